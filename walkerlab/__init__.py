@@ -40,7 +40,7 @@ def __getattr__(name: str) -> Any:
     """Load an exported name on first access."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # Not by an import statement: what stages are made of is read off those, and none of them needs this.
+    # An import statement would put the API, which no stage needs, into the code digest of every stage.
     from importlib import import_module
 
     value = getattr(import_module(".api", __name__), name)
@@ -49,5 +49,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Names that the package exports."""
+    """Return all names of the package, including exports that are not loaded yet."""
     return sorted([*globals(), *__all__])

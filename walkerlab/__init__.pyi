@@ -1,4 +1,4 @@
-"""What the package offers, for type checkers."""
+"""Exported names of the package, for type checkers."""
 
 from walkerlab.api import (
     Gait,

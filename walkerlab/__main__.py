@@ -1,4 +1,4 @@
-"""`python -m walkerlab` is `walkerlab`."""
+"""Entry point of `python -m walkerlab`, which does the same as `walkerlab`."""
 
 from walkerlab.views.cli.main import main
 

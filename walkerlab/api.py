@@ -1,4 +1,4 @@
-"""Python interface: runs stored as by the command line, and plain objects in memory."""
+"""Python interface: runs stored in folders as by the command line, or computed in memory."""
 
 import itertools
 import json
@@ -43,15 +43,15 @@ MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
     ),
     "contact": ((Contact,), "walkerlab.contact() makes one."),
 }
-"""Arguments that are blocks of a config: what they may be, and what makes them."""
+"""Arguments that are config blocks: the allowed types, and advice on how to build them."""
 
 
 class Combined(TypedDict, total=False):
-    """How a sweep combines the values of its parameters; by default as in the config.
+    """Options for combining the values of a sweep's parameters; by default they form the full grid.
 
-    zip     combine the n-th values into the n-th point
-    sample  sample points from the intervals instead, as "sobol:64"
-    seed    seed of the sampled points
+    zip     whether to combine the n-th values into the n-th point
+    sample  method and number of points to sample from the intervals instead, such as "sobol:64"
+    seed    seed of the sampled points; by default from the config
     """
 
     zip: bool
@@ -64,10 +64,10 @@ class Result:
     """Result of a stage; its repr shows the headline values.
 
     stage      name of the stage
-    summary    the keys that `--json` prints, SI units
-    content    all labelled arrays, in groups
-    no_answer  why there is no answer; None if there is one
-    artifact   its file; None if it was computed in memory
+    summary    keys that `--json` prints, in SI units
+    content    all labelled arrays, by group
+    no_answer  reason if there is no answer, otherwise None
+    artifact   file of the result; None if it was computed in memory
     """
 
     stage: str
@@ -85,11 +85,11 @@ class Result:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Names of the groups for `dataset`."""
+        """Names of the groups of arrays, as arguments of `dataset`."""
         return tuple(path for path, group in self.content.groups.items() if group.variables)
 
     def dataset(self, group: str) -> Any:
-        """Return a group as an xarray Dataset with units and long names.
+        """Return a group of arrays as an xarray Dataset with units and long names.
 
         Raises KeyError for an unknown group.
         """
@@ -114,12 +114,12 @@ class Gait(Result):
 
 
 RESULTS: dict[str, type[Result]] = {"fixedpoint": Gait}
-"""The stages whose results have more than a `Result`."""
+"""Result classes of stages whose results have additional properties."""
 
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """A folder of stored results."""
+    """Folder of stored results."""
 
     folder: RunFolder
 
@@ -129,7 +129,7 @@ class Run:
 
     @property
     def config(self) -> Config:
-        """Config of the run's results; StaleError if it cannot be determined."""
+        """Config that the results were computed with; StaleError if it cannot be determined."""
         config = config_of(self.folder)
         if config is None:
             raise StaleError(f"{self.folder.path} has no result with a readable config.")
@@ -142,11 +142,11 @@ class Run:
 
     @property
     def sweeps(self) -> tuple[str, ...]:
-        """Names of the stored sweeps, for `sweep`."""
+        """Names of the stored sweeps, as arguments of `sweep`."""
         return tuple(sorted(path.stem for path in self.folder.path.glob("sweep-*.h5")))
 
     def result(self, stage: str) -> Result:
-        """Return the stored result of a stage, up to date or not; StaleError if it cannot be read."""
+        """Return the stored result of a stage, even if it is out of date; StaleError if it cannot be read."""
         _check_stage(stage)
         stored = result_in(self.folder, stage)
         message = stored.summary.get("no_answer")
@@ -154,7 +154,7 @@ class Run:
         return _result_of(stage, stored.summary, stored, no_answer, self.folder.artifact(stage))
 
     def sweep(self, name: str = "") -> Any:
-        """Return a sweep as an xarray Dataset; by default the only one. StaleError if it cannot be read."""
+        """Return a stored sweep as an xarray Dataset, by default the only one; StaleError if it cannot be read."""
         names = self.sweeps
         if not name and len(names) != 1:
             raise StaleError(f"{self.folder.path} has {len(names)} sweeps: {', '.join(names) or 'none'}.")
@@ -178,15 +178,15 @@ def run(
     force: bool = False,
     jobs: int = 1,
 ) -> Result:
-    """Do what `walkerlab STAGE` does: reuse what is up to date, run the rest, store it.
+    """Run a stage as `walkerlab STAGE` does: reuse up-to-date results, compute the others and store them.
 
-    config   a file, the name of a built-in config, or a run: its name or its folder
-    set      keys of the config with other values, as {"slope_deg": 3}
-    runs     the folder of all runs
-    name     of the run's folder; None names it after the config and its changes
-    strides  to walk, for stages that walk
+    config   file, name of a built-in config, or name or folder of a run
+    set      config keys to change, such as {"slope_deg": 3}
+    runs     folder that holds all runs
+    name     name of the run's folder; None derives it from the config and its changes
+    strides  number of strides to walk; None keeps the config's number
 
-    Raises ConfigError for an unusable config. For a question without an answer, `Result.no_answer` has the reason.
+    Raises ConfigError for an invalid config. If the computation has no answer, `Result.no_answer` has the reason.
 
     >>> gait = run("fixedpoint", set={"slope_deg": 3}, runs=folder)
     >>> round(gait.summary["period_s"], 4)
@@ -203,7 +203,7 @@ def run(
 
 
 def open_run(name: str | Path, runs: str | Path = RUNS) -> Run:
-    """Open a stored run by its name in the folder of all runs, or by its own folder.
+    """Open a stored run by its name in the folder `runs`, or by the path of its own folder.
 
     Raises ConfigError for an unknown run.
 
@@ -226,15 +226,15 @@ def sweep(
     jobs: int = 0,
     **combined: Unpack[Combined],
 ) -> Any:
-    """Do what `walkerlab sweep` does, and give its file as one xarray Dataset.
+    """Run a sweep as `walkerlab sweep` does, and return all of its results as one xarray Dataset.
 
-    over      for each key of a config its values, or "FROM:TO:N"
-    name      of the run's folder; None names it after the config and its changes
-    jobs      chunks computed at once; 0 leaves it to the engine
-    combined  zip, sample and seed: how the values are combined, each with each unless they say otherwise
+    over      values of each config key to vary, as a list or "FROM:TO:N"
+    name      name of the run's folder; None derives it from the config and its changes
+    jobs      number of chunks to compute in parallel; 0 lets the engine choose
+    combined  zip, sample and seed, see `Combined`; by default the values form the full grid
 
-    Raises NoAnswer if points were not computed, and WalkerlabError if a bug is why; the others are stored then, for
-    `open_run`.
+    Raises NoAnswer if points could not be computed, or WalkerlabError if a bug is among the reasons. The other points
+    are stored; `open_run` reads them.
 
     >>> gaits = sweep("fixedpoint", {"slope_deg": [1, 3]}, runs=folder, jobs=1)
     >>> [round(float(period), 4) for period in gaits.period_s]
@@ -244,7 +244,7 @@ def sweep(
     from walkerlab.pipeline.sweeps.question import build_sweep
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
 
-    xarray_here()  # the answer is a Dataset
+    xarray_here()  # fail before the sweep runs if xarray is missing
     resolved = resolve(str(config), set_options(set), runs=_folder_of(runs), name=name)
     warn(resolved.loaded.warnings)
     if not isinstance(over, Mapping):
@@ -262,7 +262,7 @@ def sweep(
 
 
 def walker(type: str, **keys: Any) -> Any:
-    """Build a walker of any type, as a block of a config; missing keys have their defaults.
+    """Build the config block of a walker of any type; omitted keys have their defaults.
 
     Raises ConfigError for a key or value that the type does not allow.
     """
@@ -270,7 +270,7 @@ def walker(type: str, **keys: Any) -> Any:
 
 
 def compass(**keys: Any) -> Any:
-    """The compass walker: two straight legs with a mass on each, and a mass at the hip; the paper's by default.
+    """Build a compass walker: two straight legs with a mass on each, and a mass at the hip; by default the paper's.
 
     >>> compass(hip_mass_kg=20).total_mass_kg
     30.0
@@ -279,7 +279,7 @@ def compass(**keys: Any) -> Any:
 
 
 def kneed(**keys: Any) -> Any:
-    """A walker with knees that lock; Hsu Chen's by default.
+    """Build a walker with knees that lock; by default Hsu Chen's walker.
 
     >>> kneed(hip_mass_kg=1.0).total_mass_kg
     2.1
@@ -288,7 +288,7 @@ def kneed(**keys: Any) -> Any:
 
 
 def contact(**keys: Any) -> Contact:
-    """The ground of the contact model, numbers in N, mm, s as ADAMS dialogs show them unless `units="si"`.
+    """Build the ground of the contact model; values are in N, mm, s as in ADAMS dialogs, unless `units="si"`.
 
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
@@ -299,15 +299,15 @@ def contact(**keys: Any) -> Contact:
 
 
 def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Gait:
-    """The periodic gaits of a walker on a slope, in memory: the chosen one in `summary`, all of them in `dataset`.
+    """Find the periodic gaits of a walker on a slope, in memory; `summary` has the chosen gait, `dataset` all of them.
 
-    What is left out is as in the built-in `paper` config, here and below.
+    Here and in the functions below, omitted arguments have their values from the built-in `paper` config.
 
-    walker     from `compass`, `kneed` or `walker`
-    slope_deg  positive downhill, deg
-    keys       other keys of a config, such as gravity_m_s2, equations, seed
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    keys       other config keys, such as gravity_m_s2, equations, seed
 
-    Raises ConfigError for values that are not allowed, as all functions here do.
+    Raises ConfigError for values that are not allowed, as do all functions below.
 
     >>> gait = find_gait(compass(hip_mass_kg=10), slope_deg=3)
     >>> gait.summary["stable"], round(gait.summary["period_s"], 4)
@@ -323,12 +323,12 @@ def simulate(
     strides: int | None = None,
     **keys: Any,
 ) -> Result:
-    """Walk, in memory: the rigid model, or with `contact` the contact model; from the gait unless `start` is given.
+    """Simulate a walk in memory; it starts on the gait unless `start` is passed.
 
-    walker     from `compass`, `kneed` or `walker`
-    slope_deg  positive downhill, deg
-    contact    the ground, from `contact`; None is the rigid model
-    keys       other keys of a config, such as start, gravity_m_s2, solver
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    contact    ground of the contact model, built by `contact`; None simulates the rigid model
+    keys       other config keys, such as start, gravity_m_s2, solver
 
     >>> walk = simulate(slope_deg=1, strides=2)
     >>> walk.summary["outcome"], walk.summary["steps"]
@@ -348,12 +348,13 @@ def continue_gait(
     slope_deg: float | None = None,
     **keys: Any,
 ) -> Result:
-    """Follow families of gaits over a parameter of the config, in memory: branches and bifurcations in `summary`.
+    """Follow families of gaits over a config parameter, in memory; `summary` has the branches and bifurcations.
 
-    walker     from `compass`, `kneed` or `walker`
-    over       the key that changes, and `span` from where to where, in its unit
-    slope_deg  positive downhill, deg, where `over` is another key
-    keys       others of the block `continuation`, such as model; other keys of a config, such as contact, seed
+    walker     built by `compass`, `kneed` or `walker`
+    over       config key to vary
+    span       first and last value, in the key's unit
+    slope_deg  slope in deg, positive downhill, if `over` is another key
+    keys       other keys of the block `continuation`, such as model, or of the config, such as contact, seed
     """
     ends = {} if span is None else dict(zip(("from", "to"), _two_numbers("span", _plain(span)), strict=True))
     values = {"slope_deg": slope_deg, **_stage_block("continuation", keys, over=over, **ends)}
@@ -363,12 +364,12 @@ def continue_gait(
 def basin(
     walker: Any = None, slope_deg: float | None = None, cells: tuple[int, int] | None = None, **keys: Any
 ) -> Result:
-    """Which starts come to which attractor, in memory: shares in `summary`, the window's cells in `dataset`.
+    """Find which starts lead to which attractor, in memory; `summary` has their fractions, `dataset` a grid of starts.
 
-    walker     from `compass`, `kneed` or `walker`
-    slope_deg  positive downhill, deg
-    cells      along either axis of the window
-    keys       others of the block `basin`, such as model; other keys of a config, such as seed
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    cells      number of cells of the grid along each axis
+    keys       other keys of the block `basin`, such as model, or of the config, such as seed
     """
     values = {"slope_deg": slope_deg, **_stage_block("basin", keys, cells=cells)}
     return in_memory("basin", config_of_scene(walker, values, keys))
@@ -377,13 +378,13 @@ def basin(
 def robustness(
     walker: Any = None, slope_deg: float | None = None, to: Sequence[str] = (), walks: int | None = None, **keys: Any
 ) -> Result:
-    """Find what a gait survives and which parameter matters most, in memory; `summary` has the norms.
+    """Find the largest disturbances that a gait survives and the parameter that matters most, in memory.
 
-    walker     from `compass`, `kneed` or `walker`
-    slope_deg  positive downhill, deg
-    to         numbers of the config that the gait is differentiated by; by default all that the model reads
-    walks      on each rough ground
-    keys       model, steps, roughness_m and max_steps of the block `robustness`; other keys of a config
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    to         parameters with respect to which the gait is differentiated; by default all that the model reads
+    walks      number of walks on each rough ground
+    keys       other keys of the block `robustness`, such as model, steps, roughness_m, or of the config
     """
     values = {"slope_deg": slope_deg, **_stage_block("robustness", keys, to=to or None, walks=walks)}
     return in_memory("robustness", config_of_scene(walker, values, keys))
@@ -396,13 +397,13 @@ def explore(
     runs: str | Path = RUNS,
     **keys: Any,
 ) -> Any:
-    """The page of `walkerlab explore` in a notebook's frame; its `url` is for a browser, its `close()` ends it.
+    """Return the page of `walkerlab explore` for a notebook; its `url` opens in a browser, and `close()` stops it.
 
-    walker     from `compass`, `kneed` or `walker`
-    slope_deg  positive downhill, deg
-    contact    the ground, from `contact`; None is the rigid model alone
-    runs       the folder of all runs, for reports and films that the page is asked for
-    keys       other keys of a config
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    contact    ground of the contact model, built by `contact`; None shows only the rigid model
+    runs       folder that holds all runs, for reports and films made from the page
+    keys       other config keys
     """
     from walkerlab.views.explore.server import Server
     from walkerlab.views.explore.walks import ExploredConfig, sets_of
@@ -414,11 +415,11 @@ def explore(
 
 
 def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
-    """Find the walker that minimises or maximises a number of its gait, in memory: `best`, `value`, … in `summary`.
+    """Find the walker that minimises or maximises a quantity of its gait, in memory; `summary` has `best`, `value`, …
 
-    walker  from `compass`, `kneed` or `walker`
-    over    bounds (low, high) of numbers of the config, in the key's unit
-    keys    minimise or maximise, keep (bounds of other numbers of the gait), model, starts; other keys of a config
+    walker  built by `compass`, `kneed` or `walker`
+    over    bounds (low, high) of the parameters to vary, in the key's unit
+    keys    minimise or maximise, keep (bounds of other gait quantities), model, starts; other config keys
     """
     return in_memory("design", config_of_scene(walker, _stage_block("design", keys, over=over or {}), keys))
 
@@ -431,14 +432,14 @@ def read_walk(
     slope_deg: float | None = None,
     **keys: Any,
 ) -> Result:
-    """Read a walk recorded elsewhere, in memory: its steps in `summary`, steps and samples in `dataset`.
+    """Read a walk from a file, in memory; `summary` has its steps, `dataset` its steps and samples.
 
     path       CSV, table or results (.res) of ADAMS, OpenSim (.mot, .sto), markers (.trc, .c3d), or a stored walk (.h5)
-    columns    columns by quantity where their names do not say it, such as {"angle 1": "hip_r"}
-    units      units by kind, quantity or column where the file does not state them, such as {"angle": "deg"}
-    walker     whose walk it is, from `compass`, `kneed` or `walker`
-    slope_deg  positive downhill, deg
-    keys       other keys of a config
+    columns    column of each quantity that the header does not identify, such as {"angle 1": "hip_r"}
+    units      units by kind, quantity or column, if the file does not state them, such as {"angle": "deg"}
+    walker     walker that made the recording, built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    keys       other config keys
 
     Raises ConfigError for a file without a walk.
     """
@@ -454,15 +455,15 @@ def identify(
     prior: Mapping[str, Sequence[float]] | None = None,
     **keys: Any,
 ) -> Result:
-    """Estimate parameters of a walker from a measured walk, in memory: `estimates`, … in `summary`.
+    """Estimate parameters of a walker from a measured walk, in memory; `summary` has `estimates`, …
 
-    walk    a file, or columns by name: period_s and perhaps length_m of steps, or time, angle 1 and angle 2
-    config  everything that is known of the walker: a config, its file or name, or a run
-    fit     keys to estimate, or their bounds by key, in the key's unit
-    prior   value and standard deviation of keys known beforehand
-    keys    others of the block `identify`, such as level, model, nuisance
+    walk    file, or columns by name: period_s and optionally length_m of each step, or time, angle 1 and angle 2
+    config  known properties of the walker: a Config, a config file or built-in name, or a run
+    fit     keys to estimate, or a mapping of each key to its bounds, in the key's unit
+    prior   known value and standard deviation, by key
+    keys    other keys of the block `identify`, such as level, model, nuisance
 
-    Raises ConfigError for an invalid question or file. If the fit does not converge, `Result.no_answer` has the reason.
+    Raises ConfigError for invalid arguments or files. If the fit does not converge, `Result.no_answer` has the reason.
     """
     if isinstance(walk, Mapping):
         with tempfile.TemporaryDirectory() as folder:
@@ -481,22 +482,22 @@ def plan_measurements(
     model: str = "rigid",
     **keys: Any,
 ) -> Result:
-    """Say which measurements would determine parameters of a walker: `measurements`, … in `summary`.
+    """Find which measurements would determine a walker's parameters, in memory; `summary` has `measurements`, …
 
-    config  everything that is known of the walker: a config, its file or name, or a run
+    config  known properties of the walker: a Config, a config file or built-in name, or a run
     fit     keys to estimate
-    prior   value and standard deviation of keys known beforehand
+    prior   known value and standard deviation, by key
     model   rigid or contact
-    keys    others of the block `plan`, such as steps, max_steps, errors, period_noise_s
+    keys    keys of the block `plan`, such as steps, max_steps, errors, period_noise_s
 
-    Raises ConfigError for an invalid question. If the walk ends too early, `Result.no_answer` has the reason.
+    Raises ConfigError for invalid arguments. If the walk ends too early, `Result.no_answer` has the reason.
     """
     question = {"fit": dict.fromkeys(fit), "prior": dict(prior or {}), "model": model}
     return in_memory("plan", with_blocks(config, identify=question, plan=keys))
 
 
 def with_blocks(config: str | Path | Config, **blocks: Mapping[str, Any]) -> Config:
-    """Return a config, named by itself, its file, name or run, with these blocks."""
+    """Return a config with some blocks replaced; `config` may also be a file, a built-in name or a run."""
     start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
     tree = {**start.model_dump(mode="json", exclude_none=True, by_alias=True), **blocks}
     return validate_tree(tree_of(tree, NOWHERE))
@@ -510,16 +511,16 @@ def export_model(
     law: str = "contact",
     **keys: Any,
 ) -> tuple[Path, ...]:
-    """Write a walker with the start of its gait for ADAMS (.adm, .cmd) or MuJoCo (.xml); return the files written.
+    """Write a walker, started on its gait, as a model for ADAMS (.adm, .cmd) or MuJoCo (.xml); return all its files.
 
-    path       the model; commands (.acf) of a dataset, or the script of a driven walker, are written beside it
-    walker     from `compass`, `kneed` or `walker`
-    slope_deg  positive downhill, deg
-    contact    the ground, from `contact`; by default the paper's, on pads
-    law        contact in ADAMS: its own `contact`, or `functions` for walkerlab's law exactly
-    keys       other keys of a config, such as start, strides, push_off
+    path       file of the model; commands (.acf) for an .adm model, or a driven walker's script, are written next to it
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    contact    ground of the contact model, built by `contact`; by default the paper's, on pads
+    law        contact force in ADAMS: `contact` for its own, `functions` for exactly walkerlab's
+    keys       other config keys, such as start, strides, push_off
 
-    Raises ConfigError for an unknown format and for a walker that it cannot express, NoAnswer without a gait.
+    Raises ConfigError for an unknown format or a walker that the format cannot express, NoAnswer if no gait is found.
     """
     from walkerlab.exchange import export
     from walkerlab.pipeline.stages.walk import rigid_start
@@ -554,7 +555,7 @@ def _stage_block(stage: str, keys: dict[str, Any], **values: Any) -> dict[str, A
 
 
 def dataset(group: Group) -> Any:
-    """A group of labelled arrays as an xarray Dataset: variables named as a dimension are its coordinates."""
+    """Convert a group of labelled arrays to an xarray Dataset; variables named after a dimension become coordinates."""
     data = {
         name: (variable.dims, variable.values, {"units": variable.units, "long_name": variable.long_name})
         for name, variable in group.variables.items()
@@ -573,7 +574,7 @@ def xarray_here() -> Any:
 
 
 def in_memory(stage: str, config: Config) -> Result:
-    """Compute a stage and its inputs without files; ConfigError if the config lacks a block it needs."""
+    """Compute a stage and its inputs without files; ConfigError if the config lacks a block that the stage needs."""
     _check_stage(stage)
     PIPELINE[stage].refuse_question(config)
     answer = answer_in_memory(config, stage, MemoryResults())
@@ -581,10 +582,10 @@ def in_memory(stage: str, config: Config) -> Result:
 
 
 def config_of_scene(walker: Any, values: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:
-    """Build the paper config with another scene; contact only if `given` has it.
+    """Build the paper config with another scene; it has a contact block only if one is passed.
 
-    walker  its block, or None
-    given   values and blocks by key; None is left out
+    walker  walker block; None keeps the paper's
+    values  values and blocks by key; None keeps the paper's value
     keys    further keys
 
     Raises ConfigError for unknown keys and invalid values.
@@ -604,7 +605,7 @@ def config_of_scene(walker: Any, values: Mapping[str, Any], keys: Mapping[str, A
 
 
 def warn(messages: Iterable[str], inside: int = 0) -> None:
-    """Warn at the line of the caller of this module's function, `inside` functions further out."""
+    """Issue warnings that point at the line that called the API; `inside` counts the functions in between."""
     for text in messages:
         warnings.warn(text, stacklevel=3 + inside)
 
@@ -636,7 +637,7 @@ def _folder_of(runs: Any) -> Path:
 
 def sweep_values(key: str, values: Any) -> str | list[Any]:
     """Return the values of a sweep's parameter, or the text of a range; ConfigError for anything else."""
-    # Imported here: few callers sweep.
+    # Imported late: few callers sweep.
     from walkerlab.pipeline.sweeps.question import MAX_POINTS
 
     if isinstance(values, str) and not values.lstrip().startswith("["):
@@ -646,7 +647,7 @@ def sweep_values(key: str, values: Any) -> str | list[Any]:
             f"over {key}: {values!r} is not a list of values, nor a range FROM:TO:N.",
             f'For example {{"{key}": [1, 2]}} or {{"{key}": "1:3:5"}}.',
         )
-    return list(itertools.islice(values, MAX_POINTS + 1))  # more are refused, and need not be held for that
+    return list(itertools.islice(values, MAX_POINTS + 1))  # one value too many is enough for the error
 
 
 def _check_stage(stage: str) -> None:

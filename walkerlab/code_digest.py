@@ -1,4 +1,4 @@
-"""Digests of a module's source and of everything it imports, found without importing it."""
+"""Digest of a module's source and of everything it imports, computed without importing it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 PACKAGE = __name__.partition(".")[0]
 
-# Imports are found in the text because the digest must cost milliseconds and load no compiler. Full names in quotes
-# count too: registries name modules that they import late. Each alternative begins with a letter, which `re` finds
+# Imports are found by searching the text, because the digest must take milliseconds and load no compiler. Quoted full
+# names count too, since registries use them for late imports. Each alternative begins with a letter, which `re` finds
 # three times as fast as a word boundary.
 COMMENT = re.compile(r"#[^\n]*")
 IMPORT = re.compile(
@@ -22,7 +22,8 @@ IMPORT = re.compile(
     r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
 )
 
-# A wheel keeps the built-in configs inside the package. A stage's key already holds the part of the config it reads.
+# Not data of the code: in a wheel the built-in configs are inside the package, but a stage's key already contains the
+# part of the config that it reads.
 INPUT_FOLDERS = ("config/builtin",)
 
 
@@ -30,14 +31,13 @@ class Sources:
     """Sources of packages on disk; each file is read and scanned once."""
 
     def __init__(self) -> None:
-        """Start with nothing read."""
         self._modules: dict[str, Module | None] = {}
 
     def code_digest(self, name: str) -> str:
-        """SHA-256 of a module and of everything it imports from its own package or this one.
+        """Return the SHA-256 of a module and of everything it imports from its own package or this one.
 
-        Includes data files of those packages (templates, tables) but not this package's `__init__`, since a new version
-        number changes no result. Raises ModuleNotFoundError if there is no such module.
+        Data files of those packages (templates, tables) count too, but not this package's `__init__`, since a new
+        version number changes no result. Raises ModuleNotFoundError if there is no such module.
         """
         closure = self.closure(name)
         files = {f"{module.name}:{path.name}": path for module in closure for path in module.data}
@@ -45,7 +45,7 @@ class Sources:
         return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
 
     def closure(self, *names: str) -> list[Module]:
-        """Modules and everything they import, directly or not, from their own packages and this one; sorted by name.
+        """Return modules and all direct and indirect imports from their own packages and this one, sorted by name.
 
         Raises ModuleNotFoundError if there is no such module.
         """
@@ -90,7 +90,6 @@ class Module:
     """Source file of a module, read on first use."""
 
     def __init__(self, name: str, path: Path) -> None:
-        """Refer to a module by its full name and file."""
         self.name = name
         self.path = path
         self.is_package = path.name == "__init__.py"
@@ -101,18 +100,18 @@ class Module:
 
     @cached_property
     def imports(self) -> list[str]:
-        """See `find_imports`."""
+        """Full names of modules that this module may import; see `find_imports`."""
         return find_imports(self.name, self.is_package, self.text)
 
     @cached_property
     def data(self) -> list[Path]:
-        """Files of a package that are not Python, in its folder and in subfolders that are not packages."""
+        """Data files of a package, in its folder and in subfolders that are not packages themselves."""
         return sorted(data_files(self.path.parent)) if self.is_package else []
 
 
 @cache
 def find_imports(module: str, is_package: bool, source: bytes) -> list[str]:
-    """Full names of possible modules that a module imports, including all parent packages and its own."""
+    """Return the full names of modules that a module may import, with all parent packages and its own name."""
     text = COMMENT.sub("", source.decode()).replace("\\\n", " ")
     own = {PACKAGE, module.partition(".")[0]}
     names = {module, *(name for name in imported_names(module, is_package, text) if name.partition(".")[0] in own)}
@@ -120,7 +119,7 @@ def find_imports(module: str, is_package: bool, source: bytes) -> list[str]:
 
 
 def imported_names(module: str, is_package: bool, text: str) -> Iterator[str]:
-    """Full names in the import statements of a module's text (without comments), and dotted names in quotes."""
+    """Yield the full names in the import statements of a module's text (without comments), and quoted dotted names."""
     for match in IMPORT.finditer(text):
         if match["quoted"]:
             yield match["quoted"]
@@ -128,12 +127,12 @@ def imported_names(module: str, is_package: bool, text: str) -> Iterator[str]:
             origin = None if match["modules"] else absolute_name(module, is_package, match["origin"])
             yield from [origin] if origin else []
             listed = (match["modules"] or match["names"].strip("() \t\n")).split(",")
-            names = [entry.split()[0] for entry in listed if entry.strip()]  # of 'a, b as c'
+            names = [entry.split()[0] for entry in listed if entry.strip()]  # without 'as' aliases
             yield from (f"{origin}.{name}" if origin else name for name in names)
 
 
 def absolute_name(module: str, is_package: bool, origin: str) -> str:
-    """Full name of the module in `from ... import`, which may be relative."""
+    """Return the full name of the module in a `from ... import`, which may be relative."""
     name = origin.lstrip(".")
     levels = len(origin) - len(name)
     if not levels:
@@ -144,7 +143,7 @@ def absolute_name(module: str, is_package: bool, origin: str) -> str:
 
 
 def digest_of(parts: Iterable[tuple[str, bytes]]) -> str:
-    """SHA-256 (hex) of named parts."""
+    """Return the SHA-256 (hex) of named parts."""
     digest = hashlib.sha256()
     for name, data in parts:
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
@@ -152,7 +151,7 @@ def digest_of(parts: Iterable[tuple[str, bytes]]) -> str:
 
 
 def data_files(folder: Path) -> Iterator[Path]:
-    """Files that a package's code may read: all except Python, caches, hidden files and built-in configs."""
+    """Yield files that a package's code may read: all except Python, caches, hidden files and built-in configs."""
     for path in folder.iterdir():
         if path.name.startswith((".", "__pycache__")) or path.as_posix().endswith(INPUT_FOLDERS):
             continue

@@ -4,16 +4,16 @@ import re
 from typing import Any, ClassVar, Final
 
 COMMAND_PATTERN: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
-"""A command in a text, unless it is about no run."""
+"""Commands in a text, except those that do not act on a run."""
 
 
 def add_run_options(text: str, typed: str) -> str:
-    """Add the options that select the run, `typed` with a blank in front, to the commands that a text advises."""
+    """Append the options that select the run, `typed` with a leading space, to every command in a text."""
     return COMMAND_PATTERN.sub(lambda match: f"`{match[1]}{typed}`", text) if typed else text
 
 
 class WalkerlabError(Exception):
-    """A failure that the user can act on: a message that says what happened, and advice, which may be empty."""
+    """Failure that the user can act on, with a message about what happened and advice, which may be empty."""
 
     exit_code: ClassVar[int] = 1
 
@@ -37,7 +37,7 @@ class ConfigError(WalkerlabError):
 
 
 class NoAnswer(WalkerlabError):  # noqa: N818 (no answer is a result, not an error)
-    """The computation has no answer (no gait found, solver failed, ...); `partial` may hold its content so far."""
+    """The computation has no answer (no gait found, solver failed, ...); `partial` may hold unfinished results."""
 
     exit_code = 4
 

@@ -18,24 +18,24 @@ ERROR_OF_EACH_STEP: Final = {
     "rolling_m": "rolling_m",
     "knee_strike_times_s": "knee_strike_time_s",
 }
-"""Quantities of each step in a walk's summary, with their names in its `numerical_error`."""
+"""Per-step quantities in a walk's summary, and their names in its `numerical_error`."""
 
 
 @dataclass(frozen=True)
 class Label:
     """Unit and meaning of a field or property of a row, used in `Annotated`; unlabelled fields are not stored."""
 
-    unit: str  # "1" for a pure number, "" for text
+    unit: str  # "1" for pure numbers, "" for text
     text: str  # meaning
     dims: tuple[str, ...] = ()  # dimensions of a row's value; () for a scalar
     timing: bool = False  # whether it is a measured run time or derived from one
     absent: float | None = None  # substitute for a missing value; None leaves a gap
-    name: str = ""  # stored name, if not the field's
+    name: str = ""  # stored name, if it differs from the field's
 
 
 @cache
 def labels_of(row: type) -> Mapping[str, Label]:
-    """Return the labels of a row class by field and property."""
+    """Return the labels of a row class by the name of the field or property."""
     properties = [(name, member.fget) for name, member in vars(row).items() if isinstance(member, property)]
     returned = {name: get_type_hints(getter, include_extras=True)["return"] for name, getter in properties}
     hints = get_type_hints(row, include_extras=True) | returned
@@ -43,17 +43,17 @@ def labels_of(row: type) -> Mapping[str, Label]:
 
 
 def unit_ending(name: str) -> str:
-    """Return the unit suffix of a name, as m_s of velocity_m_s; may be empty."""
+    """Return the unit suffix of a name, e.g. m_s for velocity_m_s; empty if it has none."""
     return max((ending for ending in UNITS if name.endswith(f"_{ending}")), key=len, default="")
 
 
 def unit_by_name(name: str) -> str:
-    """Return the unit in a name's suffix; '1' without one."""
+    """Return the unit in a name's suffix; '1' if it has none."""
     return UNITS.get(unit_ending(name), "1")
 
 
 def axis_label(key: str) -> str:
-    """Turn a key into an axis label without unit: thigh mass for walker.thigh.mass_kg."""
+    """Convert a key to an axis label without unit, e.g. walker.thigh.mass_kg to 'thigh mass'."""
     ending = unit_ending(key)
     return key.removeprefix("walker.").removesuffix(f"_{ending}" if ending else "").replace("_", " ").replace(".", " ")
 
@@ -63,6 +63,6 @@ def with_unit(words: str, unit: str) -> str:
 
 
 def join_words(parts: Iterable[str]) -> str:
-    """Join words: 'a', 'a and b', 'a, b and c'."""
+    """Join words as in English: 'a', 'a and b', 'a, b and c'."""
     words = list(parts)
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

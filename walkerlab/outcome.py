@@ -1,11 +1,11 @@
-"""Outcomes of walks: values with texts, advice and colour, never exceptions."""
+"""Outcomes of walks, with texts, advice and a colour for each; an outcome is a value, never an exception."""
 
 from enum import IntEnum
 from typing import NamedTuple
 
 
 class Outcome(IntEnum):
-    """How a walk ends; kernels return the integer."""
+    """Ending of a walk; kernels return the integer."""
 
     WALKED = 0
     FELL = 1
@@ -21,17 +21,17 @@ class Outcome(IntEnum):
 
     @property
     def label(self) -> str:
-        """Name in tables and JSON."""
+        """Name of the outcome in tables and JSON."""
         return self.name.lower().replace("_", "-")
 
     @property
     def answered(self) -> bool:
-        """Whether the walk gives an answer: a fall does, a failed solver does not."""
+        """Whether the walk has a definite result: a fall is one, a failed solver is not."""
         return self not in (Outcome.BUDGET_EXHAUSTED, Outcome.SOLVER_FAILED)
 
     @property
     def stumbled(self) -> bool:
-        """Whether the walker itself could not continue."""
+        """Whether the walk ended because the walker could not continue."""
         return self.answered and self not in (Outcome.WALKED, Outcome.REJECTED)
 
     @property
@@ -40,7 +40,7 @@ class Outcome(IntEnum):
 
     @property
     def advice_on_uneven_ground(self) -> str:
-        """Advice for uneven ground, which may stop a walk from any start."""
+        """Advice for a walk on uneven ground, where any start may fail."""
         return ADVICE_ON_UNEVEN_GROUND.get(self, self.advice)
 
 
@@ -50,11 +50,11 @@ def outcome_of(label: str) -> Outcome | None:
 
 
 class OutcomeWords(NamedTuple):
-    does: str  # present tense, of one walker
-    did: str  # past tense, after a number of walks
-    why: str  # why a family of gaits ends there
-    colour: str  # on maps: saturated for walking, pale for failure
-    advice: str  # meaning, and what to try next
+    does: str  # predicate for one walker, present tense
+    did: str  # predicate for a number of walks, past tense
+    why: str  # reason why a family of gaits ends with this outcome
+    colour: str  # colour on maps: saturated for walking, pale for failures
+    advice: str  # meaning of the outcome, and what to try next
 
 
 OUTCOME_TEXTS = {
@@ -152,4 +152,4 @@ ADVICE_ON_UNEVEN_GROUND = {
     f"{TRY_EVEN_GROUND}",
     Outcome.BENT_KNEE: f"On this uneven ground a foot came down on a knee that had not locked; {TRY_EVEN_GROUND}",
 }
-"""Advice for walks over footholds of different heights, where it differs."""
+"""Advice for walks on uneven ground, for the outcomes whose advice differs there."""

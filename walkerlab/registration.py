@@ -1,6 +1,6 @@
-"""Late imports for registries: code is named by a quoted string and imported when it is used.
+"""Late imports for registries: code is named by a quoted string and imported on first use.
 
-Names are written in full, so that digests of code include them (see code_digest.py).
+Module names are written in full, so that code digests include the modules (see code_digest.py).
 """
 
 from collections.abc import Callable
@@ -13,5 +13,5 @@ def registered(module: str, name: str) -> Any:
 
 
 def later(module: str, name: str) -> Callable[..., Any]:
-    """Return a stand-in for a function that is imported when first called."""
+    """Return a stand-in that imports the function when it is called."""
     return lambda *arguments: registered(module, name)(*arguments)

@@ -9,16 +9,16 @@ from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 Coordinate = Literal["theta_2", "dtheta_1", "dtheta_2"]
 COORDINATES: Final[tuple[Coordinate, ...]] = get_args(Coordinate)
-MAX_BOUND: Final = 1e6  # of a window's bounds
+MAX_BOUND: Final = 1e6  # limit of the window's bounds
 
 _COORDINATE_UNITS: Final = "rad, rad/s"
 _WIDTH: Final = "the gait by 0.15 rad and 0.25 sqrt(g/L)"
 _Bound = Annotated[float, Field(ge=-MAX_BOUND, le=MAX_BOUND)]
-_Bounds = tuple[_Bound, ...]  # empty: the usual window
+_Bounds = tuple[_Bound, ...]  # empty for the default window
 
 
 class Basin(Block):
-    """Starts on a grid over coordinates of the section just after heel strike; the others are the gait's."""
+    """Grid of starts just after heel strike; coordinates that the grid does not vary have the gait's values."""
 
     model: Literal["rigid", "contact"] = key("rigid", "", "which model walks")
     plane: tuple[Coordinate, ...] = key(

@@ -99,7 +99,7 @@ class Contact(Block):
     @model_validator(mode="before")
     @classmethod
     def _default_quantities_in_si(cls, data: Any) -> Any:
-        """A key left out means the same physical quantity in either units."""
+        """Convert the defaults, so that an omitted key means the same physical quantity in both systems of units."""
         if not isinstance(data, dict) or data.get("units") != "si":
             return data
         exponent = data.get("exponent", 2.2)
@@ -121,7 +121,7 @@ class Contact(Block):
     @field_validator(*BOUNDS_SI)
     @classmethod
     def _within_bounds(cls, value: float, info: ValidationInfo) -> float:
-        """Check a length or velocity against its bounds, which are converted to the block's units."""
+        """Check a length or velocity against its bounds, converted to the block's units."""
         units = info.data.get("units", "adams")
         scale, prefix = (MM_PER_M, "m") if units == "adams" else (1.0, "")
         least, most, unit = BOUNDS_SI[str(info.field_name)]
@@ -134,7 +134,7 @@ class Contact(Block):
         return self.friction != "none"
 
     def unit_of(self, either: str) -> str:
-        """Choose the unit in use from a key's units, such as `mm or m`."""
+        """Return the unit in use from a pair of units such as `mm or m`."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
     def in_si(self) -> Self:

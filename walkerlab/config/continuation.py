@@ -15,7 +15,7 @@ _UNIT: Final = "unit of the key"
 if TYPE_CHECKING:
 
     class _Span(Block):
-        """A range of values; its keys are `from` and `to`."""
+        """Range of values, with the keys `from` and `to`."""
 
 else:
     # `from` is a keyword of Python, so a class body cannot declare it
@@ -35,7 +35,7 @@ else:
 
 
 class Span(_Span):
-    """A key and a range of its values."""
+    """Config key and the range over which it varies."""
 
     over: str = key(
         "slope_rad",
@@ -51,7 +51,7 @@ class Span(_Span):
 
     @property
     def most(self) -> float:
-        value: Any = getattr(self, "to")  # noqa: B009 - declared above, out of the type checker's sight
+        value: Any = getattr(self, "to")  # noqa: B009 - declared above, where the type checker cannot see it
         return float(value)
 
 

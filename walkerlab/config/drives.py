@@ -8,7 +8,7 @@ from walkerlab.config.numbers import short_number
 
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
 STRONGEST: Final = 1e9
-QUICKEST: Final = 1e4  # rad/s, of a leg at its spring: legs with next to no inertia would swing infinitely fast
+QUICKEST: Final = 1e4  # rad/s, fastest leg on a hip spring or damper; massless legs would be infinitely fast
 
 
 class Hip(Block):
@@ -27,7 +27,7 @@ class Hip(Block):
     )
 
     def too_quick_for(self, inertia: float) -> bool:
-        """Whether it would swing legs with an inertia about the hip (kg m^2) too fast to integrate."""
+        """Whether the torques would swing a leg with this inertia about the hip (kg m^2) too fast to integrate."""
         steady = max(self.spring_N_m_per_rad, abs(self.torque_N_m))
         return steady > QUICKEST**2 * inertia or self.damping_N_m_s_per_rad > QUICKEST * inertia
 
@@ -42,7 +42,7 @@ class PushOff(Block):
 
 
 def drives_of(config: Any) -> tuple[str, ...]:
-    """Describe what supplies energy to a config's walker besides gravity."""
+    """Describe the drives that supply energy to a config's walker."""
     push, torque = config.push_off.impulse_N_s, config.walker.hip.torque_N_m
     return nonzero_words(
         {f"a push-off of {short_number(push)} N s": push, f"a hip torque of {short_number(torque)} N m": torque}
@@ -63,5 +63,5 @@ def nonzero_words(acting: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def acting_on(config: Any) -> tuple[str, ...]:
-    """Describe what acts on a config's walker besides gravity and ground."""
+    """Describe the drives, hip spring and hip damper of a config's walker; empty if it is passive."""
     return drives_of(config) + springs_of(config)

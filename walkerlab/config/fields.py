@@ -1,4 +1,4 @@
-"""Annotations of config keys: unit, bounds, meaning and source of each, and texts that describe them."""
+"""Annotations of config keys (unit, bounds, meaning, source), and functions that describe keys and blocks."""
 
 import types
 from collections.abc import Callable, Iterable, Iterator
@@ -15,7 +15,7 @@ from walkerlab.labels import with_unit
 
 
 class Block(BaseModel):
-    """Base of all config blocks: frozen and strictly typed; unknown keys, NaN and infinity are errors."""
+    """Base class of all config blocks: frozen and strictly typed; unknown keys, NaN and infinity are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
 
@@ -33,12 +33,12 @@ def key(
 ) -> Any:
     """Declare a key of a block.
 
-    unit              as printed; "1" for pure numbers, "" for none
-    meaning           one sentence
+    unit              printed unit; "1" for pure numbers, "" for other values
+    meaning           description, one sentence
     source            origin of the default
     bounds            description of the allowed values, where `limits` cannot express them
     default_in_words  description of a default that depends on another key
-    sequence          whether YAML lists become tuples, as for keys whose default is a tuple
+    sequence          whether YAML lists become tuples; implied if the default is a tuple
     limits            pydantic's constraints: gt, ge, lt, le, pattern, ...
     """
     words = {"unit": unit, "source": source, "bounds": bounds, "default_in_words": default_in_words}
@@ -55,10 +55,10 @@ def meaning_error(reason: str) -> PydanticCustomError:
 
 
 def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
-    """Validate key `name` by the value of key `other` above it; `why` returns the reason or an empty text."""
+    """Validate key `name` against key `other`, declared above it; `why` returns the reason for an error or ''."""
 
     def check(value: Any, info: ValidationInfo) -> Any:
-        other_value = info.data.get(other)  # None if that key has an error of its own
+        other_value = info.data.get(other)  # None if the other key is itself invalid
         reason = "" if other_value is None else why(value, other_value)
         if reason:
             raise meaning_error(reason)
@@ -68,7 +68,7 @@ def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:
-    """Return the block that a key holds (the first of several kinds), or None for a value."""
+    """Return the type of the block that a key holds (the first kind if there are several); None if it holds a value."""
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Block):
             return candidate
@@ -76,7 +76,7 @@ def block_of(field: FieldInfo) -> type[Block] | None:
 
 
 def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
-    """Return the blocks that a key may hold, by their `type`; empty if there is at most one."""
+    """Return the types of block that a key may hold, by the block's key `type`; empty if there is at most one."""
     kinds = {}
     for candidate in get_args(field.annotation):
         for tag in get_args(candidate)[1:]:
@@ -90,7 +90,7 @@ def leaves(
 ) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
     """Yield path and field of every value in `block`, in the schema's order.
 
-    A config's block of that type, `held`, selects the kind of each inner block; by default the first kind.
+    held  instance of `block` that selects the kind of each inner block; by default the first kind
     """
     for name, field in block.model_fields.items():
         inner, own = block_of(field), getattr(held, name, None)
@@ -101,7 +101,7 @@ def leaves(
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Yield path and field of values in the other kinds of blocks: `walker(kneed).thigh.length_m`."""
+    """Yield path and field of the values in all but the first kind of block, e.g. `walker(kneed).thigh.length_m`."""
     for name, field in block.model_fields.items():
         for tag, kind in list(kinds_of(field).items())[1:]:
             yield from leaves(kind, (f"{name}({tag})",))
@@ -113,7 +113,7 @@ def value_at(config: Any, path: Iterable[str]) -> Any:
 
 
 def annotation_of(field: FieldInfo, name: str) -> str:
-    """Return a key's `unit`, `source`, `bounds` or `default_in_words`; empty if it has none."""
+    """Return the annotation `unit`, `source`, `bounds` or `default_in_words` of a key; empty if it has none."""
     extra = field.json_schema_extra
     return str(extra.get(name, "")) if isinstance(extra, dict) else ""
 
@@ -141,7 +141,7 @@ def type_words(annotation: Any) -> str:
 
 
 def words_of(annotation: Any) -> tuple[str, ...]:
-    """Return the words that a value may be, also inside a list or union."""
+    """Return the words that a type allows, including those inside a list or union."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
         return tuple(word for word in parts if isinstance(word, str))

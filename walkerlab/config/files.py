@@ -1,4 +1,4 @@
-"""Config files, user-written and built in: finding and reading them."""
+"""Finding and reading config files, user-written or built in."""
 
 import contextlib
 import stat
@@ -27,7 +27,7 @@ read_cached = lru_cache(maxsize=32)(read)  # callers change only copies of the t
 class ConfigFile:
     """A config file, or the config of a stored run."""
 
-    path: Path  # of the file; for a run, the name of its folder
+    path: Path  # path of the file; for a run, the name of its folder
     label: str  # name in messages
     text: str | None = None  # config stored with a run or artifact; None to read the file
     changes: tuple[str, ...] = ()  # KEY=VALUE settings that made the run's config from its file
@@ -38,7 +38,7 @@ def builtin_names() -> tuple[str, ...]:
 
 
 def config_to_extend(typed: str | None) -> str:
-    """Return the config that a new one may extend: that of the command line, or the paper's for a run."""
+    """Return the config that a new one extends: `typed` if it is a file or a built-in name, otherwise the paper's."""
     is_config = typed is not None and (
         typed in builtin_names() or (Path(typed).is_file() and Path(typed).suffix != ".h5")
     )
@@ -50,7 +50,7 @@ def builtin_config(name: str) -> ConfigFile:
 
 
 def find_config(path: Path) -> ConfigFile:
-    """Resolve `--config`: an existing path, otherwise the name of a built-in config."""
+    """Resolve `--config`, which is an existing path or the name of a built-in config."""
     if str(path) in builtin_names() and not path.is_file():
         return builtin_config(str(path))
     return file_at(path)
@@ -61,9 +61,9 @@ def file_at(path: Path) -> ConfigFile:
 
 
 def read_layers(file: ConfigFile) -> list[Mapping]:
-    """Read a file and all it extends, the furthest ancestor first.
+    """Read a config file and all files that it extends, directly or indirectly; the file itself comes last.
 
-    Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, and if a stored config
+    Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, or if a stored config
     refers to another file.
     """
     layers = [
@@ -73,7 +73,7 @@ def read_layers(file: ConfigFile) -> list[Mapping]:
 
 
 def files_read(file: ConfigFile) -> list[Path]:
-    """List the files a config is read from: its own, those it extends, and lists of cases."""
+    """List the files that a config is read from: its own, the files it extends, and files with stability cases."""
     paths = []
     for layer_file, root in files_and_blocks(file):
         cases = cases_file(root, layer_file.path.parent)
@@ -82,9 +82,9 @@ def files_read(file: ConfigFile) -> list[Path]:
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
-    """Yield a config's file with its block of keys, then the file it extends, and so on; raises as `read_layers`."""
+    """Yield (file, block of keys) of a config, then of each file it extends; raises the errors of `read_layers`."""
     seen: list[str] = []
-    reference: Position | None = None  # where the file's name stands
+    reference: Position | None = None  # position of the file's name in the config that extends it
     while True:
         root = read_cached(_text_of(file, reference), file.label)
         if str(file.path.resolve()) in seen:
@@ -106,12 +106,12 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
         reference = extends.position
         if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
             raise problem_error(reference, "extends: is not the name of a config", _what_there_is())
-        is_builtin = extends.value in builtin_names()  # else a path from the file's folder
+        is_builtin = extends.value in builtin_names()  # otherwise a path relative to the file's folder
         file = builtin_config(extends.value) if is_builtin else file_at(file.path.parent / extends.value)
 
 
 def _refuse_named_files(root: Mapping) -> None:
-    """Raise ConfigError if a stored config refers to a file: it may be untrusted, and is complete anyway."""
+    """Raise ConfigError if a stored config, which may be untrusted and needs no other file, refers to one."""
     cases = cases_file(root, Path())
     places = [root.entries["extends"].position] if "extends" in root.entries else []
     places += [] if cases is None else [cases[1]]
@@ -120,7 +120,7 @@ def _refuse_named_files(root: Mapping) -> None:
 
 
 def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
-    """Return the file named under stability.cases, relative to a folder, and its position; None for a list of cases."""
+    """Return the file named under stability.cases (relative to `folder`) and the name's position; None for a list."""
     block = layer.entries.get("stability")
     file_name = block.entries.get("cases") if isinstance(block, Mapping) else None
     if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):
@@ -129,7 +129,7 @@ def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | No
 
 
 def with_cases(layer: Mapping, folder: Path) -> Mapping:
-    """Replace the name of a file under stability.cases, relative to a folder, by the list in that file.
+    """Replace a file name under stability.cases (relative to `folder`) by the list of cases in that file.
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
@@ -151,7 +151,8 @@ def _what_there_is() -> str:
 
 
 def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") -> str:
-    # position of its name and expected content, if not a config, are for the message if it cannot be read
+    # `reference`, the position of the file's name, and `purpose`, the expected content if not a config, are only for
+    # the error message.
     if file.text is not None:
         return file.text
     kind = "file" if purpose else "config"
@@ -168,7 +169,7 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
         beyond = "" if purpose or file.path.suffix else beyond_scope(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
         raise problem_error(reference, text, there_is, "" if beyond else _near(file), advice) from None
-    except (OSError, ValueError, RuntimeError) as error:  # ValueError: a null byte in the name; RuntimeError: a loop
+    except (OSError, ValueError, RuntimeError) as error:  # ValueError: null byte in the name; RuntimeError: link loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise problem_error(reference, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
     if len(data) > 4 * MAX_CHARACTERS:

@@ -16,12 +16,12 @@ class ConfigSetting:
     """A `--set KEY=VALUE` option."""
 
     path: tuple[str, ...]  # parts of the dotted key
-    value: Node  # tree of the value
-    position: Position  # of the key
+    value: Node  # parsed value, as a tree
+    position: Position  # position of the key
 
 
 def merge_layers(layers: Sequence[Mapping]) -> Mapping:
-    """Merge layers into one block, later over earlier; the name comes from the last layer alone.
+    """Merge layers into one block; later layers override earlier ones, and only the last one sets the name.
 
     Raises ConfigError if a layer has more than one slope key.
     """
@@ -56,7 +56,7 @@ def _refuse_two_slopes(keys: dict[str, Position]) -> None:
 
 def parse_setting(text: str) -> ConfigSetting:
     """Parse a `--set` option; ConfigError if it is not KEY=VALUE with a YAML value."""
-    # an attribute `source` of the text, if any, names the option in messages
+    # If the text has an attribute `source`, it is the option's name in messages.
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
     start = Position(source, 1, 1)
@@ -76,7 +76,7 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
 
 
 def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
-    """Apply settings in order; a list or block is replaced whole. ConfigError for a key below a value."""
+    """Apply settings in order, replacing lists and blocks whole; ConfigError if a key's parent is not a block."""
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:

@@ -1,7 +1,7 @@
 """Loading a config: a file, `--set` and `--strides` become a typed config with warnings and a run name.
 
-A config changed by `--set` runs in a folder of its own, named after the change. The name follows from the values that
-differ, however they were typed: one experiment, one folder.
+A config changed by `--set` runs in its own folder, named after the changed values. The name does not depend on how
+they were typed, so equal experiments share a folder.
 """
 
 import hashlib
@@ -27,29 +27,29 @@ from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
 
 STEEP_RAD: Final = 0.5
-"""No passive walker is known to walk on a slope as steep; a number above it is perhaps in degrees."""
+"""Steeper than any slope on which passive walkers are known to walk; a larger value is perhaps in degrees."""
 LONG_M: Final = 20.0
-"""Nobody builds longer legs; a number above it is perhaps in millimetres."""
+"""Longer than the legs of any real walker; a larger value is perhaps in millimetres."""
 STRONG_M_S2: Final = 30.0
-"""No planet of the solar system pulls as strongly; a number above it is perhaps in cm/s^2."""
+"""Stronger than the gravity of any planet in the solar system; a larger value is perhaps in cm/s^2."""
 HEAVY_KG_M3: Final = 1000.0
-"""A mass above that of a cube of water as wide as the legs are long is perhaps in grams."""
+"""Density of water; a mass larger than a water cube as wide as the legs are long is perhaps in grams."""
 
 
 @dataclass(frozen=True, slots=True)
 class LoadedConfig:
     """A valid config with its origin."""
 
-    config: Config  # resolved, in the schema's types
-    run_name: str  # name of its folder below the runs folder
-    # KEY=VALUE of each key that differs from its file; for a run's config, the run's changes come first
+    config: Config  # resolved config
+    run_name: str  # name of the run's folder inside the runs folder
+    # KEY=VALUE of each key that differs from the config's file; earlier changes of a stored run come first
     changes: tuple[str, ...]
     warnings: tuple[str, ...]  # adjustments and suspicious values, as sentences
-    source: str  # its file
-    tree: Mapping  # its untyped tree, with positions
+    source: str  # name of the config's file in messages
+    tree: Mapping  # untyped tree of the config, with positions
 
     def placed(self, error: ConfigError) -> ConfigError:
-        """Add the position of the key at fault to an error, where the config's text has one."""
+        """Prepend the position of the key at fault to an error's message, if the key is in the config's text."""
         where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
@@ -65,13 +65,13 @@ def load(
     strides: int | None = None,
     name: str | None = None,
 ) -> LoadedConfig:
-    """Load a config: a file, the name of a built-in config, or a run's; by default the paper's.
+    """Load a config from a file, by the name of a built-in config, or from a stored run; by default the paper's.
 
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, which overrides everything else
-    name     `--name`; None keeps the config's own
+    name     `--name`; None keeps the config's name
 
-    Raises ConfigError that lists every problem with file, line, column, value, allowed values and the nearest key.
+    Raises a ConfigError that lists every problem with file, line, column, value, allowed values and the nearest key.
     """
     file = path if isinstance(path, ConfigFile) else builtin_config(DEFAULT) if path is None else find_config(path)
     tree = merge_layers(read_layers(file))
@@ -95,7 +95,7 @@ def load(
     changes = (*(earlier for earlier in file.changes if key_of(earlier) not in keys), *new)
     if changed.name != base.name:
         folder = run_name(changed.name, new)
-    elif file.text is not None and not new:  # a run goes on in its folder, however that is named
+    elif file.text is not None and not new:  # an unchanged run keeps its folder, whatever its name
         folder = file.path.name
     else:
         folder = run_name(base.name if file.text is None else file.path.name.partition("@")[0], changes)
@@ -113,13 +113,13 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
-    """Yield warnings about likely mistakes: a leg mass left in place, wrong units, a pitch without pads."""
+    """Yield warnings about likely mistakes: leg mass not moved with the leg, wrong units, pad pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
     places = block.keys if isinstance(block, Mapping) else {}
     length = short_number(walker.leg_length_m)
     if isinstance(walker, CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
         leg, mass, stays = places["leg_length_m"], places["foot_to_mass_m"].source, walker.foot_to_mass_m
-        moved = leg.source.startswith("built-in") or mass.startswith("--")  # the mass itself, over a leg that was there
+        moved = leg.source.startswith("built-in") or mass.startswith("--")  # changed the mass, not the leg
         if leg.source != mass and not moved and stays != walker.leg_length_m / 2:
             yield (
                 f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m stays {short_number(stays)} m, "
@@ -154,12 +154,12 @@ def numbers_in(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
 
 
 MAX_NAME: Final = 40
-"""Characters of a run folder's name that shows its changes."""
+"""Maximum number of characters of a run folder's name that spells out its changes."""
 UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List KEY=VALUE of each key in which `changed` differs from `base`; the slope as typed, if in degrees."""
+    """List the keys in which `changed` differs from `base`, as KEY=VALUE; `slope_deg` is passed if it was typed."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:
@@ -177,7 +177,7 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
 
 def run_name(name: str, changes: Sequence[str]) -> str:
     """Name a run folder `name@key=value,...` if that is short, otherwise `name@label-` and 8 hex digits."""
-    # the label is the first changed block of a stage, otherwise the first key
+    # The label is the first changed block that configures a stage, otherwise the first changed key.
     change = ",".join(changes)
     full_name = f"{name}@{change}" if change else name
     if not change or (len(full_name) <= MAX_NAME and not UNSAFE.search(change)):

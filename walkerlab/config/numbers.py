@@ -1,11 +1,11 @@
-"""Shortest exact texts of numbers, and comparison up to rounding."""
+"""Shortest exact texts for numbers, and comparison of numbers up to rounding."""
 
 import math
 from decimal import Decimal
 from typing import Any, Final
 
 SAME: Final = 1e-9
-"""Maximum relative difference between equal numbers converted between units."""
+"""Maximum relative difference of two numbers that count as equal, since converting units rounds them."""
 
 
 def short_number(number: float) -> str:

@@ -1,4 +1,4 @@
-"""Configs given as a few changes of the paper config, such as stability cases."""
+"""Configs that change a few keys of the paper config, such as stability cases."""
 
 from collections.abc import Mapping as Keys
 from typing import Any
@@ -13,7 +13,7 @@ from walkerlab.config.validation import align_start, validate_tree
 
 
 def paper_config_with(lines: Keys[str, Any], source: str = "the paper's") -> Config:
-    """Build the paper config with changes, plain values by nested key; messages name their `source`.
+    """Build the paper config with the changes in `lines`, nested keys with values; error messages name their `source`.
 
     Raises ConfigError if the result is invalid; theta_1 of a start is moved onto the slope without a warning.
     """
@@ -59,7 +59,7 @@ def check_ground(case: Case, config: Config, lines: Mapping) -> None:
         raise problem_error(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")
     if isinstance(config.start, str):
         return
-    # a step of no length leaves steps nothing to be judged by on other terrains too
+    # Other terrains, too, judge steps by the length of the start's step, which therefore must not be 0.
     by_start = config.contact.pad_pitch == "rigid" or config.contact.terrain == "after-mid-swing"
     if by_start and config.start[0] == config.start[1]:
         where = lines.keys.get("start", lines.position)
@@ -75,7 +75,7 @@ def tree_of(block: Keys[str, Any], position: Position) -> Mapping:
             return tree_of(value, position)
         if isinstance(value, list | tuple):
             return Sequence(position, [node(item) for item in value])
-        if hasattr(value, "tolist"):  # NumPy's
+        if hasattr(value, "tolist"):  # a NumPy array or number
             return node(value.tolist())
         return Scalar(position, value, str(value))
 

@@ -15,12 +15,10 @@ SHOWN_PROBLEMS = 20
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A problem with a config."""
-
-    position: Position | None  # None if it is in no text
+    position: Position | None  # None for a value that is not in a text
     text: str  # description with key and value
     allowed: str = ""  # valid values; empty if `text` names them
-    nearest: str = ""  # likely intention; empty if nothing is similar
+    nearest: str = ""  # word that was probably meant; empty if nothing is similar
 
     def __str__(self) -> str:
         where = f"{self.position}: " if self.position else ""
@@ -35,7 +33,7 @@ BEYOND_SCOPE: Final = {
     r"3-?d\b|three-?d|spatial|lateral": "walkerlab is planar: its walkers move in one vertical plane",
     r"quadruped|four-?leg|hexapod|monoped": "walkerlab's walkers have two legs",
 }
-"""Names that people try, as patterns, and why walkerlab has nothing of the kind."""
+"""Patterns of names that users may try, and why walkerlab has nothing of the kind."""
 KEYS_ARE_LISTED = "`walkerlab schema` lists every key with its unit, bounds and default"
 
 
@@ -55,7 +53,7 @@ def problem_error(
 
 
 def beyond_scope(word: str) -> str:
-    """Explain in a sentence why walkerlab does not offer something; empty if it is within the scope."""
+    """Explain in a sentence why walkerlab does not offer what a word names; empty if the word matches no pattern."""
     return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 
 

@@ -1,8 +1,8 @@
-"""Parser of YAML texts to trees with positions.
+"""Parser that converts YAML texts to trees with positions.
 
 ruamel.yaml splits the text; plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no` is
-a text. Anchors, aliases, tags, duplicate keys, deep nesting and large texts are errors, so that parsing costs no more
-than the length of a text.
+a text. Anchors, aliases, tags, duplicate keys, deep nesting and large texts are errors, so that the cost of parsing is
+proportional to the length of the text.
 """
 
 import math
@@ -31,7 +31,7 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 
 
 def value_of(text: str) -> str | int | float | bool | None:
-    """Interpret a plain scalar by YAML 1.2."""
+    """Convert a plain scalar to a value by the rules of YAML 1.2."""
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.fullmatch(text) and len(text) <= MAX_DIGITS:
@@ -39,15 +39,15 @@ def value_of(text: str) -> str | int | float | bool | None:
     if _OTHER_BASE.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text, 0)
     if _FLOAT.fullmatch(text):
-        return float(text) + 0.0  # no negative zero: one number, one text, one key
+        return float(text) + 0.0  # no negative zero, so that equal numbers have equal texts and keys
     return text
 
 
 def read(text: str, source: str, column: int = 1) -> Node | None:
     """Parse the text of a single document to a tree; None if it is empty.
 
-    Positions refer to its source, a file or option, and count from `column`, for a text inside a longer one. Raises
-    ConfigError with the position of whatever is not a plain YAML tree.
+    Positions name the `source` (a file or option); `column` is the column at which the text starts. Raises ConfigError
+    with the position of anything that is not plain YAML.
     """
     if len(text) > MAX_CHARACTERS:
         raise problem_error(Position(source, 1, column), f"longer than {MAX_CHARACTERS} characters: not a config")
@@ -64,7 +64,7 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
 
     try:
         yield from YAML(typ="safe", pure=True).parse(text)
-    except Exception as error:  # a parser of arbitrary bytes fails in many ways; every one of them is a bad config
+    except Exception as error:  # arbitrary text makes the parser fail in many ways; each of them means a bad config
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__

@@ -1,7 +1,7 @@
-"""Types of the parts of a config that stages and their helpers read, which mypy enforces.
+"""Types for the parts of a config that stages and their helpers may read; mypy enforces them.
 
-Each type lists its keys; a config satisfies all types. A stage gets an object with the keys of its type alone; these
-determine the key of its result. Meaning, unit and bounds of the keys are in config/schema.py.
+Each type lists its keys, and a config satisfies all types. A stage gets an object with only the keys of its type, and
+these determine the key of its result. Meaning, unit and bounds of the keys are in config/schema.py.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Protocol
 
-# The command line's help is made from types of this module, and loads no schema and no pydantic.
+# The command line's help uses types of this module and must load neither the schema nor pydantic.
 if TYPE_CHECKING:
     from walkerlab.config import schema
     from walkerlab.config.basin import Basin
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @cache
 def keys_of(takes: type) -> dict[str, type | None]:
-    """Return the keys of a type, those of its bases first; for a block that is read in part, the type of that part."""
+    """Map each key of a type (base classes first) to the type of the part that is read, or to None if read whole."""
     members = (item for base in reversed(takes.__mro__) for item in vars(base).items())
     return {name: _part(member) for name, member in members if isinstance(member, property)}
 
@@ -38,12 +38,12 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     result_type = getter.__globals__.get(getter.__annotations__.get("return"))
-    # blocks of the config are read whole
+    # config blocks, which are not Protocols, are read whole
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
 def dotted_keys(takes: type) -> Iterator[str]:
-    """Yield the keys of a type, dotted in blocks that are read in part: `solver.rigid`."""
+    """Yield the keys of a type, dotted inside partly read blocks, e.g. `solver.rigid`."""
     for name, part in keys_of(takes).items():
         yield from (name,) if part is None else (f"{name}.{key}" for key in dotted_keys(part))
 
@@ -74,7 +74,7 @@ class RigidConfig(Protocol):
 
 
 class ContactConfig(RigidConfig, Protocol):
-    """Scene of both models."""
+    """Keys that describe the scene of both models."""
 
     @property
     def push_off(self) -> PushOff: ...
@@ -99,11 +99,11 @@ class WalkConfig(StartConfig, Protocol):
 
 
 class SceneConfig(StartConfig, ContactConfig, Protocol):
-    """Both models and where they start."""
+    """Scene of both models, and the start of a walk."""
 
 
 class WalksConfig(WalkConfig, SceneConfig, Protocol):
-    """A scene and all that its walks in both models depend on."""
+    """Scene and every other key that walks of both models depend on."""
 
     @property
     def solver(self) -> schema.Solvers: ...
@@ -122,7 +122,7 @@ class ContactSolvers(Protocol):
 
 
 class GroundConfig(SceneConfig, Protocol):
-    """A scene and how it is walked on its ground."""
+    """Scene, and solver settings of the contact model."""
 
     @property
     def solver(self) -> ContactSolvers: ...
@@ -165,7 +165,7 @@ class OwnCases(Protocol):
 
 
 class CompassCasesConfig(Protocol):
-    """Keys that `stability` reads for the paper's compass, whose cases change the paper's config."""
+    """Keys that `stability` reads for the paper's compass; its cases are variations of the paper's config."""
 
     @property
     def walker(self) -> Walker: ...
@@ -176,7 +176,7 @@ class CompassCasesConfig(Protocol):
 
 
 class SceneCasesConfig(WalksConfig, Protocol):
-    """Keys that `stability` reads for other walkers, whose cases change their own scene."""
+    """Keys that `stability` reads for other walkers; their cases are variations of their own scene."""
 
     @property
     def stability(self) -> OwnCases: ...

@@ -4,7 +4,7 @@ from walkerlab.config.fields import Block, key
 
 
 class RecordedFile(Block):
-    """A file with a walk for `walkerlab compare --with`, and the meanings of its columns."""
+    """File with a walk for `walkerlab compare --with`, and the meaning of its columns."""
 
     file: str = key(
         "",

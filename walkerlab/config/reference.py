@@ -19,14 +19,14 @@ from walkerlab.errors import ConfigError
 
 COLUMNS: Final = 79
 OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
-"""Kind of a block in the name of a key; configs do not contain it."""
+"""Kind of a block in a key's name, such as `(kneed)`; only this reference has it, configs do not."""
 SCHEMA_REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 
 
 @dataclass(frozen=True, slots=True)
 class KeyReference:
-    """Facts about one key, as texts."""
+    """Description of one config key; every fact is a text."""
 
     key: str
     type: str
@@ -73,7 +73,7 @@ def _spelled(value: Any) -> str:
 
 
 def as_paragraphs(selection: str = "") -> str:
-    """Describe the keys for a terminal, one paragraph each; by default all, otherwise those of a block or key.
+    """Describe keys for a terminal, one paragraph each: a block's keys, a single key, or by default all keys.
 
     Raises ConfigError with the nearest key if there is no such block or key.
     """
@@ -87,9 +87,9 @@ def as_paragraphs(selection: str = "") -> str:
 
 
 def select_keys(selection: str) -> list[KeyReference]:
-    """Select the keys of a block, or the key of that name, or all keys; ConfigError with the nearest key if none match.
+    """Return a block's keys, a single key, or by default all keys; ConfigError with the nearest key if none match.
 
-    Keys that are equal in every kind of a block are listed once.
+    Keys that are equal in every kind of a block are listed only once.
     """
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
     matches = [

@@ -1,4 +1,4 @@
-"""The robustness block: disturbances of a gait, and parameters it is differentiated by."""
+"""The robustness block: disturbances of a gait, and parameters with respect to which it is differentiated."""
 
 from typing import Annotated, Final, Literal
 

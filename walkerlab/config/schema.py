@@ -51,7 +51,7 @@ CVODE_PACKAGE: Final = "sksundae"
 
 
 class SlopeInDegrees(Block):
-    """The slope as a file or `--set` may give it instead of slope_rad; the resolved config has slope_rad only."""
+    """Slope in degrees, allowed in a file or `--set` instead of slope_rad; the resolved config has only slope_rad."""
 
     slope_deg: float = key(
         ...,
@@ -69,7 +69,7 @@ Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
 State = tuple[SwingAngle, StanceAngle, Rate, Rate]
 
 
-LongState = tuple[Rate, ...]  # of walkers with more bodies than two legs
+LongState = tuple[Rate, ...]  # states of walkers with more bodies than two legs
 
 
 Start = Annotated[
@@ -101,7 +101,7 @@ def absolute(default: float) -> Any:
 
 
 class SolverSettings(Block):
-    """How one model is integrated."""
+    """Integration settings of one model."""
 
     method: Method = method("dop853")
     rtol: float = relative(1.0e-10)
@@ -116,11 +116,11 @@ class SolverSettings(Block):
 
 
 class RigidSolver(SolverSettings):
-    """How the rigid model is integrated."""
+    """Integration settings of the rigid model."""
 
 
 class ContactSolver(SolverSettings):
-    """How the contact model is integrated."""
+    """Integration settings of the contact model."""
 
     method: Method = method("radau5")
     rtol: float = relative(1.0e-7)
@@ -128,7 +128,7 @@ class ContactSolver(SolverSettings):
 
 
 class Solvers(Block):
-    """Solver settings of each model."""
+    """Integration settings of each model."""
 
     rigid: RigidSolver = RigidSolver()
     contact: ContactSolver = ContactSolver()
@@ -140,7 +140,7 @@ def factors(least: float, most: float, velocity: str) -> Any:
 
 
 class Tune(Block):
-    """Starts among which the two initial angular velocities are adjusted."""
+    """Settings for adjusting the two initial angular velocities until the contact model walks."""
 
     cells: int | None = key(
         None,
@@ -188,7 +188,7 @@ class Source(Block):
 
 
 class Config(Block):
-    """A scene and the computations on it."""
+    """A scene, and settings of the computations on it."""
 
     name: str = key(
         "paper",

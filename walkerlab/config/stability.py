@@ -16,7 +16,7 @@ NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._+-]{0,63}$"
 
 
 class Case(Block):
-    """A case: changes of the paper config, and the expected outcome."""
+    """Test case: changes to the paper config, and the expected outcomes."""
 
     name: str = key(..., "", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'", pattern=NAME)
     family: str = key("own", "", "what it belongs to, for tables", bounds="as a name", pattern=NAME)

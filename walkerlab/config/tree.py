@@ -15,7 +15,7 @@ class Position:
     column: int
 
     def __bool__(self) -> bool:
-        """False for arguments of functions, which have no position."""
+        """Whether there is a position; values passed from Python have none."""
         return bool(self.source)
 
     def __str__(self) -> str:
@@ -25,7 +25,7 @@ class Position:
 
 
 NOWHERE = Position("", 0, 0)
-"""Position of arguments of functions, which are in no text."""
+"""Position of values passed from Python, which are not in a text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Sequence:
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """A block of keys; `keys` has the position of each key itself."""
+    """Block of keys: `entries` has the value of each key, `keys` the position of the key itself."""
 
     position: Position
     entries: dict[str, Node] = field(default_factory=dict)

@@ -54,7 +54,7 @@ JUDGED_BY: Final = {
     "dynamic_friction": {"static_friction": "set contact.dynamic_friction too"},
     "friction_velocity": {"stiction_velocity": "set contact.friction_velocity too", **BY_UNITS},
 }
-"""Other keys of the contact block that its keys are judged by, and what to do where one of those was changed alone."""
+"""For keys of the contact block: the other keys that limit them, and advice if only the other key was changed."""
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
@@ -109,7 +109,7 @@ def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]
 
 
 def check_bodies(config: Config, tree: Mapping) -> None:
-    """Raise ConfigError with positions for parts on unknown bodies or on the wrong leg."""
+    """Raise ConfigError with positions for parts on unknown bodies or feet on the wrong leg."""
     walker = config.walker
     if not isinstance(walker, PartsWalker):
         return
@@ -160,7 +160,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         beyond = beyond_scope(word)
         text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
         return Problem(position, text, f"one of {', '.join(kinds)}", "" if beyond else nearest(word, kinds))
-    if len(location) > 1 and location[1] in kinds:  # pydantic's word for the kind that it tried
+    if len(location) > 1 and location[1] in kinds:  # pydantic inserts the kind of block that it tried
         location = (location[0], *location[2:])
     if what == "extra_forbidden":
         return _unknown_key(location, tree)
@@ -186,16 +186,16 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
 
 
 def _is_later(place: Position, earlier: Position) -> bool:
-    """Whether `one` belongs to a user's change of the config at `other`."""
+    """Whether the user set the value at `place` on top of the value at `earlier`."""
     return place.source.startswith("--") or (bool(place) and earlier.source.startswith("built-in"))
 
 
 def _along(
     model: type[Block], location: Location, tree: Mapping
 ) -> tuple[list[str], FieldInfo | None, type[Block] | None]:
-    """Follow a location to its key and field, and to the block that it holds in this tree, selected by `type`.
+    """Return the key and field at a location, and the type of block that the key holds in this tree.
 
-    Deeper parts (a list item, a kind of value) are ignored.
+    Parts of the location below the key (a list item, a kind of value) are ignored.
     """
     path: list[str] = []
     field: FieldInfo | None = None
@@ -240,7 +240,7 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
 def _keys_of_another_kind(
     above: str, entries: Mapping, source: str, block: type[Block], kinds: dict[str, type[Block]]
 ) -> Problem:
-    """Describe all keys from one source that belong to another type of the block."""
+    """Report all keys from one source that belong to another type of the block."""
     foreign_keys = {key for kind_block in kinds.values() for key in kind_block.model_fields} - {*block.model_fields}
     strange = {key: place for key, place in entries.keys.items() if key in foreign_keys and place.source == source}
     where = next(iter(strange.values()))
@@ -258,7 +258,7 @@ def _keys_of_another_kind(
 
 
 def _elsewhere(name: str, exactly: bool) -> str:
-    """Find a similar key of another block (`exactly`: of the same name) and return its path."""
+    """Return the path of a key with a similar name (`exactly`: the same name) in any block; empty if there is none."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")
@@ -268,7 +268,7 @@ def _elsewhere(name: str, exactly: bool) -> str:
 
 
 def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
-    """Return the value at a location and its position; for a missing key None and the position of its block.
+    """Return the value at a location and its position; for a missing key, None and the position of its block.
 
     Parts of the location that are not in the tree, such as the kind of value that pydantic tried, are skipped.
     """

@@ -18,10 +18,10 @@ from walkerlab.errors import ConfigError
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
 HSU_CHEN: Final = "Hsu Chen, Passive dynamic walking with knees, MIT (2007)"
-MAX_LENGTH_M: Final = 1e3  # m
-LEG_LENGTH_DIGITS: Final = 1e-6  # relative, to which a leg's length agrees with its parts
-MAX_MASS_KG: Final = 1e6  # kg
-LIGHTEST_CONTACT: Final = 1e-9  # minimum share of the walker's mass that moves with a foot on compliant ground
+MAX_LENGTH_M: Final = 1e3
+LEG_LENGTH_DIGITS: Final = 1e-6  # maximum relative difference between leg_length_m and the length of the parts
+MAX_MASS_KG: Final = 1e6
+LIGHTEST_CONTACT: Final = 1e-9  # minimum fraction of the walker's mass that moves with a foot on compliant ground
 
 Metres = Annotated[float, Field(ge=-MAX_LENGTH_M, le=MAX_LENGTH_M)]
 Point = tuple[Metres, Metres]
@@ -58,14 +58,14 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """Validate that a foot's arc is smaller than `limit` of key `of`, which messages call `name`."""
+    """Validate that the foot radius is below a limit computed from the value of key `of`; errors call it `name`."""
     return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
 
 
 def check_inertia(inertia: str, why: str, *places: str) -> Any:
-    """Validate that a part whose mass lies on its upper hinge (keys `places` are 0) has an inertia."""
+    """Validate that the key `inertia` is not 0 if the part's mass lies on its upper hinge (all keys `places` are 0)."""
 
     def has_inertia(value: float, info: ValidationInfo) -> float:
         if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
@@ -87,11 +87,11 @@ class Torso(Block):
 
 
 class _Legged(Block):
-    """Properties and checks that all walkers share."""
+    """Base class of all walkers: shared properties and checks."""
 
     @property
     def lean_rad(self: Any) -> float:
-        """Angle of the line from hip to foot centre in an upright leg; 0 for walkers of parts."""
+        """Angle (rad) between an upright leg and the line from hip to foot centre; 0 for walkers of parts."""
         ahead = getattr(self, "foot_centre_ahead_m", 0.0)
         return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
 
@@ -148,7 +148,7 @@ class CompassWalker(_Legged):
 
     @property
     def mass_to_hip_m(self) -> float:
-        """b = L - a, m."""
+        """Distance from the leg's mass to the hip, b = L - a, m."""
         return self.leg_length_m - self.foot_to_mass_m
 
 
@@ -239,7 +239,7 @@ class Kneed(_Legged):
 
     @property
     def leg_length_m(self) -> float:
-        """Hip to sole, m."""
+        """Length from hip to sole, m."""
         return self.thigh.length_m + self.shank.length_m
 
     @property
@@ -248,7 +248,7 @@ class Kneed(_Legged):
 
 
 class PartBody(Block):
-    """A rigid body with a frame of its own, upright as the walker stands."""
+    """A rigid body, whose own frame is upright when the walker stands upright."""
 
     name: str = name_key("name of the body")
     mass_kg: float = mass(..., "its mass", least=0.0)
@@ -277,7 +277,7 @@ class PartParticle(Block):
 
 
 class PartFoot(Block):
-    """A foot: an arc about a point of a body."""
+    """A foot: a circular arc around a point of a body."""
 
     body: str = name_key("the body it belongs to")
     centre_m: Point = point("the arc's centre in its frame")
@@ -285,7 +285,7 @@ class PartFoot(Block):
 
 
 class PartCoupling(Block):
-    """A body whose angle is a weighted sum of others' angles."""
+    """A body whose angle is a weighted sum of the angles of other bodies."""
 
     body: str = name_key("the body that follows")
     of: tuple[str, ...] = key(..., "", "the bodies that it follows", bounds="a list of names", sequence=True)
@@ -333,11 +333,11 @@ class PartsWalker(_Legged):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Depth of the first leg's sole below the hip, upright, m; None if no hinges lead there from the other leg."""
+    """Return the depth (m) of the first leg's sole below the hip, legs upright; None if hinges do not connect them."""
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
-    below, upper = 0.0, 0.0  # m, of the present body's upper hinge: below the hip, over its own origin
+    below, upper = 0.0, 0.0  # m: depth of the body's upper hinge below the hip, and its height above the body's origin
     for body, lower in pairwise(chain):
         if (body, lower) not in places:
             return None
@@ -350,7 +350,7 @@ def hip_to_sole(
 
 
 def why_off_the_leg(mass_m: float, length_m: float) -> str:
-    """Explain why a mass at that distance from the foot is not on the leg; empty if it is."""
+    """Explain why a mass at `mass_m` from the foot is not on the leg; empty if it is on the leg."""
     if mass_m < length_m:
         return ""
     massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
@@ -362,13 +362,13 @@ def torso_mass(torso: Torso | None) -> float:
 
 
 def rigid_bodies(walker: Any) -> int:
-    """Number of angles in the rigid model's state: swing leg, stance leg, further swinging bodies, torso."""
+    """Return the number of angles in the rigid model's state: swing leg, stance leg, other swinging bodies, torso."""
     bodies = len(walker.bodies) - len(walker.legs[1]) + 1 if isinstance(walker, PartsWalker) else 2
     return bodies + int(isinstance(walker, Kneed)) + int(walker.torso is not None)
 
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
-    """Return the coupled angles of the rigid model's state: index to body name and weights by index."""
+    """Map the index of each coupled angle of the rigid state to its body and the weights of the angles it follows."""
     coupled = {}
     if isinstance(walker, PartsWalker):
         swinging, stance = walker.legs
@@ -386,12 +386,12 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 
 
 def is_passive_compass(config: Any) -> bool:
-    """Whether the walker is a passive compass without torso, as in Appendix A."""
+    """Whether the config's walker is a passive compass without torso, as in Appendix A."""
     return bool(config.walker.type == "compass" and config.walker.torso is None and not acting_on(config))
 
 
 def leg_inertia(walker: Any) -> float:
-    """Inertia of one leg about the hip (kg m^2); for walkers of parts an upper bound."""
+    """Return the inertia of one leg about the hip (kg m^2); for walkers of parts, an upper bound."""
     if walker.type == "compass":
         below = walker.leg_length_m - walker.foot_to_mass_m
         return float(walker.leg_mass_kg * below**2 + walker.leg_inertia_kg_m2)
@@ -444,7 +444,7 @@ def why_no_contact(walker: Any) -> str:
 
 
 def why_no_state(start: Any, walker: Any) -> str:
-    """Explain why a start is not a state of a walker; empty if it is, or `fixed-point`."""
+    """Explain why a start has the wrong number of values for a walker; empty if the number is right."""
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
     return "" if fits else f"has {len(start)} numbers, and this walker's state has {numbers}"
@@ -459,7 +459,7 @@ def contact_to_add(walker: Any) -> str:
 
 
 def has_knees(walker: Any) -> TypeGuard["Kneed | PartsWalker"]:
-    """Whether the swing leg shortens and so clears plain ground."""
+    """Whether the walker has knees, so that its swing leg can clear plane ground."""
     return isinstance(walker, Kneed) or (
         isinstance(walker, PartsWalker) and any(hinge.locks for hinge in walker.hinges)
     )

@@ -1,4 +1,4 @@
-"""Writing a config as YAML that loads back to an equal config, plain or commented."""
+"""Writing a config as YAML, with or without comments, that loads back to an equal config."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from walkerlab.config.reader import value_of
 from walkerlab.config.schema import Config, Source
 
 PUNCTUATION = re.compile(r"""^[^\w./]|[:#,\[\]{}"'\n]|^$""")
-"""Characters that need quotes in a YAML value."""
+"""Characters that make a YAML value need quotes."""
 LINE_WIDTH: Final = 110
 ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
@@ -24,7 +24,7 @@ def to_yaml(config: Config) -> str:
 
 
 def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> str:
-    """Write a config as YAML that extends `base`, named `start`, with only the keys that differ."""
+    """Write a config as YAML with only the keys that differ from `base`, which it extends by the name `start`."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
     degrees = slope_in_degrees(changed.slope_rad)
@@ -35,7 +35,7 @@ def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> s
 
 
 def slope_in_degrees(slope_rad: float) -> float | None:
-    """Return the slope in degrees if it was written in degrees, otherwise None."""
+    """Return the slope in degrees if a short number of degrees gives exactly this slope, otherwise None."""
     degrees = float(f"{math.degrees(slope_rad):.12g}")
     return degrees if math.radians(degrees) == slope_rad else None
 
@@ -53,7 +53,7 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
 
 
 def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
-    """Write a config as YAML with meaning, bounds and unit above each key; keys `left_alone` keep their defaults."""
+    """Write a config as YAML with meaning, bounds and unit above each key, leaving out the top keys `left_alone`."""
     values = config.model_dump(mode="json", exclude=set(left_alone))
     lines = [*_commented(config, values, ""), *(f"# {name}: {ELSEWHERE.format(name)}" for name in left_alone)]
     return "".join(f"{line}\n" for line in lines)
@@ -68,7 +68,7 @@ def _commented(block: Block, values: dict[str, Any], indent: str, path: str = ""
             yield f"{indent}{name}:"
             yield from _commented(content, value, f"{indent}  ", f"{path}{name}.")
         elif value is None and block_of(field) is Source:
-            continue  # the study that a built-in config redoes is not a user's own
+            continue  # a user's config does not reproduce a study
         elif value is None and block_of(field) is not None:
             yield f"{indent}# {name}: {ELSEWHERE.format(path + name)}"
         elif isinstance(content, tuple) and (listed := block_of(field)) is not None:
@@ -115,6 +115,6 @@ def _value(value: Any) -> str:
 
 
 def _number(value: float) -> str:
-    """Write a point even before an exponent, so that YAML 1.1 readers also see a number."""
+    """Format a number with a decimal point even before an exponent, so that YAML 1.1 readers also see a number."""
     text = repr(value)
     return text if "." in text else text.replace("e", ".0e")

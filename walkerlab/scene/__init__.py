@@ -1,1 +1,1 @@
-"""Build minimal models from a config, and list the omissions with their reasons."""
+"""Build minimal models from a config, and list what they omit and why."""

@@ -1,4 +1,4 @@
-"""Build the contact model of a config, leaving out everything that the config does not need."""
+"""Build the contact model of a config, without anything that the config does not need."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 BUDGET_PER_STEP = 1_000_000  # right-hand sides
-SAMPLES_PER_PENDULUM_TIME = 200  # of stored walks
-GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # the tangent is exact for this method
-FULL_STOP_DAMPING = 1e-5  # rad, penetration of full damping in a compliant knee stop
+SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
+GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # derivatives of a radau5 step are exact
+FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class ContactScene(WalkerOnGround):
         sampling: float | Floats | None = None,
         heights: Floats | None = None,
     ) -> ContactWalkResult:
-        """Walk up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`.
+        """Simulate up to `steps` steps from a state (4 + 2 n) of the free walker, see `walk_contact`.
 
-        heights  (footholds,) m over the slope, beginning with the start's; even ground by default
+        heights  (footholds,) m above the slope, from the start's foothold on; even ground by default
         """
         even = self.ground.terrain
         ground = self.ground if heights is None else self.ground._replace(terrain=even._replace(heights=heights))
@@ -65,7 +65,7 @@ class ContactScene(WalkerOnGround):
 def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
     """Build the scene of a config with a contact block.
 
-    rigid_step_length_m  step length of the rigid gait, the reference length of pads and terrain
+    rigid_step_length_m  step length of the rigid gait, the reference length for pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
     """
     contact = require_contact(config)
@@ -86,9 +86,9 @@ def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
 def scene_on_pads(
     config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
 ) -> ContactScene:
-    """Build the config's scene with pads laid; raises NoAnswer if they need a contact gait that is not found.
+    """Build the scene of a config with its pads; raises NoAnswer if their pitch needs a contact gait and none is found.
 
-    answer  result of the search for that gait; searches by default
+    answer  result of the search for the contact gait; None to search if necessary
     """
     own = None
     if wants_own_pitch(require_contact(config)):
@@ -111,7 +111,6 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
-    # full damping from 0.01 mrad on
     return KneeRules(KneeStop(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
@@ -129,7 +128,7 @@ def require_contact(config: ContactConfig) -> Contact:
 
 
 def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find the contact model's gait on pads of its own step length, from a rigid start state.
+    """Find the contact model's gait on pads that are its own step length apart, from a rigid start state.
 
     rigid_step_length_m  initial pad pitch
     """
@@ -138,7 +137,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
 
 def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find `contact_gait` on a plane that lets scuffing feet through, in place of pads."""
+    """Find the contact model's gait, replacing pads by a plane that lets scuffing feet through."""
     contact = require_contact(config)
     if contact.terrain == "checkerboard":
         config = config.model_copy(update={"contact": contact.model_copy(update={"terrain": "after-mid-swing"})})
@@ -150,7 +149,7 @@ def wants_own_pitch(contact: Contact) -> bool:
 
 
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
-    """Return the pad pitch (m); on a plane the rigid step length, the reference length of the terrain."""
+    """Return the pad pitch (m); for terrain without pads, its reference length, the rigid step length."""
     if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":
         return rigid_step_length_m
     if contact.pad_pitch == "own":
@@ -168,7 +167,7 @@ def normal_law(contact: Contact) -> NormalLaw:
 def friction_law(contact: Contact) -> FrictionLaw:
     """Return the friction law in SI; frictionless contact is a law of its own, not a zero coefficient.
 
-    Raises ConfigError for a law added by a user that is incomplete.
+    Raises ConfigError if a law that a user added is incomplete.
     """
     try:
         return create_law(contact.friction, contact.in_si())
@@ -177,13 +176,13 @@ def friction_law(contact: Contact) -> FrictionLaw:
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
-    """Return the walker in the rigid start state, its stance foot just touching at along = 0 and rolling.
+    """Return the contact model's state for a rigid start; the stance foot just touches at along = 0 and rolls.
 
-    rigid_state  of the rigid model, both feet on the slope; for a compass (theta_1 swing, theta_2 stance, dtheta_1,
-                 dtheta_2)
+    rigid_state  state of the rigid model with both feet on the slope; for a compass (theta_1 swing, theta_2 stance,
+                 dtheta_1, dtheta_2)
 
-    The hinge at the ball's centre gives position and velocity; the ball then rolls without slip instead of turning
-    about its centre.
+    Position and velocity are first computed with a hinge at the ball foot's centre. Unless the foot is pinned, its
+    velocity is then changed so that it rolls without slip.
     """
     walker = scene.walker
     members = group_bodies(scene.assembly).members

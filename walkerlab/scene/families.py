@@ -1,4 +1,4 @@
-"""Build the step maps of a config over a parameter, on which families of gaits are followed."""
+"""Build step maps of a config as functions of a parameter, for following families of gaits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Solver settings of one step of the contact model.
 CONTACT_STEP = Tolerances("radau5", 1e-10, 1e-12, 60_000)
-RELATIVE_CHANGE = 1e-3  # of a parameter, to test whether a model depends on it
+RELATIVE_CHANGE = 1e-3  # relative change of a parameter, to test whether a model depends on it
 
 
 def rigid_walkers(config: ContactConfig, parameter: Parameter) -> WalkerAt:
@@ -66,7 +66,7 @@ def iterate_values(value: Any) -> Iterator[Any]:
 
 
 def model_reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a config parameter affects a model, as far as the config allows other values."""
+    """Whether a parameter affects a model; True if the config allows no neighbouring value to test with."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
     neighbours = (value + sign * RELATIVE_CHANGE * (abs(value) or 1.0) for sign in (1.0, -1.0))
@@ -75,7 +75,7 @@ def model_reads(model: str, config: ContactConfig, key: str) -> bool:
 
 
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """Return the error for a request, made by the config key `where`, about a parameter that no model uses."""
+    """Build the error for the config key `where` if it names a parameter that none of the models uses."""
     return ConfigError(
         f"{where}: {key} does not affect the {' or the '.join(models)} model",
         "Choose a key that the model uses, or another model (--model).",

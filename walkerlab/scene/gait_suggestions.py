@@ -1,7 +1,7 @@
 """Suggest changes that give a walker a gait: its feet ahead of its shanks, or another slope.
 
-A kneed walker is tried with its feet slightly ahead of the shanks, as in real machines. On a few slopes a gait is
-searched for, and its branch is followed over the slope.
+Kneed walkers are tried with their feet slightly ahead of the shanks, as in real machines. Gaits are searched for on a
+few slopes, and their branches are followed over the slope.
 """
 
 import math
@@ -22,33 +22,33 @@ from walkerlab.scene.families import rigid_walkers
 from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
-SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # of the config's slope, in order of trial
-COMMON_SLOPES = (0.03, 0.12)  # rad: most walkers that have gaits have them here
-# rad: bounds of the steepest slope to follow gaits to
+SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # slopes to try in this order, relative to the config's slope
+COMMON_SLOPES = (0.03, 0.12)  # rad; most walkers that have gaits have them on these slopes
+# rad; the steepest slope to which gaits are followed lies between these
 MIN_FOLLOWED_TO, MAX_FOLLOWED_TO = 0.2, 0.35
 SUGGESTION_SEARCH = SearchSettings(random_starts=50, further_starts=100)
-SUGGESTION_POINTS = 60  # per branch
-INSET = 0.1  # from the end of a range, as a share of it
+SUGGESTION_POINTS = 60  # maximum number of points of a branch
+INSET = 0.1  # distance kept from the end of a range, as a fraction of the range
 FOOT_KEY = "foot_centre_ahead_m"
-FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # in leg lengths
+FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # distances of the feet ahead of the shanks, in leg lengths
 
 
 @dataclass(frozen=True)
 class SlopeRange:
-    """A range of slopes with gaits, and the part of it where they are stable; None if nowhere."""
+    """Range of slopes (rad) with gaits, and the part of it with stable gaits; None if no gait is stable."""
 
     slopes: tuple[float, float]
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
-        """Return a slope slightly inside the nearer end of the range, of stable gaits if there are any."""
+        """Return a slope just inside the range, at the end nearer to `target`; prefers the range of stable gaits."""
         low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
         return near + INSET * (far - near)
 
 
 def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
-    """Return the nearest range of slopes (rad) with gaits, stable ones first; None if none is found."""
+    """Return the nearest range of slopes with gaits, preferring stable gaits; None if no gait is found."""
     own = config.slope_rad
     span = ValueSpan(0.02 * own, min(MAX_FOLLOWED_TO, max(3.0 * own, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
@@ -72,7 +72,7 @@ def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBran
 
 
 def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
-    """Yield ranges of branches where the ground need not pull, and where gaits on them are stable."""
+    """Yield for each branch the range of slopes where the ground need not pull, and its longest stable part."""
     for branch in branches:
         good = [point for point in branch.points if point.monitors[0] >= 0.0]
         if len(good) < 2:
@@ -85,7 +85,7 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
 
 
 def suggest_gaits(config: Config, typed: str = "") -> str:
-    """Describe where gaits exist near a config without one, with commands that have the options `typed` by the user."""
+    """Suggest gaits near a config that has none, as commands that repeat the options `typed` by the user."""
     if config.slope_rad <= 0.0:
         return ""
     feet, suitable = find_gait_with_feet_ahead(config), find_slopes_with_gaits(config)
@@ -109,7 +109,7 @@ def suggest_gaits(config: Config, typed: str = "") -> str:
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
-    """Return the most stable gait of a kneed walker with its feet ahead, and how far ahead (m); None without one."""
+    """Return the distance (m) of the feet ahead of the shanks with the most stable gait, and that gait, or None."""
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).over(config, rigid_walker)(ahead_m)

@@ -1,4 +1,4 @@
-"""Identify the parameters of a config from a measured walk, with both models."""
+"""Identify the parameters of a config from a measured walk, with either model or both."""
 
 from __future__ import annotations
 
@@ -38,24 +38,24 @@ Measured = MeasuredSteps | MeasuredAngles
 Values = tuple[float, ...]
 CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
-AT_BOUND: Final = 1e-6  # distance from a bound, in the scale of the parameter, that counts as at it
-SPREAD_OF_STARTS: Final = 0.1  # of a parameter, between starts of the fit
-CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # errors of a walk near 1e-10, far below noise
+AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
+SPREAD_OF_STARTS: Final = 0.1  # maximum relative change of a parameter in the starts of the fit
+CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
-GAIT_STEP: Final = 1e-3  # of a parameter's scale, in derivatives of the gait
+GAIT_STEP: Final = 1e-3  # difference step for derivatives of the gait, relative to a parameter's scale
 
 
 @dataclass(frozen=True)
 class Question:
-    """Question to a measured walk."""
+    """Parameters to estimate from a measured walk, with the settings of the estimate."""
 
     fit: Mapping[str, tuple[float, float] | None]  # bounds of each fitted key, in its unit; None for the schema's
-    prior: Mapping[str, tuple[float, float]]  # value and standard deviation of keys, known beforehand
-    nuisance: tuple[str, ...] = ()  # properties of sensors that are estimated too
+    prior: Mapping[str, tuple[float, float]]  # known value and standard deviation, by key
+    nuisance: tuple[str, ...] = ()  # properties of clock and sensors to estimate too
     loss: Loss = "linear"
     starts: int = 1  # number of starts of the fit
-    robustness: bool = False  # whether the gait's sensitivity to a drop of the floor is wanted
+    robustness: bool = False  # whether to compute the gait's sensitivity to a drop of the floor
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -63,7 +63,7 @@ class Question:
 
 
 class ConfigFamily:
-    """Configs at values of several parameters."""
+    """Configs as a function of several parameters."""
 
     def __init__(self, config: ContactConfig, keys: Sequence[str]) -> None:
         self.config = config
@@ -93,7 +93,7 @@ class ConfigFamily:
 
 
 def step_map_of(model: str, family: ConfigFamily, length_m: float) -> StepMap:
-    """Return a model's step map over the family's values."""
+    """Return a model's step map as a function of the family's parameter values."""
     config = family.config
     if model == RIGID:
         return RigidMap(family.over(rigid_walker), 1.0, rigid_walker(config))
@@ -114,12 +114,12 @@ def identify_walk(
     models: Sequence[str] = (RIGID,),
     note: Callable[[str], None] = lambda _: None,
 ) -> Identification:
-    """Fit the question's keys to a measured walk with each model, and return the likeliest model's result.
+    """Fit parameters to a measured walk with each model; return the likeliest result, preferring models that fit.
 
     gait  summary of `fixedpoint` for the config
     note  receives messages
 
-    Raises ConfigError for keys that are no parameters, NoAnswer if no model can be fitted.
+    Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
     results = [identify_with(model, config, measured, gait, question, note) for model in models]
     answers = [result for result in results if isinstance(result, Identification)]
@@ -144,7 +144,7 @@ def identify_with(
     question: Question,
     note: Callable[[str], None],
 ) -> Identification | str:
-    """Fit one model; the reason as text if no walk of it can be fitted."""
+    """Fit one model; return the reason as text if no walk of the model can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
     fits = [fit(problem, start) for start in starts_of(problem, question.starts)]
@@ -167,7 +167,7 @@ class Fit:
 
 
 def in_time(first: Fit) -> Fit | None:
-    """Refine a fit of angles in phase to one of angles at their times; None for steps, or if that does not converge."""
+    """Refit angles at their sample times, starting from a fit in phase; None for steps, or if it does not converge."""
     forecast, u = first.problem.forecast, first.fitted.u
     if not isinstance(forecast.measured, MeasuredAngles):
         return None
@@ -190,7 +190,7 @@ def problem_of(subject: ModelUnderTest, measured: Measured, question: Question) 
 
 
 def starts_of(problem: FitProblem, count: int) -> list[Floats]:
-    """Return starts (unknowns,): the config's values, then values beside them."""
+    """Return the starts of the fit, each (unknowns,): the config's values, then random values near them."""
     parameters = np.array(problem.start) / problem.forecast.scales
     rng, starts = np.random.default_rng(0), []
     for place in range(count):
@@ -202,9 +202,9 @@ def starts_of(problem: FitProblem, count: int) -> list[Floats]:
 
 
 def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit) -> Identification:
-    """Turn a fit into its answer.
+    """Build the result of an identification from its fits.
 
-    steps  the fit whose values include the steps' periods; the same as `best` but for angles at their times
+    steps  fit that predicts the step periods; differs from `best` only if angles were fitted at their sample times
     """
     problem, fitted, forecast, keys = best.problem, best.fitted, best.problem.forecast, question.keys
     information = information_on(fitted, keys, forecast.scales, forecast.quantities)
@@ -250,7 +250,7 @@ def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit)
 
 
 def nuisances_with_errors(fit: Fit, names: Sequence[str]) -> dict[str, Uncertain]:
-    """Return the estimated properties of clock and sensors."""
+    """Return the estimated properties of clock and sensors with their standard errors."""
     forecast, fitted = fit.problem.forecast, fit.fitted
     variances = np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True))
     own = dict(zip(forecast.nuisances, variances[forecast.unknowns - len(forecast.nuisances) :], strict=True))
@@ -263,7 +263,7 @@ def measurement_noise(fit: Fit) -> dict[str, float]:
 
 
 def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
-    """Return the roughness with its standard error, from the curvature of the restricted likelihood."""
+    """Return the floor's roughness and its standard error, from the curvature of the restricted likelihood."""
     roughness = fitted.noise.roughness_m
     if roughness == 0.0:
         return {"roughness_m": 0.0, "standard_error": None, "at_bound": True}
@@ -278,7 +278,7 @@ def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
 
 
 def rms_residuals(fit: Fit) -> dict[str, float]:
-    """Return the root mean square of measured minus predicted values, over the most probable floor, by quantity."""
+    """Return the rms of measured minus predicted values by quantity, given the most probable floor heights."""
     forecast, fitted = fit.problem.forecast, fit.fitted
     about = fitted.data.residuals - fitted.data.G @ fitted.heights_m
     return {
@@ -288,7 +288,7 @@ def rms_residuals(fit: Fit) -> dict[str, float]:
 
 
 def step_tables(fit: Fit) -> tuple[StepTable, ...]:
-    """Return measured and predicted steps over even ground, with the standard deviation of their difference."""
+    """Tabulate measured steps, predicted steps on even ground, and the standard deviation of their difference."""
     forecast, fitted = fit.problem.forecast, fit.fitted
     steps, variance = forecast.steps.count, fitted.noise.measurement[forecast.quantity] ** 2
     total = np.sqrt(variance + (fitted.noise.roughness_m**2) * (fitted.data.G**2).sum(axis=1))
@@ -307,11 +307,11 @@ def units_of(subject: ModelUnderTest) -> Units:
 def gait_with_errors(
     problem: FitProblem, fitted: Fitted, covariance: Floats, units: Units | None
 ) -> dict[str, Uncertain]:
-    """Return period, length and spectral radius of the identified gait, with errors that follow from the estimates'.
+    """Return period, step length and spectral radius of the identified gait, with errors propagated from the estimates.
 
-    Empty if the identified walker has no gait of one step near the start's.
+    Empty if the identified walker has no one-step gait near the fitted start.
 
-    units  of the walker, if the gait's sensitivity to a drop of the floor is wanted too
+    units  units of the walker; None leaves out the gait's sensitivity to a drop of the floor
     """
     forecast = problem.forecast
     values = np.array(forecast.parameters(fitted.u))

@@ -1,4 +1,4 @@
-"""Plan measurements: which ones would determine parameters of a walker, and with how many steps."""
+"""Plan measurements: find which ones determine a walker's parameters, and the number of steps they need."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ CURVE: Final = (2, 3, 5, 7, 10, 14, 20, 30, 50, 70, 100, 150, 200, 300, 500)
 
 @dataclass(frozen=True)
 class WayToMeasure:
-    """A way to measure a walk, and the errors that it would leave."""
+    """A way to measure a walk, and the parameter errors that would remain."""
 
     measurement: str
     start: str
-    errors: dict[str, float | None]  # standard error of each key, in its unit; None where the walk leaves it open
+    errors: dict[str, float | None]  # standard error of each key, in its unit; None if the walk does not determine it
     not_identifiable: tuple[Unidentifiable, ...]
-    # number of steps for each key with a wanted error; None where the longest walk does not suffice
+    # steps needed to reach the target error of each key; None if the longest walk is too short
     steps_needed: dict[str, int | None]
     curve: dict[int, dict[str, float | None]]  # errors by number of steps
 
@@ -60,12 +60,12 @@ def plan_measurements(
     model: str,
     note: Callable[[str], None] = lambda _: None,
 ) -> tuple[WayToMeasure, ...]:
-    """Return the errors that each way of measuring a walk would leave, simple ones first.
+    """Compute the parameter errors that would remain after each way of measuring a walk, simple ways first.
 
     gait  summary of `fixedpoint` for the config
     note  receives messages
 
-    Raises NoAnswer if the model does not walk as far, ConfigError for keys that are no parameters.
+    Raises NoAnswer if the model's walk ends early, ConfigError for keys that are not parameters.
     """
     subject = find_model_gait(model, config, gait, note)
     noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
@@ -95,7 +95,7 @@ Errors = tuple[dict[str, float | None], tuple[Unidentifiable, ...]]
 
 
 def predict_measured(subject: ModelUnderTest, question: Question, plan: Plan) -> tuple[MeasuredSteps, MeasuredAngles]:
-    """Predict what would be measured of the walk from the subject's z; raises NoAnswer if it ends early."""
+    """Predict the measurements of a walk from the subject's state z; raises NoAnswer if the walk ends early."""
     family = ConfigFamily(subject.config, question.keys)
     walks, level = step_map_of(subject.model, family, subject.length_m), np.zeros(plan.max_steps + 2)
     walk = walks.disturbed(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
@@ -113,7 +113,7 @@ def predict_measured(subject: ModelUnderTest, question: Question, plan: Plan) ->
 
 
 def walk_of(subject: ModelUnderTest, measured: Measured, question: Question) -> PlannedWalk:
-    """Return the predicted walk with its derivatives; raises NoAnswer if a walk beside it ends early."""
+    """Return the planned walk with its derivatives; raises NoAnswer if a slightly changed walk ends early."""
     problem = problem_of(subject, measured, question)
     if isinstance(measured, MeasuredAngles):
         nuisances = tuple(dict.fromkeys((*question.nuisance, DELAY)))
@@ -128,7 +128,7 @@ def walk_of(subject: ModelUnderTest, measured: Measured, question: Question) -> 
 
 
 def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], most: int) -> int | None:
-    """Return the smallest number of steps, up to `most`, after which a key's error is at most `wanted`."""
+    """Return the smallest number of steps that reduces a key's error to `wanted`; None if it is more than `most`."""
 
     def suffices(count: int) -> bool:
         error = errors_after(count)[0].get(key)

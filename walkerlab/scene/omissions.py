@@ -1,4 +1,4 @@
-"""List results that the scene of a config omits, the reason, and the savings.
+"""List computations that the scene of a config makes unnecessary, with reasons and savings.
 
 The list follows from the config alone, so it is available before anything is loaded or run. scripts/benchmark.py
 measures the savings in time and bytes (docs/performance.md).
@@ -28,8 +28,8 @@ class LeftOut:
 
 # `LeftOut` as stored in summaries.
 Entry = dict[str, str]
-RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
 # Values per sample of each output.
+RIGID_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 3, "forces": 4}
 CONTACT_NUMBERS: Mapping[Output, int] = {"states": 10, "energies": 8, "forces": 8}
 
 
@@ -38,7 +38,7 @@ def rigid_walk_omissions(config: SimulateConfig) -> tuple[Entry, ...]:
 
 
 def stance_omission(config: RigidConfig) -> Entry:
-    """Return the omission at the rigid stance foot: a compass pivots on a point, other walkers may roll."""
+    """Describe the omission at the rigid model's stance foot: a compass pivots on a point, other walkers may roll."""
     if config.walker.type == "compass":
         return omission(
             "floating base, stance contact and foot radius of the rigid walk",
@@ -70,8 +70,8 @@ def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
 
 
 def count_step_angles(walker: Walker) -> int:
-    """Return the number of angles during a step; with a compliant knee stop the stance shank has its own."""
-    from walkerlab.config.walkers import rigid_bodies  # late, to keep the command line's help fast
+    """Count the angles during a step; a compliant knee stop adds one for the stance shank."""
+    from walkerlab.config.walkers import rigid_bodies  # imported late to keep the help fast
 
     return rigid_bodies(walker) + int(walker.type == "kneed" and walker.knee.lock == "compliant")
 

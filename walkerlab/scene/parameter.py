@@ -1,4 +1,4 @@
-"""A config key as the parameter of a family of walkers: its unit, its value, and the config at other values."""
+"""Config keys as parameters of families of walkers: unit, value, and the config at other values."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,8 +23,8 @@ MODEL_KEYS = tuple(keys_of(ContactConfig))
 
 @dataclass(frozen=True)
 class Parameter:
-    key: str  # dotted, as requested
-    unit: str  # of its values
+    key: str  # dotted key, as requested
+    unit: str  # unit of its values
     path: tuple[str, ...]
 
     def value_in(self, config: ContactConfig) -> float:
@@ -32,11 +32,14 @@ class Parameter:
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
-        """Return the config at another value, with everything that follows from it; None if the schema refuses it."""
-        return config_with(config, (self,), (value,))
+        """Return the config at another value, with defaults that depend on it; None if the schema rejects the value."""
+        try:
+            return self._changed(config, value)
+        except ValidationError:
+            return None
 
     def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
-        """Return the error for a value that the schema refuses, requested by the config key `key`, with the reason."""
+        """Build the error, with the reason, for a value that the config key `key` requests and the schema rejects."""
         why = ""
         try:
             _changed(config, (self,), (value,))
@@ -54,7 +57,7 @@ class Parameter:
         )
 
     def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
-        """Return `make(config)` as a function of the parameter's value; None where the schema refuses the value."""
+        """Return a function from parameter values to `make(config)`, or to None if the schema rejects the value."""
 
         def at_value(value: float) -> R | None:
             changed = self.config_at(config, value)
@@ -92,13 +95,13 @@ def _keys_set(value: Any) -> Any:
 
 
 def dotted(key: Key) -> str:
-    """Join a key's path as messages show it; an item of a list belongs to the list's key."""
+    """Join a key's path with dots, for messages; indices of list items are left out."""
     return ".".join(part for part in key if isinstance(part, str))
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """Return the parameter of a key of the config; raises ConfigError if it is not a number that a model uses."""
-    # `asker` is the config key that names it, if any
+    """Return the parameter for a config key; raises ConfigError if the key is not a number that a model uses."""
+    # `asker` is the config key that names this parameter, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
@@ -113,8 +116,8 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 
 def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
-    """Return why a key is not a number that a model of the config uses; empty if it is."""
-    # `own` are the keys of the config, of its own walker's type
+    """Return why a key is not a parameter of the config's models; empty if it is one."""
+    # `own` has the keys of this config, for its own type of walker
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):
             return "is a block of keys, not a number"

@@ -13,7 +13,7 @@ AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 
 
 def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
-    """Return the parts of a walker, for the rigid model with point feet; raises ConfigError if they make no walker."""
+    """Return the parts of a walker; in the rigid model a compass has point feet. ConfigError for inconsistent parts."""
     if isinstance(walker, CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
         parts = straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))
@@ -33,9 +33,9 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
 
 def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
-    """Return the mass at the hip of straight legs (kg)."""
-    # On compliant ground, legs that are point masses need a hip mass: when side by side they turn about their masses
-    # and move a massless hip freely, so that the forces do not determine its acceleration.
+    """Return the hip mass (kg) of a walker with straight legs, raised if the contact model needs more."""
+    # On compliant ground, legs that are point masses need a hip mass: otherwise, when side by side, they turn about
+    # their masses and move the massless hip freely, so that the forces do not determine its acceleration.
     if rigid:
         return walker.hip_mass_kg
     present = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2

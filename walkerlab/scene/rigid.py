@@ -1,4 +1,4 @@
-"""Build the rigid model of a config, leaving out everything that the config does not need."""
+"""Build the rigid model of a config, without anything that the config does not need."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ CACHED_LEVEL_WALKERS = 16  # families over a slope reuse the same walker
 @dataclass(frozen=True)
 class RigidScene:
     walker: RigidModel
-    names: tuple[str, ...]  # of the state variables
+    names: tuple[str, ...]  # names of the state variables
     knee_m: tuple[float, float] | None  # position of the knee in its thigh's frame
-    outputs: tuple[Output, ...]  # to record over time
+    outputs: tuple[Output, ...]  # outputs to record over time
     ground: Footholds
 
     def walk(
@@ -43,7 +43,7 @@ class RigidScene:
         advance: Callable[[int], None] | None = None,
         step_length: float | None = None,
     ) -> RigidWalkResult:
-        """Walk up to `steps` steps from a state (2 n); `sampled` to record the requested outputs. See `take_walk`."""
+        """Simulate up to `steps` steps from a state (2 n); `sampled` records the requested outputs. See `take_walk`."""
         heights, sampled = foothold_heights(self.ground, steps), sampled and bool(self.outputs)
         return take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
@@ -59,14 +59,14 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 
 
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
-    """Return the walker of a config, with its own set of equations or another one."""
+    """Return the rigid walker of a config; `equations` overrides the config's set of equations."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
     return with_equations(passive.changed(**drive_parameters(config)), equations or config.equations)
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)
 def level_walker(walker: Walker, gravity: float) -> RigidModel:
-    """Return a walker on level ground (gravity in m/s^2); raises ConfigError for parts that make no walker."""
+    """Return a walker on level ground (gravity in m/s^2); raises ConfigError if the parts are not a valid walker."""
     try:
         return on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
     except ValueError as error:

@@ -10,15 +10,15 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import ContactScene, start_state
 
-# away from edges, a map has the same outcomes as with the config's tolerances (docs/adjustment.md)
+# away from boundaries between outcomes, a map is the same as with the config's tolerances (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
-LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides of a cell: minimum, and multiple of the unchanged start's
+LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides per cell: minimum, and multiple of the unchanged start's
 
 
 def starts_of(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Return a rigid start with scalable velocities in a scene; walks must settle on the gait if there is one."""
+    """Build a contact scene's starts from a rigid start with scaled velocities; walks must settle on any known gait."""
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
     def start(swing: float, stance: float) -> State:

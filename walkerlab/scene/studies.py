@@ -1,7 +1,7 @@
-"""Registration of the reproduced study's walker and of its equations besides Lagrange's.
+"""Registration of the reproduced study: its walker, and its own equations in addition to Lagrange's.
 
-The study is named by a string and imported late: nothing here depends on it, yet its law is part of the code that
-results are made of (see code_digest.py).
+The study is named by a string and imported late, so this module does not depend on it, but code digests include its
+law (see code_digest.py).
 """
 
 from __future__ import annotations
@@ -28,5 +28,5 @@ def with_equations(model: RigidModel, equations: Equations) -> RigidModel:
 
 
 def equation_sets(config: Any) -> tuple[Equations, ...]:
-    """Return the sets of equations to search gaits with: the config's, and every set for the study's walker."""
+    """Return the sets of equations to search gaits with: all sets for the study's walker, otherwise the config's."""
     return (LAGRANGE_EQUATIONS, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)

@@ -24,7 +24,7 @@ from walkerlab.scene.rigid import rigid_walker
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
 
-# Solver settings of walks of which only the length matters; the budget is per step.
+# Solver settings for walks that only need their number of steps; the budget is per step.
 QUICK_WALKS: Final = {
     RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS),
     CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
@@ -33,11 +33,11 @@ QUICK_WALKS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class ModelUnderTest:
-    """A model and its gait, in a form that other processes can receive."""
+    """A model and its gait, in a form that can be sent to other processes."""
 
     model: str
-    config: ContactConfig  # of its scene
-    z: Floats  # (d,) the gait on the section
+    config: ContactConfig  # config of its scene
+    z: Floats  # (d,) coordinates of the gait on the section
     length_m: float  # step length
 
     def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> GaitOnMap:
@@ -66,10 +66,10 @@ def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
 def find_model_gait(
     model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]
 ) -> ModelUnderTest:
-    """Return a model with its gait, the contact model off its pads; raises NoAnswer without a gait.
+    """Return a model with its gait, for the contact model on ground without pads; raises NoAnswer if there is none.
 
     gait  summary of `fixedpoint`
-    note  receives differences from the config's scene
+    note  receives a message about each difference from the config's scene
     """
     length = float(gait["step_length_m"])
     if model == RIGID:

@@ -1,4 +1,4 @@
-"""Describe how walks ended and whether the ground is the cause: pads that end a walk do not limit the walker."""
+"""Describe how walks ended, and whether the cause is the ground, such as its pads, rather than the walker."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
 
-# How the contact model's ground causes an outcome; pads are treated separately.
+# Explanations of outcomes that the contact model's ground causes; pads are treated separately.
 GROUND_CAUSES: Final = {
     "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
     "contact.stiction_velocity.",
     "lifted-off": "The ground throws them off, or they start too fast: contact.stiffness, contact.damping.",
 }
-# Meaning of the values of `contact.pad_pitch`.
+# Meanings of `contact.pad_pitch`, to append to a length.
 PITCH_SOURCES: Final = {"rigid": ", the rigid gait's step length", "own": ", the contact gait's step length"}
 Range = tuple[float, float]
 
@@ -28,8 +28,8 @@ class Pads:
     """Pads on which walks ended."""
 
     pitch_m: Range  # minimum and maximum over the walks, m
-    step_m: Range | None = None  # minimum and maximum length of their last steps, m; None if unknown
-    laid: str = ""  # the config's `contact.pad_pitch`, if all have the same
+    step_m: Range | None = None  # minimum and maximum length of the walks' last steps, m; None if unknown
+    laid: str = ""  # `contact.pad_pitch` in the config, if it is the same for all walks
 
 
 def describe_endings(
@@ -39,10 +39,10 @@ def describe_endings(
 
     outcomes  number of walks by outcome; other keys are ignored
     contact   whether the contact model walked
-    pads      on which walks ended off-pad
+    pads      pads of the walks that ended off-pad
 
-    Returns rows of `outcome`, `walks`, `of` (their total), `ground` (whether it is a cause) and `said` (the
-    description).
+    Returns rows of `outcome`, `walks`, `of` (total number of walks), `ground` (whether it is a cause) and `said`
+    (description).
     """
     total = sum(walks for outcome, walks in outcomes.items() if outcome_of(outcome) is not None)
     rows = []
@@ -70,7 +70,7 @@ def ground_causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads
 
 
 def without_pads(config: ContactConfig) -> str:
-    """Return the setting for ground without pads; kneed legs clear a plane."""
+    """Return a setting for ground without pads: a plane for kneed walkers, whose feet clear it, or after-mid-swing."""
     return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
 
 
