@@ -11,7 +11,7 @@ from walkerlab.pipeline.store.content import Content
 
 
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Solve every problem; wrong answers are stored, and reported by `stability`."""
+    """Solve every problem. Wrong answers are stored like right ones; the stage `stability` reports them."""
     rows = []
     for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
         result = problem()
