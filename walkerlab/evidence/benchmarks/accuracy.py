@@ -155,7 +155,7 @@ def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
             for run in runs
             if run.method.split("-")[0] != family
             and run.method.startswith(("scipy", "cvode"))
-            and run.method != USER_SCRIPT  # its right-hand side is not ours
+            and run.method != USER_SCRIPT  # the script has its own right-hand side
         )
         levels.append((level, runs[0] if runs else None, next(libraries, None)))
     return words("accuracy.conclusion", scene, levels)

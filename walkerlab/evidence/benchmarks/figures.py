@@ -132,7 +132,7 @@ SERIES_DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2
 
 
 def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Series]:
-    """Yield an experiment's series of runs from the gait, as measured; each engine's first one has filled markers."""
+    """Yield an experiment's series of runs from the gait; each engine's first series has filled markers."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
     engines, names = rows["engine"].astype(str), rows["integrator"].astype(str)
     selected = (rows["scene"] == scene) & (rows["experiment"] == experiment)
@@ -148,7 +148,7 @@ def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Ser
 
 
 def draw_errors(scene: str, results: Results) -> Drawn:
-    """Plot errors over run time: on the same law (left), and on each engine's own contact (right)."""
+    """Plot errors over run time: under our law (left) and on each engine's own contact (right)."""
     # each axes has its own legend, since line styles and markers are reused
     figure, panes = panels(4.6, 1, 2)
     experiments = (
@@ -175,7 +175,7 @@ def draw_engine(axes: Axes, series: Series, cost: str, values: Array) -> None:
 
 
 def draw_periods(scene: str, results: Results) -> Drawn:
-    """Plot the last step's period over step size on own contact, with lines for ADAMS's law and the rigid gait."""
+    """Plot the last period over step size on engines' own contact, with lines for ADAMS's law and the rigid gait."""
     figure, axes = panels(4.2)
     all_series, summary = list(engine_series(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
     engines, reference = [series for series in all_series if series.engine != OURS], summary["reference"][scene]

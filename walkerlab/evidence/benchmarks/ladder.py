@@ -90,7 +90,7 @@ def ascend(trial: Trial, method: str) -> Ascent:
 def complete_ascents(
     trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
-    """Compute the references' first ends (or the errors instead) and, with `long_runs`, the postponed runs."""
+    """Compute the references' first end states (or their errors) and, with `long_runs`, the postponed runs."""
     # longest first: the last trial is near the rigid limit, where the explicit reference method takes the most steps
     ends = [partial(try_first_end, trial) for trial in reversed(trials)]
     postponed = [ascent for ascent in ascents if ascent.unfinished and long_runs]
@@ -123,7 +123,7 @@ def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
     """Time a walk up to `MAX_REPEATS` times within `REPEAT_TIME_S`."""
-    # the first walk is a warm-up, and counts only if it is long
+    # the first walk serves as a warm-up and counts only if it is long
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = time_walk(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []

@@ -48,7 +48,7 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile; the rest run by falling budget."""
+    """Yield results in case order. One case per model runs first, to compile; then those with large budgets start."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
@@ -94,7 +94,7 @@ def judge(case: Case, config: Config) -> CaseResult:
 
 
 def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
-    """Return the walks that must agree with the first, each with its description in front."""
+    """Return the walks that must agree with the first, as pairs (description, walk)."""
     again = [("ten times tighter tolerance", start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR)))]
     if second.walk is not None:
         again.append((second.method, second.walk))

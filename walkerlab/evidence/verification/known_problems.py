@@ -1,4 +1,4 @@
-"""Stage `known-problems`: problems with known answers, run through the contact code; independent of the scene."""
+"""Stage `known-problems`: problems with known answers, solved with the contact code; independent of the scene."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

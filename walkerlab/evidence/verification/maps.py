@@ -78,7 +78,7 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
     """Walk two steps at one stiffness by semi-implicit Euler with each step size (s); compare with a tight reference.
 
-    Returns, for each step size, the index of its verdict in `VERDICT_NAMES` and its error in natural units.
+    Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error in legs, radians, pendulum times.
     """
     case, config, start = prepare_on_ground(stiffness, None, COMPARED_STEPS, REFERENCE_CELL_BUDGET)
     walk = start.walk(case, Tolerances(*REFERENCE_SETTINGS, case.budget))

@@ -13,7 +13,7 @@ from walkerlab.physics.solvers.system import Floats
 
 
 class Masses:
-    """Point masses of a walker, with levers from a reference point of it (default: its centre of mass).
+    """Point masses of a walker, with levers from a reference point (default: its centre of mass).
 
     mass     (masses,) kg
     levers   (masses, bodies, 2) m, from the reference point to each mass

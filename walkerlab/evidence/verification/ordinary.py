@@ -1,8 +1,8 @@
 """Ordinary methods on the same cases: SciPy at its default tolerances, and a game engine's method with fixed steps.
 
 A contact scene is one differential equation without events, as written by somebody unaware of switching points and pad
-edges. It is integrated up to the end of our own walk and compared with it; our walk is recomputed at a tight tolerance
-for this. A rigid scene is a user's script with an event function.
+edges. It is integrated up to the end of our own walk, which is recomputed at a tight tolerance for the comparison. A
+rigid scene is a user's script with an event function.
 """
 
 import time
@@ -60,7 +60,7 @@ class Choice:
 def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """Walk a case by every ordinary method.
 
-    Returns nothing for a walker other than a passive compass, for a case without a start or without motion, and for
+    The result is empty for a walker other than a passive compass, for a case without a start or without motion, and for
     ground that needs events (a hinge, or `after-mid-swing`).
     """
     # the locking of a knee is an event, and Appendix A describes no other walker

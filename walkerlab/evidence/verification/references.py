@@ -17,7 +17,7 @@ def linear_bounce_period(mass: float, stiffness: float, drop: float, gravity: fl
 
 
 def impact_force(depth: float, rate: float, law: tuple[float, float, float, float]) -> float:
-    """Return the force (N) of ADAMS's IMPACT law, as written in its manual; law: (k, e, c_max, d_max), SI."""
+    """Return the force (N) of ADAMS's IMPACT law, as written in the manual; law: (k, e, c_max, d_max), SI."""
     k, e, c_max, d_max = law
     if depth <= 0.0:
         return 0.0

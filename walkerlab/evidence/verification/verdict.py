@@ -1,4 +1,4 @@
-"""Measures and verdict of a case."""
+"""Measures of a case's walk, and the result of judging it."""
 
 import math
 from dataclasses import dataclass

@@ -20,7 +20,7 @@ class Integrator:
     order: int  # nominal order
     most_steps: int  # step budget of a run
     adapts: bool = False  # whether the step size follows a tolerance
-    for_contact_only: bool = False  # whether it is the same as another integrator without the engine's contact
+    for_contact_only: bool = False  # whether it differs from another integrator only on the engine's own contact
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Simulation(ABC):
 class Adapter(Protocol):
     """A module that drives one engine; it imports the engine only when a model is built."""
 
-    INTEGRATORS: Mapping[str, Integrator]  # by name
+    INTEGRATORS: Mapping[str, Integrator]  # integrators by name
     CONTACTS: Mapping[str, str]  # name of the integrator for each contact model
     CANNOT_EXPRESS: tuple[str, ...]  # limitations, for the report
 

@@ -1,4 +1,7 @@
-"""The three experiments in other engines (same law, own law, no contact), each compared with our own solution."""
+"""Three experiments in other engines, each compared with our own solution: same law, own law and no contact.
+
+Same law: our contact law in the engine's integrators. Own law: the engine's own contact model.
+"""
 
 import math
 import time
@@ -28,8 +31,8 @@ SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  #
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
 ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # tolerances of adaptive integrators
-ERROR_GOAL = 1e-5  # error on the same law below which no finer run is made
-SETTLED_CHANGE = 1e-4  # relative change of the period on own contact below which no finer run is made
+ERROR_GOAL = 1e-5  # error under our law below which no finer run is made
+SETTLED_CHANGE = 1e-4  # relative change of the period on an engine's own contact below which no finer run is made
 LARGEST_STEP_S = 0.01  # largest step of adaptive integrators
 START_FACTORS = (0.95, 0.99)  # factors on the gait's velocities
 TUNING_STEP_S = 2e-5
@@ -43,7 +46,7 @@ ADAMS_RTOL = 1e-7  # relative tolerance of our walk under ADAMS's law, with whic
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 UNLIMITED_BUDGET = 100_000_000  # right-hand sides
 UNLIMITED_S = 1e9
-STEP_ALLOWANCE = 2  # factor on the step budget on own contact, where a walk may last longer than under ADAMS's law
+STEP_ALLOWANCE = 2  # factor on the step budget on an engine's own contact, where a walk may last longer than ours
 OUR_REPEATS = 3
 
 
@@ -102,8 +105,8 @@ class EngineExperiment:
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
     ) -> EngineRow:
         """Evaluate a run, or record why it was lost; `start`: initial velocities as a multiple of the gait's."""
-        # on the same law, the errors are those of the end state and the touch times; on own contact, the error is that
-        # of the last period, for completed walks from the gait
+        # under our law, the errors are those of the end state and the touch times; on the engine's own contact, the
+        # error is that of the last period, for completed walks from the gait
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
         step_s, tolerance = stepping.step_s, stepping.tolerance
         if isinstance(answer, TaskLost):
@@ -176,7 +179,7 @@ class EngineOnScene:
     def walk(
         self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
-        """Walk on our law, or on the engine's own contact if given, for at most `most` engine steps."""
+        """Walk under our law, or on the engine's own contact if given, for at most `most` engine steps."""
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.started(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
@@ -185,7 +188,7 @@ class EngineOnScene:
         return experiment.row(called, stepping, answer, start), answer
 
     def same_law(self) -> Iterator[EngineRow]:
-        """Yield runs of each integrator on our law, from coarse to fine."""
+        """Yield runs of each integrator under our law, from coarse to fine."""
         for name, integrator in self.engine.adapter().INTEGRATORS.items():
             if integrator.for_contact_only:
                 continue
@@ -214,7 +217,8 @@ class EngineOnScene:
         return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
 
     def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
-        """Yield walks on own contact: from the gait, coarse to fine; from other starts, at the second finest step."""
+        """Yield walks on the engine's own contact: from the gait, coarse to fine, then from other starts."""
+        # other starts are simulated at the second finest step
         # adaptive walks from the gait share one step budget; the next walk is assumed to take as many steps as the last
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
@@ -236,7 +240,7 @@ class EngineOnScene:
             yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in START_FACTORS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
-        """Simulate the hinged walker's passive swing with each integrator."""
+        """Simulate the hinged walker's passive swing with each integrator; returns results and lost runs."""
         scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
         n = len(model.chain)
         start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))

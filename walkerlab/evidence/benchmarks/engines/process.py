@@ -17,9 +17,9 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class TaskLost:
-    """Task without a result."""
+    """Record of a task without a result."""
 
-    why: str  # reason
+    why: str  # reason for the missing result
     timed_out: bool = False
 
 
@@ -42,7 +42,7 @@ class OwnProcess:
         self._folder.cleanup()
 
     def do(self, task: Callable[[], R], timeout_s: float) -> R | TaskLost:
-        """Run a picklable task; returns its result, or the reason for its loss. Raises RuntimeError after `abandon`."""
+        """Run a picklable task; returns its result, or `TaskLost` if there is none; RuntimeError after `abandon`."""
         if self._abandoned:
             raise RuntimeError("the process was abandoned")
         if self._worker is None:

@@ -22,10 +22,10 @@ class EngineRow:
     experiment: Annotated[str, Label("1", "experiment")]
     integrator: Annotated[str, Label("1", "integrator, or contact model on its own law")]
     start: Annotated[float, Label("1", "velocities of the start over those of the gait")]
-    # the largest allowed step, for an adaptive run that was lost
+    # for an adaptive run that was lost, the largest step allowed
     step_s: Annotated[float, Label("s", "step size, the mean one where steps are adapted")]
     tolerance: Annotated[float | None, TOLERANCE]
-    error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # on own contact, the reference is ADAMS's law
+    error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # the reference is our walk under ADAMS's law
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
     wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop; None if the process was lost
     period_s: Annotated[float | None, Label("s", "period of the last step")]

@@ -128,7 +128,7 @@ class EngineWalk:
 
 @dataclass(frozen=True)
 class SwingAnswer:
-    end: Floats  # (2 n) absolute angles and velocities
+    end: Floats  # (2 n) absolute angles (rad) and velocities (rad/s)
     wall_s: float
 
 
@@ -189,7 +189,7 @@ class TuningAnswer:
 
     own: OwnContact
     penetration: float  # m, of the ball at rest
-    damping_ratio: float  # damping ratio of the ball about its rest position
+    damping_ratio: float  # damping ratio of the ball's oscillation about rest
     friction: float  # friction coefficient of the sliding block
     creep_velocity: float  # m/s, of the block that stands on an incline
 
@@ -222,7 +222,7 @@ class Bench:
         self.settling_s = 8.0 / slow
 
     def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
-        """Simulate the ball from `depth` (m) inside the ground; it is pulled by `along` times its weight.
+        """Simulate the ball from `depth` (m) inside the ground; `along` times its weight pulls it along the ground.
 
         h  step size (s)
         """
@@ -243,7 +243,7 @@ class Bench:
         return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
-        """Return the damping ratio of an oscillator fitted to the ball's accelerations about rest; depth in m."""
+        """Fit an oscillator to the ball's accelerations and return its damping ratio; depth at rest in m."""
         omega = self.omega
         motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
@@ -254,7 +254,7 @@ class Bench:
         return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
 
     def friction(self, depth: float) -> float:
-        """Return deceleration / gravity of a sliding block after its penetration has settled; depth at rest in m."""
+        """Return the deceleration of a sliding block, divided by gravity; depth: penetration at rest (m)."""
         target, settled = self.target, self.settling_s
         start = self.task.sliding_velocity + target.friction * target.gravity * 1.25 * settled
         motion = self.after(1.25 * settled, self.task.step_s, 0.0, depth, (start, 0.0))
@@ -263,6 +263,6 @@ class Bench:
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
-        """Return the creep velocity (m/s) of a block standing on an incline; depth at rest in m."""
+        """Return the creep velocity (m/s) of a block standing on an incline; depth: penetration at rest (m)."""
         target, h = self.target, STEADY_STEP_FACTOR * self.task.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])

@@ -163,7 +163,7 @@ def series_by_name(rows: Sequence[EngineRow], scene: str, experiment: str) -> di
 
 
 def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """Return each engine's run time divided by ours on the same law, for each error level that both reach."""
+    """Return each engine's run time divided by ours under our law, for each error level that both reach."""
     our_rows = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
     by_engine: dict[str, list[EngineRow]] = {}
     for series in series_by_name(rows, scene, SAME_LAW).values():
@@ -190,7 +190,7 @@ def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
 
 def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, dict[str, float]]:
     """Return the largest step (s) with three correct digits of the last period, by experiment and name."""
-    # compared with the reference on the same law, and with the finest run on an engine's own contact
+    # digits are checked against the reference under our law, and against the finest run on an engine's own contact
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
@@ -211,13 +211,13 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
         if row.outcome != "walked" or row.period_s is None or abs(row.period_s / target - 1.0) > THREE_DIGITS:
             break
         good = row.step_s
-    # on own contact the finest run is the target itself, so it is no evidence
+    # on an engine's own contact the finest run is the target itself, so it is no evidence
     finest_only = experiment == OWN_LAW and good == runs[-1].step_s
     return None if finest_only else good
 
 
 def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """Return the last refinement's effect: the ratio of errors (same law) or the change of the period (s, own law)."""
+    """Return the last refinement's effect: the errors' ratio (same law), or the change of the period (s, own law)."""
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():
         for name, runs in series_by_name(rows, scene, experiment).items():
