@@ -44,7 +44,7 @@ class RigidTrial:
     walker: RigidModel
     start: tuple[float, ...]
     steps: int
-    compass: RigidWalker | None = None  # the walker in Appendix A's form, for the user's script
+    compass: RigidWalker | None = None  # the walker in Appendix A's form, for the user's script and heyoka
     name: str = "rigid"
 
     @property

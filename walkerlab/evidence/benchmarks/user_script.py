@@ -9,7 +9,7 @@ from walkerlab.physics.solvers.system import Floats
 
 
 class ScriptBudgetError(Exception):
-    """The script has used up its right-hand sides."""
+    """The script has exhausted its budget of right-hand sides."""
 
 
 def walk_as_a_script(

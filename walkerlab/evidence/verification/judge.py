@@ -36,7 +36,7 @@ class Second:
 
 @dataclass(frozen=True)
 class CaseCell:
-    """A case to judge and to walk by ordinary methods, possibly in another process."""
+    """A case to judge and to simulate by ordinary methods, possibly in another process."""
 
     case: Case
     config: Config | None = None  # config of a scene's variation; None if the case changes the paper config
@@ -48,7 +48,7 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile; then those with large budgets start."""
+    """Yield results in case order. One case per model runs first, to compile; the others start by falling budget."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)

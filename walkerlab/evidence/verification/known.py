@@ -50,7 +50,7 @@ class ParticleRun:
     """Sampled trajectory of the first body."""
 
     times: Floats  # (samples,) s
-    states: Floats  # (samples, 8)
+    states: Floats  # (samples, 8) states of both bodies
     end: State
     dissipated: Floats  # (5,) J, in the order of `energy_channels.LOSSES`
 
