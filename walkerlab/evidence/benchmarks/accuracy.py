@@ -1,4 +1,4 @@
-"""Error against run time of every method on every scene of the config, over a ladder of tolerances."""
+"""Stage `accuracy`: error against run time of every method on every scene, over a ladder of tolerances."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -31,17 +31,17 @@ from walkerlab.scene.rigid import rigid_walker
 
 ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_TRIAL_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
-SLOW_CONTACT_STEPS = 4  # of other walkers than the compass, whose right-hand side is several times as long
+SLOW_CONTACT_STEPS = 4  # for walkers other than the compass, whose right-hand side takes several times as long
 OMISSIONS_OFF_COMPASS = (
     {"what": "accuracy of the scene contact-near-rigid", "why": "only the compass has it", "saves": "a minute"},
     {"what": "libraries' longest runs on the contact model", "why": "they run in Python", "saves": "minutes"},
 )
-START_RATE_FACTOR = 0.98  # of the gait's angular velocities, so that no step repeats the one before
+START_RATE_FACTOR = 0.98  # factor on the gait's angular velocities, so that no step repeats the previous one
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Measure every method on every scene; `jobs` processes for reference solutions and postponed library runs."""
-    # all other runs are timed one after the other, with nothing else running
+    """Measure every method on every scene, with reference solutions and postponed library runs in `jobs` processes."""
+    # all other runs are timed one after another, with nothing else running
     trials: list[Trial] = []
     second_ends: list[End] = []
     ascents: list[Ascent] = []
@@ -85,7 +85,7 @@ def omitted_scene(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
 
 
 def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Iterator[Trial]:
-    """Yield the walks to measure on: rigid, on compliant ground, and for the compass also near the rigid limit."""
+    """Yield the walks for the measurement: rigid, on compliant ground and, for the compass, near the rigid limit."""
     length, state = rigid_start(config, inputs)
     walker = rigid_walker(config)
     start = with_scaled_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
@@ -130,7 +130,7 @@ def summarise(
 
 
 def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[MethodRow]:
-    """Fastest run of each method that reaches an error of `level` on a scene, fastest method first."""
+    """Return each method's fastest run with an error of at most `level` on a scene, fastest method first."""
     fastest: dict[str, MethodRow] = {}
     for row in sorted(rows, key=lambda row: row.wall_s):
         if row.scene == scene and row.error is not None and row.error <= level:
@@ -139,13 +139,13 @@ def good_enough(rows: Sequence[MethodRow], scene: str, level: float) -> list[Met
 
 
 def best_methods(rows: Sequence[MethodRow], scene: str) -> dict[str, str]:
-    """Fastest method for each error level that some method reaches."""
+    """Return the fastest method for each error level that some method reaches."""
     fastest = {plain_power(level): good_enough(rows, scene, level) for level in ERROR_LEVELS}
     return {level: runs[0].method for level, runs in fastest.items() if runs}
 
 
 def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
-    """Describe in one sentence which method is fastest at which error, and by what factor over the best library."""
+    """Return a sentence on the fastest method at each error level and its lead over the best library."""
     levels = []
     for level in ERROR_LEVELS:
         runs = good_enough(rows, scene, level)
@@ -155,7 +155,7 @@ def conclusion(rows: Sequence[MethodRow], scene: str) -> str:
             for run in runs
             if run.method.split("-")[0] != family
             and run.method.startswith(("scipy", "cvode"))
-            and run.method != USER_SCRIPT  # its right-hand side is not ours
+            and run.method != USER_SCRIPT  # the script has its own right-hand side
         )
         levels.append((level, runs[0] if runs else None, next(libraries, None)))
     return words("accuracy.conclusion", scene, levels)

@@ -1,4 +1,4 @@
-"""Conditions of a measurement: the machine, the walk, and how error levels are written."""
+"""Conditions of a measurement (the machine, an omitted hinge), and the format of error levels."""
 
 import os
 import platform
@@ -8,7 +8,7 @@ from walkerlab.config.reads import ContactConfig
 
 
 def hinge_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]:
-    """Return an omission entry if the config hinges the first step: measured walks are free from the start."""
+    """Return an omission entry if the config hinges the first step, because measured walks have no hinge."""
     if config.contact is None or config.contact.stance != "pinned":
         return []
     return [{"what": "hinged first step", "why": f"{measured} are measured on a walk without a hinge"}]

@@ -1,4 +1,4 @@
-"""Contact walks on which methods are measured: the config's contact, and one near the rigid limit."""
+"""Contact walks on which methods are measured: one with the config's contact, and one near the rigid limit."""
 
 from dataclasses import replace
 
@@ -7,20 +7,18 @@ from walkerlab.evidence.benchmarks.trials import ContactTrial
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import contact_scene, start_state
 
-STIFFNESS_FACTOR, CREEP_FACTOR = (
-    100.0,
-    0.01,
-)  # the near-rigid contact: stiffness and damping times, creep velocities times
+# near-rigid contact: factors on stiffness and damping, and on creep velocities
+STIFFNESS_FACTOR, CREEP_FACTOR = 100.0, 0.01
 
 
 def contact_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
-    """Walk on the config's contact, with pads of length `length_m` (m)."""
+    """Set up the walk with the config's contact, on pads of length `length_m`."""
     scene = contact_scene(config, length_m, own_pitch_m=length_m)
     return ContactTrial(scene.walker, scene.ground, start_state(scene, state), steps, "contact")
 
 
 def near_rigid_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
-    """Walk on much stiffer ground that creeps less, which is harder for integrators."""
+    """Set up a walk on much stiffer ground that creeps less, which is harder for integrators."""
     trial = contact_trial(config, state, length_m, steps)
     law, friction = trial.walker.normal, trial.walker.friction.with_creep(CREEP_FACTOR)
     normal = law._replace(stiffness=STIFFNESS_FACTOR * law.stiffness, damping=STIFFNESS_FACTOR * law.damping)

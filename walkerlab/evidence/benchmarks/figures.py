@@ -26,10 +26,10 @@ DASHED, DOTTED = (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2))
 
 @dataclass(frozen=True)
 class Series:
-    """Runs of a method, or of an integrator or contact model of an engine, from coarse to fine."""
+    """Runs of one method, or of one integrator or contact model of an engine, from coarse to fine."""
 
     look: Look
-    runs: Mapping[str, Array]  # stored columns; gaps are NaN
+    runs: Mapping[str, Array]  # stored columns by name; gaps are NaN
     filled: bool  # whether the markers are filled
     engine: str = ""  # empty for methods
 
@@ -65,12 +65,12 @@ LOOKS = {
 }
 DEFAULT_LOOK = Look("", BLACK, DOTTED, 1.0, "*")
 METHOD_VARIABLES = ("method", "tolerance", "reached", "error", "wall_s", "rhs_evaluations", "outcome")
-MIN_FLOOR = 1e-17  # below any floor
-FAILURE_LEVEL = 30.0  # where failures are drawn, in terms of the largest error
+MIN_FLOOR = 1e-17  # smallest uncertainty drawn
+FAILURE_LEVEL = 30.0  # height of failed runs in the figure, as a multiple of the largest error
 
 
 def method_series(scene: str, results: Results) -> Iterator[Series]:
-    """Yield the methods in the order measured; fully compiled methods have filled markers."""
+    """Yield the methods' series in the order measured; fully compiled methods have filled markers."""
     rows = results["accuracy"].groups[f"{scene}/rows"]
     methods = rows["method"].astype(str)
     for name in dict.fromkeys(methods.tolist()):
@@ -84,7 +84,7 @@ def draw_methods(scene: str, results: Results) -> Drawn:
     """Plot error over run time (left) and over right-hand sides (right), with crosses for failed runs."""
     all_series, summary = list(method_series(scene, results)), results["accuracy"].summary
     reference = summary["reference"][scene]
-    # how far the reference is from a second one: errors below mean nothing
+    # difference between the reference and a second one: smaller errors mean nothing
     floor = max(float(reference["agreement"]), MIN_FLOOR)
     errors = [
         float(np.max(series.runs["error"], where=series.runs["reached"] != 0, initial=floor)) for series in all_series
@@ -116,7 +116,7 @@ def draw_methods(scene: str, results: Results) -> Drawn:
 
 
 def legend_entries(all_series: Sequence[Series], floor: float) -> list[Line2D]:
-    """Legend entries of the methods, of failures and of the reference uncertainty."""
+    """Build the legend entries of the methods, failed runs and the reference uncertainty."""
     legend = [series.key for series in all_series]
     if not all(series.runs["reached"].all() for series in all_series):
         legend.append(entry("end not reached", color=BLACK, linestyle="none", marker="x", markersize=5.0))
@@ -132,7 +132,7 @@ SERIES_DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2
 
 
 def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Series]:
-    """Yield an experiment's series, started on the gait, in the order measured; the first of each engine is filled."""
+    """Yield an experiment's series of runs from the gait; each engine's first series has filled markers."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
     engines, names = rows["engine"].astype(str), rows["integrator"].astype(str)
     selected = (rows["scene"] == scene) & (rows["experiment"] == experiment)
@@ -148,7 +148,8 @@ def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Ser
 
 
 def draw_errors(scene: str, results: Results) -> Drawn:
-    """Plot the same law (left) and each engine's own contact (right), with a legend each, since looks are reused."""
+    """Plot errors over run time: under our law (left) and on each engine's own contact (right)."""
+    # each axes has its own legend, since line styles and markers are reused
     figure, panes = panels(4.6, 1, 2)
     experiments = (
         (SAME_LAW, "upper", "(a) ADAMS's law in each integrator", "error of the end state (SI)"),
@@ -174,7 +175,7 @@ def draw_engine(axes: Axes, series: Series, cost: str, values: Array) -> None:
 
 
 def draw_periods(scene: str, results: Results) -> Drawn:
-    """Plot the last step's period over step size on own contact, with ADAMS's law and the rigid gait as levels."""
+    """Plot the last period over step size on engines' own contact, with lines for ADAMS's law and the rigid gait."""
     figure, axes = panels(4.2)
     all_series, summary = list(engine_series(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
     engines, reference = [series for series in all_series if series.engine != OURS], summary["reference"][scene]

@@ -1,4 +1,4 @@
-"""Runs of one method on one scene, tolerance by tolerance: timing, budgets and when to stop."""
+"""Runs of one method on one scene, tolerance by tolerance: timing, budgets and stopping criteria."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -15,12 +15,11 @@ from walkerlab.labels import Label
 from walkerlab.physics.solvers.registry import METHODS
 from walkerlab.pipeline.workers import in_order
 
-RUN_BUDGET = 200_000  # right-hand sides of any run, which ends the hopeless ones
-SHORT_RUN_BUDGET = 25_000  # of a library's run that is timed among the others; longer ones come after all of those
-LAST_RUN_SIZE = (
-    12_000  # of a library's run that is the last of its ladder: a walk in Python takes a hundred times as long
-)
-WARM_UP_BUDGET = 2_000  # after which everything is compiled and loaded
+# sizes of runs, in right-hand sides
+RUN_BUDGET = 200_000  # limit of any run, which ends hopeless runs
+SHORT_RUN_BUDGET = 25_000  # limit of a library's run; longer runs are postponed until all others are done
+LAST_RUN_SIZE = 12_000  # a library's ladder ends with a run of this size, because Python takes a hundred times as long
+WARM_UP_BUDGET = 2_000  # enough to compile and load everything
 MAX_REPEATS, REPEAT_TIME_S = 7, 0.3
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
 LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
@@ -36,13 +35,13 @@ class MethodRun:
 
 @dataclass(frozen=True)
 class Ascent:
-    """Runs of one method up its ladder of tolerances."""
+    """Runs of one method over its ladder of tolerances."""
 
     trial: Trial
     method: str
     ladder: tuple[float, ...]
     runs: tuple[MethodRun, ...]
-    unfinished: bool  # whether the next tolerance takes long and is postponed
+    unfinished: bool  # whether the run at the next tolerance takes long and is postponed
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ class MethodRow:
     outcome: Annotated[str, Label("1", "outcome")]
     error: Annotated[float | None, ERROR_LABEL]
     against: Annotated[str, Label("1", "method of the reference end state")]  # never the same method
-    within_reference: bool  # whether the error is below the reference's uncertainty, and so only a bound
+    within_reference: bool  # whether the error is below the reference's uncertainty
     wall_s: Annotated[float, Label("s", "median run time", timing=True)]
     least_wall_s: Annotated[float, Label("s", "least run time", timing=True)]
     largest_wall_s: Annotated[float, Label("s", "largest run time", timing=True)]
@@ -64,12 +63,12 @@ class MethodRow:
 
     @property
     def reached(self) -> Annotated[int, Label("1", "whether the end state was reached")]:
-        """1 if the run has an error, 0 otherwise."""
+        """1 if the run reached the end state, so that its error is known; otherwise 0."""
         return int(self.error is not None)
 
 
 def ascend(trial: Trial, method: str) -> Ascent:
-    """Run one tolerance after the other until a run is too expensive."""
+    """Run a method at tighter and tighter tolerances until a run is too expensive."""
     own = method in METHODS and METHODS[method].compiled
     ladder, short, last = (
         (OWN_LADDER, RUN_BUDGET, RUN_BUDGET)
@@ -91,8 +90,8 @@ def ascend(trial: Trial, method: str) -> Ascent:
 def complete_ascents(
     trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
-    """Compute the references' first ends (or why one is missing) and, with `long_runs`, the postponed runs."""
-    # longest first: near the rigid limit ground is the stiffest for the explicit method that references are made with
+    """Compute the references' first end states (or their errors) and, with `long_runs`, the postponed runs."""
+    # longest first: the last trial is near the rigid limit, where the explicit reference method takes the most steps
     ends = [partial(try_first_end, trial) for trial in reversed(trials)]
     postponed = [ascent for ascent in ascents if ascent.unfinished and long_runs]
     long_runs_postponed = [
@@ -117,13 +116,14 @@ def try_first_end(trial: Trial) -> End | WalkEndsError:
 
 
 def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
-    """Make a postponed run; it may be in a fresh process, so it warms up first."""
+    """Make a postponed run, after a warm-up because it may be the first in its process."""
     trial.prepare(method, tolerance, WARM_UP_BUDGET)()
     return measure(trial, method, tolerance, RUN_BUDGET)
 
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
-    """Time a walk up to `REPEATS` times within `REPEAT_TIME_S`."""
+    """Time a walk up to `MAX_REPEATS` times within `REPEAT_TIME_S`."""
+    # the first walk serves as a warm-up and counts only if it is long
     walk = trial.prepare(method, tolerance, budget)
     first_s, result = time_walk(walk)
     walls = [first_s] if first_s > REPEAT_TIME_S else []
@@ -161,7 +161,7 @@ def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
 
 
 def omitted_tolerances(ascent: Ascent) -> list[dict[str, Any]]:
-    """List the tolerances that were not run, with reasons."""
+    """List the tolerances that were not run, with the reason."""
     if ascent.unfinished:
         why = f"more than {SHORT_RUN_BUDGET} right-hand sides, each in Python"
     else:

@@ -10,10 +10,8 @@ from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.system import Floats
 
-REFERENCE_RUN_BUDGET = (
-    20_000_000  # right-hand sides: a million explicit steps, which stiff ground takes, and some to spare
-)
-# on stiff ground an explicit step errs by rounding alone: asked for less, it shrinks without end and gains nothing
+REFERENCE_RUN_BUDGET = 20_000_000  # right-hand sides, enough for the million explicit steps that stiff ground takes
+# on stiff ground the error of an explicit step is all rounding: a tighter tolerance would only shrink the step
 TIGHTEST_CONTACT = {"dop853": 1e-12, "radau5": 1e-11}
 TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 
@@ -24,13 +22,13 @@ class End:
 
     method: str
     state: Floats
-    tolerance: float = 0.0  # relative; 0 for Taylor series at machine precision
-    rhs_evaluations: int = 0  # 0 where they are not counted
+    tolerance: float = 0.0  # relative tolerance; 0 for Taylor series at machine precision
+    rhs_evaluations: int = 0  # 0 if they are not counted
 
 
 @dataclass(frozen=True)
 class Reference:
-    """End of a walk by two different methods; their difference is its uncertainty."""
+    """End states of a walk by two different methods; their difference is the uncertainty."""
 
     first: End
     second: End
@@ -42,11 +40,11 @@ class Reference:
 
     @property
     def agreement(self) -> float:
-        """Largest difference between the two ends."""
+        """Largest difference between the two end states."""
         return float(np.max(np.abs(self.first.state - self.second.state)))
 
     def for_method(self, method: str) -> End:
-        """End to compare a method with, never computed by that method itself."""
+        """Return the end state to compare a method with, always one computed by another method."""
         return self.second if method == self.first.method else self.first
 
 
@@ -60,7 +58,7 @@ def reference_for(trial: Trial) -> Reference:
 
 
 def first_end(trial: Trial) -> End:
-    """Compute the end by Taylor series for a rigid compass where heyoka is installed, otherwise by dop853.
+    """Compute the end state: by Taylor series for a rigid compass if heyoka is installed, otherwise by dop853.
 
     dop853 shares nothing with the implicit methods, but takes a million steps on stiff ground.
 
@@ -72,17 +70,17 @@ def first_end(trial: Trial) -> End:
 
 
 def second_end(trial: Trial) -> End:
-    """Compute the end by a second, quick method. Raises WalkEndsError if the walk does not reach its end."""
+    """Compute the end state by a second, fast method. Raises WalkEndsError if the walk does not reach its end."""
     return tightest_end(trial, "radau5" if compass_of(trial) is None else "dop853")
 
 
 def compass_of(trial: Trial) -> RigidWalker | None:
-    """Closed-form walker of a trial, if heyoka can walk it."""
+    """Return the Appendix A walker of a rigid trial, or None if there is none or heyoka is not installed."""
     return trial.compass if isinstance(trial, RigidTrial) and taylor_reference.is_installed() else None
 
 
 def tightest_end(trial: Trial, method: str) -> End:
-    """Compute the end by one of our methods at its tightest useful tolerance."""
+    """Compute the end state by one of our methods at its tightest useful tolerance; may raise WalkEndsError."""
     tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST_CONTACT
     result = trial.prepare(method, tolerances[method], REFERENCE_RUN_BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:

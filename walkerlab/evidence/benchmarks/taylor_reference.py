@@ -25,7 +25,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
     passing, striking = integrators(walker)
     state = np.array(start)
     for _ in range(steps):
-        # the feet are together at the start too: look for the heel strike once the legs have passed each other
+        # both feet are on the slope at the start too: look for the heel strike once the legs have passed each other
         for integrator in (passing, striking) if state[0] < state[1] else (striking,):
             integrator.time, integrator.state[:] = 0.0, state
             integrator.reset_cooldowns()
@@ -38,7 +38,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
 
 
 def integrators(walker: RigidWalker) -> tuple[Any, Any]:
-    """Taylor integrators of the swing phase that stop when the legs pass and at heel strike."""
+    """Build two Taylor integrators of the swing phase: one stops when the legs pass, the other at heel strike."""
     import heyoka as hy
 
     th1, th2, w1, w2 = hy.make_vars("th1", "th2", "w1", "w2")

@@ -1,4 +1,4 @@
-"""Walks on which methods are measured: fixed start and step count, and one end state to compare."""
+"""Walks on which methods are measured, each with a fixed start, a fixed step count and an end state to compare."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ATOL_PER_RTOL = 1e-2
 @dataclass(frozen=True)
 class TrialRun:
     outcome: str
-    state: Floats  # at the end, empty if it was not reached
+    state: Floats  # end state; empty if it was not reached
     rhs_evaluations: int
     accepted: int
     rejected: int
@@ -39,21 +39,21 @@ class TrialRun:
 
 @dataclass(frozen=True)
 class RigidTrial:
-    """Walk of the rigid model; its end state follows the last impact."""
+    """Walk of the rigid model; its end state is the one just after the last impact."""
 
     walker: RigidModel
     start: tuple[float, ...]
     steps: int
-    compass: RigidWalker | None = None  # the walker as Appendix A has it, which a user's script is for
+    compass: RigidWalker | None = None  # the walker in Appendix A's form, for the user's script and heyoka
     name: str = "rigid"
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """All methods of the registry, and a user's script where there is one."""
+        """All methods of the registry, and the user's script if it covers the walker."""
         return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """Return a function that walks with a method, ready to be timed; its calls share their memory."""
+        """Return a function that walks with a method, ready to be timed; its calls reuse the same memory."""
         atol = rtol * ATOL_PER_RTOL
         if method == USER_SCRIPT:
             assert self.compass is not None, "the script is not among this walker's methods"
@@ -83,7 +83,7 @@ class RigidTrial:
 
 @dataclass(frozen=True)
 class ContactTrial:
-    """Walk on compliant ground; its end state is that of the last touch."""
+    """Walk on compliant ground; its end state is the one at the last touch."""
 
     walker: ContactWalker
     ground: JudgedGround
@@ -110,10 +110,10 @@ class ContactTrial:
 
 
 Trial = RigidTrial | ContactTrial
-"""A walk to measure methods by."""
+"""A walk on which methods are measured."""
 
 
 def make_run(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
-    """Build a run's record; without `Outcome.WALKED` it has no end state."""
+    """Build a run's record; it has an end state only if the outcome is `WALKED`."""
     end = state.copy() if outcome is Outcome.WALKED else np.zeros(0)
     return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))

@@ -1,7 +1,4 @@
-"""Rigid walk as a user would script it with NumPy and SciPy: matrices, a linear solve, an event function.
-
-Serves only as a comparison.
-"""
+"""Rigid walk as a user would script it with NumPy and SciPy, for comparison: matrices, a linear solve, an event."""
 
 from typing import Any
 
@@ -12,7 +9,7 @@ from walkerlab.physics.solvers.system import Floats
 
 
 class ScriptBudgetError(Exception):
-    """The script has used up its right-hand sides."""
+    """The script has exhausted its budget of right-hand sides."""
 
 
 def walk_as_a_script(
@@ -27,7 +24,7 @@ def walk_as_a_script(
 ) -> tuple[Floats | None, int]:
     """Walk with SciPy's solve_ivp, a NumPy right-hand side and terminal events.
 
-    ends  further terminal events, which end the walk
+    ends  further event functions that end the walk
 
     Returns the state after the last impact (None if not reached) and the number of right-hand sides.
     """

@@ -1,6 +1,6 @@
-"""Catalogues of extreme cases: named ones of the paper's compass, and variations of any scene.
+"""Catalogues of extreme cases: one of the paper's compass, and one of variations of any scene.
 
-A scene's variations walk on harder and softer ground, on other slopes and from other starts.
+The variations change the ground, the slope, the start, the knees or the solver's settings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ SCENE_CATALOGUE: Final = Path(__file__).with_name("scene_catalogue.yaml")
 PHYSICAL_ENDS: tuple[Fate, ...] = tuple(
     fate for fate in FATES if fate not in ("budget-exhausted", "solver-failed", "rejected")
 )
-"""The ends that physics may have: where nobody knows which, a case passes by its measures alone."""
+"""Physically possible outcomes. A case whose outcome is unknown accepts all of them, so only its measures can fail."""
 STOPPED_ENDS: tuple[Fate, ...] = tuple(fate for fate in PHYSICAL_ENDS if fate != "walked")
 SCENE_CHANGES: Final = ("start", "slope", "times", "over", "set")
 CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_ENDS}
@@ -39,14 +39,14 @@ def package_cases() -> tuple[Case, ...]:
 
 
 def read_catalogue(path: Path) -> Any:
-    """Plain values of a catalogue file."""
+    """Read a catalogue file into plain values."""
     root = read(path.read_text(encoding="utf-8"), path.name)
     assert root is not None, "a catalogue is not empty"
     return plain(root)
 
 
 def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
-    """Join a catalogue's cases (by default the package's) and a config's; ConfigError if two share a name."""
+    """Return a catalogue's cases (default: the package's), then a config's; raises ConfigError if names repeat."""
     catalogue = package_cases() if catalogue is None else catalogue
     shared = {case.name for case in catalogue} & {case.name for case in own}
     if shared:
@@ -55,7 +55,7 @@ def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> t
 
 
 def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """Check that the names of cases differ; raises ConfigError otherwise."""
+    """Return the cases as a tuple; raises ConfigError if two share a name."""
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
@@ -64,14 +64,14 @@ def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
 
 
 def config_of(case: Case) -> Config:
-    """Apply a case's lines to the paper's config; raises ConfigError if the result is no valid config."""
+    """Apply a case's changes to the paper's config; raises ConfigError if the result is invalid."""
     return paper_config_with(case.config, f"case {case.name}")
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:
-    """Cases of a scene with their configs, for the rigid model and, on compliant ground, the contact model.
+    """Return a scene's cases with their configs: for the rigid model and, if it has contact, the contact model.
 
-    config  with start, and pitch of pads if there are any, given as numbers
+    config  the scene, with a numeric start and, on pads, a numeric pad pitch
     """
     present, cases = features(config), []
     for entry in read_catalogue(SCENE_CATALOGUE):
@@ -86,7 +86,7 @@ def scene_cases(config: Config) -> list[tuple[Case, Config]]:
 
 
 def features(config: Config) -> set[str]:
-    """Features of a scene that cases may require."""
+    """Return the features of a scene that cases may require, such as friction or a compliant knee lock."""
     walker, present = config.walker, {"rigid"}
     if config.contact is not None:
         present |= {"contact", "friction"} if config.contact.has_friction else {"contact"}
@@ -96,7 +96,7 @@ def features(config: Config) -> set[str]:
 
 
 def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
-    """Apply a case's changes to a scene; on another slope, the angles are turned so that both feet stand on it."""
+    """Apply a case's changes to a scene; a new slope also turns the start's angles, so that both feet stand on it."""
     start, slope = changes.get("start", 1.0), changes.get("slope", 1.0) * config.slope_rad
     values = dict(changes.get("set", {}))
     values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}
@@ -112,6 +112,6 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
 
 
 def with_key(block: B, path: str, value: Any) -> B:
-    """Copy of a block in which the value at a dotted path is replaced."""
+    """Return a copy of a block with the value at a dotted path replaced."""
     name, _, tail = path.partition(".")
     return block.model_copy(update={name: with_key(getattr(block, name), tail, value) if tail else value})

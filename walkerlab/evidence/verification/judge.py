@@ -1,4 +1,4 @@
-"""Judging of cases: each is walked, at a ten times tighter tolerance again, by another method and as its twin."""
+"""Judgement of cases. Each is walked again at a ten times tighter tolerance, by another method and as a scaled twin."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -19,36 +19,36 @@ from walkerlab.physics.solvers.registry import METHODS, Method, method_named
 from walkerlab.pipeline.workers import in_order
 
 TIGHTER_FACTOR = 0.1
-SAMPLED_STEPS = 100  # longer walks are not sampled
+SAMPLED_STEPS = 100  # walks of more steps are not sampled
 LIBRARY_METHODS: Final = ("scipy-bdf", "scipy-radau")
-"""Asked where our other method gives up; multistep first, since its formulas are neither of ours."""
-LIBRARY_BUDGET: Final = 30_000  # right-hand sides; a library's walks run in Python
+"""Tried if our own other method fails. The multistep method comes first, because both of ours are one-step methods."""
+LIBRARY_BUDGET: Final = 30_000  # right-hand sides; small, because the libraries' solvers run in Python
 
 
 @dataclass(frozen=True)
 class Second:
-    """A case walked by a second method."""
+    """Walk of a case by a second method."""
 
-    method: str  # empty if none reached an answer
+    method: str  # empty if no method reached an answer
     walk: JudgedWalk | None
-    tried: str  # methods that failed before, with their outcomes
+    tried: str  # failed methods with their outcomes, or the reason why none was tried
 
 
 @dataclass(frozen=True)
 class CaseCell:
-    """A case to judge and to try with ordinary methods, in any process."""
+    """A case to judge and to simulate by ordinary methods, possibly in another process."""
 
     case: Case
-    config: Config | None = None  # of a scene's case; None for a case of the paper's compass
+    config: Config | None = None  # config of a scene's variation; None if the case changes the paper config
 
     def run(self) -> tuple[CaseResult | Choice, ...]:
-        """Return the verdict, then the ordinary methods' results."""
+        """Return the judgement, then the results of the ordinary methods."""
         config = self.config or config_of(self.case)
         return (judge(self.case, config), *choices(self.case, config))
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first to compile; the rest run longest first."""
+    """Yield results in case order. One case per model runs first, to compile; the others start by falling budget."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
@@ -94,7 +94,7 @@ def judge(case: Case, config: Config) -> CaseResult:
 
 
 def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
-    """Walks that must agree with the first, with their descriptions."""
+    """Return the walks that must agree with the first, as pairs (description, walk)."""
     again = [("ten times tighter tolerance", start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR)))]
     if second.walk is not None:
         again.append((second.method, second.walk))
@@ -108,7 +108,7 @@ def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> li
 
 
 def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
-    """Measure the difference of two walks' touch times, or of their end times without touches; empty without both."""
+    """Compare the touch times of two walks, or their end times if one has no touch; empty if an end time is missing."""
     steps = min(first.touches.size, second.touches.size, case.compared_steps)
     if steps:
         difference = float(np.max(np.abs(first.touches[:steps] - second.touches[:steps])))
@@ -121,13 +121,13 @@ def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case
 
 
 def other_methods(case_tolerances: str) -> tuple[Method, ...]:
-    """Methods besides the configured one: ours first, then the libraries'."""
+    """Return the methods to try instead of the configured one: ours first, then the libraries'."""
     ours = [name for name, method in METHODS.items() if method.compiled]
     return tuple(method_named(name) for name in dict.fromkeys((*ours, *LIBRARY_METHODS)) if name != case_tolerances)
 
 
 def second_walk(case_tolerances: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Walk with other methods until one reaches an answer; `budget`: right-hand sides of our own methods."""
+    """Walk with other methods until one has an answer; `budget` limits right-hand sides (libraries may get fewer)."""
     tried: list[str] = []
     for method in other_methods(case_tolerances):
         result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))

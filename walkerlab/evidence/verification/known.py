@@ -1,7 +1,7 @@
-"""Problems with known answers, run through the contact code; their references do not use that code.
+"""Problems with known answers, solved with the contact code and by references that do not use it.
 
-Balls, blocks, rods and wheels are modelled as walkers of two bodies and two feet, of which the second body and
-possibly a foot take no part. The rules that end walks are disabled; a run ends at a given time.
+Balls, blocks, rods and wheels are modelled as walkers with two bodies and two feet; the second body, and sometimes one
+foot, is inactive. The rules that end walks are disabled, so a run lasts for a given time.
 """
 
 import math
@@ -33,11 +33,12 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import normal_law
 
-UNBOUNDED_M = 1e7  # m, an area without edges, and a hip that cannot fall
-OUT_OF_REACH: Position = (0.0, 1e3)  # m, where a foot is that takes no part
+# pad length, so that no edge is in reach; its negative serves as leg length, so that no hip is low enough for a fall
+UNBOUNDED_M = 1e7
+OUT_OF_REACH: Position = (0.0, 1e3)  # m, position of an inactive foot
 PROBLEM_BUDGET = 2_000_000  # right-hand sides
 SAMPLE_COUNT = 4000
-BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # of the first body, in the state
+BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # indices of the first body in the state
 GRAVITY: Final = 9.81
 CENTRE: Final = (0.0, 0.0)
 PAPER_LAW: Final = normal_law(Contact())
@@ -49,9 +50,9 @@ class ParticleRun:
     """Sampled trajectory of the first body."""
 
     times: Floats  # (samples,) s
-    states: Floats  # (samples, 8)
+    states: Floats  # (samples, 8) states of both bodies
     end: State
-    dissipated: Floats  # (5,) J, in the order of account.LOSSES
+    dissipated: Floats  # (5,) J, in the order of `energy_channels.LOSSES`
 
 
 def rig(
@@ -62,9 +63,9 @@ def rig(
     feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
     slope: float = 0.0,
 ) -> ContactWalker:
-    """Build one body, with its centre of mass at its frame's origin and point feet fixed to it.
+    """Build a walker that acts as one rigid body; `feet`: its point feet, relative to its centre of mass (m).
 
-    The idle second body is hinged at that centre and has the same inertia but no mass.
+    The idle second body is hinged at the centre of mass and has the same inertia but no mass.
     """
     assembly = Assembly(
         bodies=(Body("body", mass, CENTRE, inertia), Body("idle", 0.0, CENTRE, inertia)),
@@ -75,14 +76,14 @@ def rig(
 
 
 def rig_state(position: Position, velocity: Position, angle: float = 0.0, rate: float = 0.0) -> State:
-    """State of the rig from the position and velocity of its centre of mass in the slope's frame."""
+    """Return the rig's state from the position (m) and velocity (m/s) of its centre of mass in the slope's frame."""
     return (*position, angle, 0.0, *velocity, rate, 0.0)
 
 
 def run_until(
     walker: ContactWalker, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12
 ) -> ParticleRun:
-    """Simulate for a time with evenly spaced samples; raises ArithmeticError if the run ends early."""
+    """Simulate for `duration_s`, with evenly spaced samples; raises ArithmeticError if the run ends early."""
     frame = Frame(-UNBOUNDED_M, 2.0 * duration_s / LONGEST_FLIGHT, True)
     ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
     walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
@@ -101,7 +102,7 @@ def run_until(
 
 @dataclass(frozen=True)
 class Known:
-    """Computed quantity and its reference."""
+    """Quantity computed with the contact code, and its reference value."""
 
     name: Annotated[str, Label("", "name of the problem")]
     quantity: Annotated[str, Label("", "compared quantity, with its unit")]
@@ -130,7 +131,7 @@ def solve_problem(
     limit: float,
     why: str,
 ) -> Known:
-    """Solve a problem with the contact code (`run`) and by its reference; a run that fails does not meet the limit."""
+    """Solve a problem with the contact code (`run`) and by its reference; a failed run never meets the limit."""
     started = time.perf_counter()
     reference = reference_by()
     try:
@@ -148,7 +149,7 @@ BLOCK_MASS = 20.0
 
 
 def bouncing_ball_period() -> float:
-    """Mean time (s) between landings over five bounces on an undamped linear spring."""
+    """Return the mean time (s) between landings over five bounces on an undamped linear spring."""
     ball = rig(1.0, 0.1, SPRING)
     first = math.sqrt(2.0 * DROP / GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, GRAVITY)
@@ -161,7 +162,7 @@ def bouncing_ball_period() -> float:
 
 
 def restitution(law: NormalLaw, speed: float) -> float:
-    """Restitution of a ball with the walker's mass that lands at `speed` (m/s)."""
+    """Return the coefficient of restitution of a ball as heavy as the walker that lands at `speed` (m/s)."""
     ball = rig(BLOCK_MASS, 1.0, law)
     height = 1e-3
     start = rig_state((0.0, height), (0.0, -math.sqrt(speed**2 - 2.0 * GRAVITY * height)))
@@ -173,7 +174,7 @@ def restitution(law: NormalLaw, speed: float) -> float:
 
 
 def block_speed(slope: float, start_speed: float) -> float:
-    """Speed (m/s) of a block on a slope one second after it had `start_speed`."""
+    """Return the speed (m/s) of a block on a slope (rad), one second after it had `start_speed` (m/s)."""
     law = PAPER_LAW
     foot = resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS, law.stiffness, law.exponent, law.damping)
     block = rig(BLOCK_MASS, 1.0, law, slope=slope)
@@ -187,9 +188,9 @@ ROUNDS = 14
 
 
 def rimless_wheel_speed() -> float:
-    """Angular speed (rad/s) with a spoke normal to the slope, of a steadily rolling wheel.
+    """Return the angular speed (rad/s) of a steadily rolling wheel when a spoke is normal to the slope.
 
-    Two spokes at a time, from one upright spoke to the next; then the wheel is in the same position, one spoke further.
+    A run models two spokes, from one being normal to the slope to the other; the next run starts with its final speed.
     """
     turn = 2.0 * math.pi / SPOKES
     ahead = (math.sin(turn), -math.cos(turn))
@@ -208,9 +209,9 @@ ROD_ANGLE, ROD_FRICTION, ROD_STIFFNESS = 1.0, 4.0, 1.0e8
 
 
 def painleve_growth_rate() -> float:
-    """Rate (1/s) at which the end of a sliding rod digs in, from evenly spaced penetrations.
+    """Compute the rate s (1/s) at which the end of a sliding rod digs in, from evenly spaced penetrations d.
 
-    For d = a + b cosh(s t), the differences D over equal times tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
+    For d = a + b cosh(s t), the differences D of d over a time tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
     """
     end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
     ground, friction = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4), Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)

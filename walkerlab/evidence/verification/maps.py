@@ -1,6 +1,6 @@
-"""Maps of where our default method and a game engine's fixed step can be trusted.
+"""Maps of the conditions under which our default method and a game engine's fixed-step method can be trusted.
 
-The paper's walk over stiffness and stiction velocity, and over stiffness and the step of semi-implicit Euler.
+A cell is the paper's walk at one stiffness and stiction velocity, or at one stiffness and step of semi-implicit Euler.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,15 +29,12 @@ PAPER_STIFFNESS: Final = Contact().in_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_RANGE: Final = (1e-7, 10.0)  # m/s
 ERROR_MISSING: Final = -1.0  # stands for a missing error in checkpoints, which hold only finite numbers
-PER_STICTION: Final = 10.0  # friction velocity over stiction velocity, as the paper has it
+PER_STICTION: Final = 10.0  # friction velocity / stiction velocity, as in the paper
 STEP_RANGE: Final = (1e-6, 1e-2)  # s
 WALK_STEPS: Final = 4
-CELL_BUDGET, TIGHTER_CELL_BUDGET, REFERENCE_CELL_BUDGET = (
-    600_000,
-    1_200_000,
-    20_000_000,
-)  # right-hand sides; of the last most take 7e6
-MAX_FIXED_STEPS: Final = 5_000_000  # of a fixed step: more than any cell needs
+# right-hand sides; most references need about 7e6
+CELL_BUDGET, TIGHTER_CELL_BUDGET, REFERENCE_CELL_BUDGET = 600_000, 1_200_000, 20_000_000
+MAX_FIXED_STEPS: Final = 5_000_000  # steps of semi-implicit Euler, more than any cell needs
 VERDICT_NAMES: Final = ("fine", "wrong silently", "diverges", "gives up", "no reference")
 
 Numbers = list[float]
@@ -46,7 +43,7 @@ Numbers = list[float]
 def prepare_on_ground(
     stiffness: float, stiction_velocity: float | None, steps: int, budget: int
 ) -> tuple[Case, Config, ContactStart]:
-    """The paper's walk at a stiffness (N/m^e) and, if given, a stiction velocity (m/s)."""
+    """Prepare the paper's walk at a stiffness (N/m^e) and, if given, a stiction velocity (m/s)."""
     contact: dict[str, object] = {"units": "si", "stiffness": stiffness}
     if stiction_velocity is not None:
         contact |= {"stiction_velocity": stiction_velocity, "friction_velocity": PER_STICTION * stiction_velocity}
@@ -62,8 +59,8 @@ def prepare_on_ground(
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     """Walk with the default method at one stiffness and stiction velocity.
 
-    Returns outcome, steps, outcome at a ten times tighter tolerance, difference of both walks in legs, radians and
-    pendulum times (`NONE` if they end differently), right-hand sides.
+    Returns the outcome, the step count, the outcome at a ten times tighter tolerance, the difference of both walks in
+    legs, radians and pendulum times (`ERROR_MISSING` if outcome or step count differ), and the right-hand sides.
     """
     case, config, start = prepare_on_ground(stiffness, stiction_velocity, WALK_STEPS, CELL_BUDGET)
     walk = again = start.walk(case, case_tolerances(start, case))
@@ -79,9 +76,9 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 
 
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
-    """Walk two steps at one stiffness by semi-implicit Euler with each step size, and by a tight reference.
+    """Walk two steps at one stiffness by semi-implicit Euler with each step size (s); compare with a tight reference.
 
-    Returns verdict and error for each step size.
+    Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error in legs, radians, pendulum times.
     """
     case, config, start = prepare_on_ground(stiffness, None, COMPARED_STEPS, REFERENCE_CELL_BUDGET)
     walk = start.walk(case, Tolerances(*REFERENCE_SETTINGS, case.budget))
@@ -96,7 +93,7 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
 
 
 def units_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
-    """Yield the work units of maps with `cells` cells along each axis: name, number of cells, and call."""
+    """Yield the work units of maps with `cells` cells along each axis: name, number of cells, function to call."""
     stiffness = np.geomspace(*STIFFNESS_RANGE, cells)
     steps = tuple(float(h) for h in np.geomspace(*STEP_RANGE, cells))
     for i, k in enumerate(stiffness):

@@ -13,11 +13,11 @@ from walkerlab.physics.solvers.system import Floats
 
 
 class Masses:
-    """A walker's masses, relative to a point that moves with it: by default the centre of mass.
+    """Point masses of a walker, with levers from a reference point (default: its centre of mass).
 
     mass     (masses,) kg
-    levers   (masses, bodies, 2) m, from the point
-    inertia  (bodies,) kg m^2, of the bodies about their own centres of mass
+    levers   (masses, bodies, 2) m, from the reference point to each mass
+    inertia  (bodies,) kg m^2, of each body about its own centre of mass
     """
 
     def __init__(self, assembly: Assembly, about: Anchor | None = None) -> None:
@@ -30,21 +30,21 @@ class Masses:
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
     def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
-        """Positions and velocities (..., masses, 2) relative to the point, at angles and rates (..., bodies)."""
+        """Return positions and velocities (..., masses, 2) from the reference point; psi, rate: (..., bodies)."""
         arms = rotate(self.levers, psi[..., None, :])
         swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
         return arms.sum(axis=-2), swept.sum(axis=-2)
 
 
 def rotate(d: Floats, psi: Floats) -> Floats:
-    """Rotate levers (..., bodies, 2) with their bodies."""
+    """Rotate levers (..., bodies, 2) by the angles of their bodies (..., bodies)."""
     s, c = np.sin(psi), np.cos(psi)
     return np.stack([c * d[..., 0] - s * d[..., 1], s * d[..., 0] + c * d[..., 1]], axis=-1)
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Masses and bodies of a walker at an instant; the origin is on the ground under the stance foot."""
+    """Motion of a walker's masses and bodies at an instant; the origin is on the ground under the stance foot."""
 
     mass: Floats  # (masses,) kg
     place: Floats  # (masses, 2) m
@@ -52,7 +52,7 @@ class Moving:
     inertia: Floats  # (bodies,) kg m^2, about the bodies' own centres of mass
     rate: Floats  # (bodies,) rad/s
     hip: Floats  # (2,) m
-    contact: Floats  # (2,) m, point of the swing foot that would touch
+    contact: Floats  # (2,) m, lowest point of the swing foot
 
     @property
     def kinetic(self) -> float:
@@ -60,14 +60,14 @@ class Moving:
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
 
     def about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
-        """Angular momentum about a point (kg m^2/s), with the weights of masses and bodies."""
+        """Return the angular momentum about a point (kg m^2/s), with weights for the masses and the bodies."""
         arm = self.place - point
         orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
         return float(on_masses @ orbital + on_bodies @ (self.inertia * self.rate))
 
 
 class RigidMasses:
-    """A walker's masses in states of the rigid model."""
+    """Momenta and energy of a walker in states of the rigid model, computed from its point masses."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
         """Take levers from the centre of the stance foot's arc; slope in rad."""
@@ -81,7 +81,7 @@ class RigidMasses:
         self.to_foot = levers(assembly, root, Anchor(trailing.body, trailing.centre_m))
 
     def pose(self, state: Floats) -> Moving:
-        """Masses in a state of the rigid model (2 n)."""
+        """Return the masses with their positions and velocities in a state of the rigid model (2 n,)."""
         n = self.members.shape[1]
         psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
         centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
@@ -91,12 +91,12 @@ class RigidMasses:
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def momenta(self, state: Floats, new: bool) -> tuple[float, float]:
-        """Angular momenta conserved by a heel strike (kg m^2/s).
+        """Return the two angular momenta that a heel strike conserves (kg m^2/s).
 
-        The whole walker's about the new foothold; and that of the lifting leg, with its share of coupled bodies, about
-        the hip.
+        The first is that of the walker about the new foothold; the second is that of the lifting leg, with its share of
+        coupled bodies, about the hip.
 
-        new  whether the state is after the change of stance foot
+        new  whether the state is after heel strike, with the roles of the legs exchanged
         """
         moving, leg = self.pose(state), self.assembly.legs[SWING if new else STANCE]
         names = [body.name for body in self.assembly.bodies]
@@ -109,13 +109,13 @@ class RigidMasses:
         return walker_momentum, moving.about(moving.hip, share[self.owner], share)
 
     def moment_of(self, push_off: float, state: Floats) -> float:
-        """Angular impulse (kg m^2/s) about the new foothold of a push-off (N s) from the rear contact to the hip."""
+        """Return the angular impulse (kg m^2/s) of a push-off (N s, from rear foot to hip) about the new foothold."""
         moving = self.pose(state)
         along, up = push_off * moving.hip / np.hypot(*moving.hip)
         return float(moving.contact[1] * along - moving.contact[0] * up)
 
     def momentum_change(self, before: Floats, after: Floats, push_off: float = 0.0) -> float:
-        """Return the largest relative change of these momenta in heel strikes (strikes, 2 n); push-off in N s."""
+        """Return the largest relative change of conserved momenta; before, after: (strikes, 2 n), push_off: N s."""
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
             momenta_before, momenta_after = (
@@ -130,10 +130,10 @@ class RigidMasses:
         return finite(change / size)
 
     def energy_won(self, before: Floats, after: Floats) -> float:
-        """Largest gain of kinetic energy (J) in heel strikes; 0 if all lose energy."""
+        """Return the largest gain of kinetic energy (J) in a heel strike; 0 if all of them lose energy."""
         gains = [self.pose(new).kinetic - self.pose(old).kinetic for old, new in zip(before, after, strict=True)]
         return max(0.0, *gains)
 
     def feet_off_the_slope(self, before: Floats) -> float:
-        """Largest distance (m) of the landing foot from the slope."""
+        """Return the largest distance (m) of a landing foot from the slope at heel strike."""
         return float(max(abs(self.pose(state).contact[1]) for state in before))

@@ -1,8 +1,8 @@
-"""Momentum balance on compliant ground: a walk's change of momentum against the impulse of ground and gravity.
+"""Momentum balance on compliant ground: a walk's change of momentum compared with the impulse of ground and gravity.
 
-Momenta are computed from positions and velocities of the masses, not from the equations of motion; impulses from the
-ground's forces at sampled states. Where forces vary quickly, as in a touch of milliseconds, sampling is refined until
-the sums settle.
+Momenta are computed from positions and velocities of the masses, not from the equations of motion. Impulses are
+integrated from the ground's forces at sampled states; sampling is refined until the integrals settle, since a touch
+lasts only milliseconds.
 """
 
 from dataclasses import dataclass
@@ -26,29 +26,29 @@ from walkerlab.scene.contact import ContactScene
 from walkerlab.scene.parts import assembly_of
 
 MEASURE: Final = "momentum not from ground and gravity, over the walker's"
-BALANCE_STEPS: Final = 2  # includes an impact and the motion after it
+BALANCE_STEPS: Final = 2  # enough for an impact and the motion after it
 INITIAL_INTERVALS: Final = 256
-MAX_PASSES: Final = 9  # each divides unsettled intervals in four
-MAX_INTERVALS: Final = 30_000  # not refined beyond this
-# of the walker's momentum: an interval's impulse may change by this over the number of intervals
+MAX_PASSES: Final = 9  # refinements; each splits unsettled intervals into four
+MAX_INTERVALS: Final = 30_000  # finer grids are not refined further
+# largest total error of the impulse, as a fraction of the walker's momentum; each interval gets an equal part of it
 SETTLED_IMPULSE_SHARE: Final = 1e-6
-MAX_UNKNOWN: Final = 1e-3  # of the walker's momentum, beyond which a balance says nothing
+MAX_UNKNOWN: Final = 1e-3  # fraction of the walker's momentum; a balance with more unknown impulse is inconclusive
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Momentum against impulse, each as a share of the walker's momentum."""
+    """Result of a momentum balance, in fractions of the walker's momentum."""
 
-    residual: float  # largest over time, both directions and the angular part
-    unsure: float  # error bound of the impulses' sums
-    unresolved: float  # friction's impulse that depends on slips below the tolerance
-    steps: int  # of the solver
+    residual: float  # largest difference of momentum change and impulse, over time and components
+    unsure: float  # error bound of the integrated impulse
+    unresolved: float  # impulse of friction that depends on slip velocities below the tolerance
+    steps: int  # solver steps
 
 
 def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Measure | NotMeasured:
-    """Compare momentum with impulse, or state why it cannot be judged.
+    """Measure the momentum balance of a case's walk, or state why it cannot be judged.
 
-    Errors of single steps are not magnified by the walk: the balance holds along the computed path.
+    The walk does not magnify the errors of single steps, because the balance holds along the computed path.
     """
     if scene.pinned:
         return NotMeasured(MEASURE, "the hinge transmits forces as well")
@@ -66,7 +66,7 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
 
 
 def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
-    """Compare momentum with impulse over the first steps of a case."""
+    """Compare the change of momentum with the impulse over the first steps of a case."""
     mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
     rates = np.abs(start[len(start) // 2 :])
     speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
@@ -92,42 +92,42 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     momenta = momentum(samples, config) / scale
     differences = np.abs(momenta - momenta[0] - impulse(samples.time_s, rates))
     accepted = int(walk.work[ACCEPTED])
-    # in a state between the solver's own the slip is known to its tolerance, with another sign in every step
+    # between solver steps the slip velocity is known only to the tolerance; its error has a random sign in each step
     slip = tolerances.atol + tolerances.rtol * speed
     push = steepest_change(scene.walker.friction, slip) * config.gravity_m_s2 * walk.end_time_s / speed
     return Balance(float(differences.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
 
 
 def with_middles(grid: Floats) -> Floats:
-    """Ends and midpoints of intervals."""
+    """Return the ends and midpoints of intervals in ascending order."""
     return np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])]))
 
 
 def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
-    """Ends of intervals, given with their midpoints, after those marked by `wanting` are cut into four."""
+    """Return the ends of intervals after splitting those marked in `wanting` into four; times: ends and midpoints."""
     first, middle, last = times[:-1:2], times[1::2], times[2::2]
     halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
     return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
 
 
 def impulse(times: Floats, rate: Floats) -> Floats:
-    """Integrate a rate by Simpson's rule up to each interval's end: (times, components)."""
+    """Integrate a rate (times, components) by Simpson's rule up to each interval's end: (ends, components)."""
     widths = np.diff(times[::2])[:, None]
     pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])
 
 
 def unsettled(times: Floats, rate: Floats) -> Floats:
-    """Change of each interval's integral when its midpoint is included, in the worst component."""
+    """Estimate each interval's integration error, in its worst component: Simpson's rule minus the midpoint rule."""
     widths = np.diff(times[::2])[:, None]
     change = widths / 6.0 * (rate[:-1:2] - 2.0 * rate[1::2] + rate[2::2])
     return np.asarray(np.abs(change).max(axis=1))
 
 
 def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Floats) -> Floats:
-    """Force along and normal to the slope (N), and torque about a point of the slope (N m).
+    """Return the force along and normal to the slope (N) and the torque about a point of the slope (N m): (times, 3).
 
-    Sums ground, gravity and, from the times of touches (steps,) on, push-offs.
+    It sums the ground, gravity and push-offs; push-offs start at the touch times, `touches` (steps,) in s.
     """
     along, height, normal, friction, _ = np.moveaxis(sample_feet(scene.walker, samples), 2, 0)
     slope = config.slope_rad
@@ -149,7 +149,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 
 
 def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
-    """Momentum along and normal to the slope (kg m/s) and about a point of it (kg m^2/s), at intervals' ends."""
+    """Return the momentum along and normal to the slope (kg m/s) and about a point of it (kg m^2/s): (ends, 3)."""
     y = samples.states[::2]
     n, walker_masses = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
     rate = y[:, 4 + n :]
@@ -159,5 +159,5 @@ def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
 
 
 def cross(r: Floats, v: Floats) -> Floats:
-    """Planar cross product, (...)."""
+    """Return the planar cross product (...) of vectors (..., 2)."""
     return np.asarray(r[..., 0] * v[..., 1] - r[..., 1] * v[..., 0])

@@ -1,8 +1,8 @@
-"""Ordinary methods on the same scenes: SciPy at its default tolerance, and a game engine's fixed step.
+"""Ordinary methods on the same cases: SciPy at its default tolerances, and a game engine's method with fixed steps.
 
-The contact scene is one differential equation without events, as written without knowledge of switching points and
-pad edges. It is integrated to the end of this project's walk and compared with that walk at a tight tolerance, whatever
-the case specifies. The rigid scene is a user's script with an event function.
+A contact scene is one differential equation without events, as written by somebody unaware of switching points and pad
+edges. It is integrated up to the end of our own walk, which is recomputed at a tight tolerance for the comparison. A
+rigid scene is a user's script with an event function.
 """
 
 import time
@@ -34,35 +34,36 @@ from walkerlab.physics.solvers.stepping import BUDGET, COUNTS, RHS
 from walkerlab.physics.solvers.system import Floats
 
 MAX_ORDINARY_EVALUATIONS: Final = 20_000  # right-hand sides
-FINE_ERROR: Final = 1e-2  # of a leg, of a radian, of their rates in pendulum times
+FINE_ERROR: Final = 1e-2  # largest error of a fine result, in legs, radians and pendulum times
 SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
-DIVERGED_ERROR: Final = 10.0  # the same
+DIVERGED_ERROR: Final = 10.0  # error above which a result has diverged, in the same units
 COMPARED_STEPS: Final = 2
 SCIPY_CHOICES: Final = ("RK45", "LSODA", "Radau")
 FIXED_STEPS_S: Final = (1e-3, 1e-4)
 REFERENCE_SETTINGS: Final = ("radau5", 1e-8, 1e-10)  # method, rtol, atol
-MIN_REFERENCE_BUDGET: Final = 1_000_000  # at least
+MIN_REFERENCE_BUDGET: Final = 1_000_000  # right-hand sides
 RIGID_REFERENCE_SETTINGS: Final = ("dop853", 1e-12, 1e-14)
 
 
 @dataclass(frozen=True)
 class Choice:
-    """One method on one case."""
+    """Result of one method on one case."""
 
     case: str
     method: str
     verdict: str  # fine, wrong silently, gives up, diverges
-    error: float | None  # of the final state; None if it was not reached
+    error: float | None  # error of the final state; None if the method gave up or diverged
     rhs_evaluations: int
     wall_s: float
 
 
 def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
-    """Run every ordinary method on a case.
+    """Walk a case by every ordinary method.
 
-    Empty if the case has no start or does not move, if no equation without events describes its ground, or for another
-    walker than a compass: a script without events has no knee that locks, and Appendix A no other walker.
+    The result is empty for a walker other than a passive compass, for a case without a start or without motion, and for
+    ground that needs events (a hinge, or `after-mid-swing`).
     """
+    # the locking of a knee is an event, and Appendix A describes no other walker
     if not is_passive_compass(config):
         return ()
     short = case.model_copy(
@@ -89,15 +90,15 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
 
 @dataclass(frozen=True)
 class Arrival:
-    """End of a case's walk, to judge methods by."""
+    """End of a case's walk, the reference for other methods."""
 
     case: str
     time_s: float
     state: Floats
-    units: Floats  # of each component of the state
+    units: Floats  # unit of each component of the state
 
     def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
-        """Judge the end state of a method; None if it was not reached."""
+        """Judge a method by its end state y (None if it was not reached); count: right-hand sides."""
         if y is None:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))
@@ -114,14 +115,14 @@ def arrival_of(case: str, walk: ContactWalkResult, units: Floats) -> Arrival:
 
 
 def natural_units(config: RigidConfig) -> Floats:
-    """Units of the state's components: legs, radians, and these per pendulum time."""
+    """Return the units of the state's components: legs and radians, and for rates these per pendulum time."""
     lengths = np.array([config.walker.leg_length_m] * 2 + [1.0] * 2)
     return np.concatenate([lengths, lengths / pendulum_time(config)])
 
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress libraries' warnings, and leave the block on exceptions with which they give up."""
+    """Suppress the libraries' warnings, and the exceptions by which they give up."""
     with (
         warnings.catch_warnings(),
         np.errstate(all="ignore"),
@@ -132,7 +133,7 @@ def silenced() -> Iterator[None]:
 
 
 def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
-    """Walk with a method of SciPy's solve_ivp at default settings, with an event function for heel strikes."""
+    """Walk a rigid scene with SciPy's solve_ivp at default settings, with an event function for heel strikes."""
     began = time.perf_counter()
     y, count = None, MAX_ORDINARY_EVALUATIONS
     with silenced():
@@ -141,7 +142,7 @@ def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, 
 
 
 def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
-    """Walk with a method of SciPy's solve_ivp at default settings."""
+    """Walk a contact scene with SciPy's solve_ivp at default settings."""
     from scipy.integrate import solve_ivp
 
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
@@ -159,7 +160,7 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
 
 def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINARY_EVALUATIONS) -> Choice:
-    """Walk by semi-implicit Euler with at most `cap` steps of h (s)."""
+    """Walk a contact scene by semi-implicit Euler with at most `cap` steps of h (s)."""
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()

@@ -1,11 +1,11 @@
-"""References for the known problems without the contact code: closed forms, and SciPy on separately coded laws."""
+"""References for the known problems, without the contact code: closed forms, and SciPy on separately coded laws."""
 
 import math
 from typing import Any
 
 
 def linear_bounce_period(mass: float, stiffness: float, drop: float, gravity: float) -> float:
-    """Time (s) between landings of a ball on an undamped linear spring, in closed form.
+    """Return the time (s) between landings of a ball on an undamped linear spring, in closed form.
 
     Flight takes 2 v / g. Contact obeys x'' = g - w^2 x from x = 0, x' = v and takes half a period plus twice the phase
     shift due to gravity.
@@ -17,7 +17,7 @@ def linear_bounce_period(mass: float, stiffness: float, drop: float, gravity: fl
 
 
 def impact_force(depth: float, rate: float, law: tuple[float, float, float, float]) -> float:
-    """ADAMS's IMPACT law (N) as its manual writes it; law is (k, e, c_max, d_max)."""
+    """Return the force (N) of ADAMS's IMPACT law, as written in the manual; law: (k, e, c_max, d_max), SI."""
     k, e, c_max, d_max = law
     if depth <= 0.0:
         return 0.0
@@ -26,7 +26,7 @@ def impact_force(depth: float, rate: float, law: tuple[float, float, float, floa
 
 
 def restitution(mass: float, speed: float, law: tuple[float, float, float, float], gravity: float) -> float:
-    """Restitution of a ball that lands at `speed` (m/s), by SciPy's DOP853."""
+    """Compute the coefficient of restitution of a ball that lands at `speed` (m/s), by SciPy's DOP853."""
     from scipy.integrate import solve_ivp
 
     def motion(_t: float, y: Any) -> tuple[float, float]:
@@ -43,7 +43,7 @@ def restitution(mass: float, speed: float, law: tuple[float, float, float, float
 
 
 def creep_speed(slope: float, static: float, stiction_velocity: float) -> float:
-    """Slip velocity (m/s) at which the cubic friction law holds a block on a slope (rad)."""
+    """Return the slip velocity (m/s) at which the cubic friction law holds a block on a slope (rad)."""
     from scipy.optimize import brentq
 
     def excess(slip: float) -> float:
@@ -54,14 +54,14 @@ def creep_speed(slope: float, static: float, stiction_velocity: float) -> float:
 
 
 def sliding_acceleration(slope: float, dynamic: float, gravity: float) -> float:
-    """Acceleration (m/s^2) of a block down a slope (rad) under dynamic friction."""
+    """Return the acceleration (m/s^2) of a block down a slope (rad) under dynamic friction."""
     return gravity * (math.sin(slope) - dynamic * math.cos(slope))
 
 
 def wheel_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:
-    """Angular speed (rad/s) just after impact of a steadily rolling rimless wheel of unit mass and spoke.
+    """Return the angular speed (rad/s) just after impact of a steadily rolling rimless wheel (1 kg, spokes of 1 m).
 
-    inertia  of the hub (kg m^2)
+    inertia  moment of inertia of the hub (kg m^2)
 
     Source: McGeer, Passive dynamic walking (1990), section 2; Coleman (1998).
     """
@@ -72,19 +72,19 @@ def wheel_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0)
 
 
 def wheel_upright_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:
-    """Angular speed (rad/s) when a spoke is normal to the slope; energy is conserved since the impact."""
+    """Return the angular speed (rad/s) when a spoke is normal to the slope; energy is conserved after the impact."""
     half = math.pi / spokes
     climbed = 2.0 * gravity * (math.cos(slope) - math.cos(half - slope)) / (1.0 + inertia)
     return math.sqrt(wheel_speed(spokes, slope, gravity, inertia) ** 2 - climbed)
 
 
 def painleve_growth_rate(angle: float, friction: float, mass: float, stiffness: float) -> float:
-    """Rate (1/s) at which a sliding rod's end digs into a linear spring, beyond the critical friction.
+    """Return the rate (1/s) at which a sliding rod's end digs into a linear spring, beyond the critical friction.
 
     angle  between rod and ground (rad)
 
-    A normal force N with friction mu N accelerates the end by A N, m A = 1 + 3 cos(angle) (cos(angle) - mu sin(angle));
-    for negative A the ground's push pulls the end in, and penetration grows as exp(sqrt(-A k) t).
+    A normal force N with friction mu N accelerates the end by A N, m A = 1 + 3 cos(angle) (cos(angle) - mu sin(angle)).
+    For negative A the ground's push pulls the end in, and penetration grows as exp(sqrt(-A k) t).
 
     Source: Painleve (1895); Champneys, Varkonyi, The Painleve paradox in contact mechanics (2016).
     """

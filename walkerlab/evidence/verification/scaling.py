@@ -1,4 +1,4 @@
-"""Twins of walkers: dimensionally similar, with another size, mass and gravity, and so the same walk."""
+"""Twins of walkers: dynamically similar walkers with another size, mass and gravity, which walk in the same way."""
 
 import math
 from typing import Any, TypeVar
@@ -9,23 +9,23 @@ from walkerlab.config.schema import Config
 from walkerlab.physics.orbits.similarity import Units
 
 B = TypeVar("B", bound=Block)
-# the twin's leg (m), mass (kg) and gravity (m/s^2): odd numbers, so that rounding falls differently
+# leg (m), mass (kg) and gravity (m/s^2) of the twin: uneven values, so that its rounding errors differ
 TWIN_LEG, TWIN_MASS, TWIN_GRAVITY = 1.37, 11.3, 7.43
 
 
 def pendulum_time(config: RigidConfig) -> float:
-    """Time sqrt(L/g) (s) of a config's walker."""
+    """Return the pendulum time sqrt(L/g) (s) of a config's walker."""
     return math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
 
 
 def to_twin(config: RigidConfig) -> Units:
-    """Scale factors from a config's walker to its twin of ordinary size."""
+    """Return the scale factors from a config's walker to its twin of ordinary size."""
     length, mass = TWIN_LEG / config.walker.leg_length_m, TWIN_MASS / config.walker.total_mass_kg
     return Units(length, mass, math.sqrt(length * config.gravity_m_s2 / TWIN_GRAVITY))
 
 
 def scaled_block(block: B, by: Units) -> B:
-    """Scale each value of a block by the unit of its key."""
+    """Scale each value of a block according to the unit of its key."""
 
     def value(quantity: Any, unit: float) -> Any:
         if isinstance(quantity, Block):
@@ -41,7 +41,7 @@ def scaled_block(block: B, by: Units) -> B:
 
 
 def scaled(config: Config, by: Units) -> Config:
-    """Config of the similar walker: quantities with a unit are scaled, angles and pure numbers are not."""
+    """Return the config of a similar walker: quantities with a unit are scaled, angles and pure numbers are not."""
     walker = scaled_block(config.walker, by)
     changes: dict[str, object] = {
         "walker": walker,

@@ -54,7 +54,7 @@ def gave_up(row: Row) -> bool:
 
 
 def ending(row: Row) -> Cell:
-    """Outcome of a case, green only for an expected answer."""
+    """Return the table cell of a case's outcome, green only for an expected answer."""
     return Cell(row["outcome"], ("fair" if gave_up(row) else "good") if row["ok"] else "bad")
 
 
@@ -64,7 +64,7 @@ def failures(summary: Row) -> list[str]:
 
 
 def worst_measure(row: Row) -> float | None:
-    """Largest ratio of a measure to its limit, apart from the budget's."""
+    """Return the largest ratio of a measure to its limit; use of the budget does not count."""
     measures = [measure for measure in row["measures"] if measure["limit"] > 0.0 and measure["measure"] != BUDGET_USED]
     return max((measure["value"] / measure["limit"] for measure in measures), default=None)
 
@@ -101,7 +101,7 @@ KNOWN_COLUMNS = (
 
 
 def ordinary_table(summary: Row) -> Table:
-    """Table of ordinary methods: one row per case, one column per method."""
+    """Build the table of ordinary methods: one row per case, one column per method."""
     methods = [
         Column(method.removeprefix("SciPy ").removeprefix("semi-implicit "), method, ordinary_cell)
         for method in grouped(summary["ordinary"], "method")

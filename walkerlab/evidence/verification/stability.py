@@ -47,12 +47,12 @@ def run(
 
 
 def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[SceneCasesConfig]:
-    """Whether the walker is not the paper's compass."""
+    """Whether the cases are variations of the scene, as for every walker except the paper's compass."""
     return not is_studied(config)
 
 
 def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
-    """Scene with start and pitch of pads given as numbers, shared by its cases."""
+    """Return the scene with a numeric start and pad pitch, which all its cases share."""
     step, start = rigid_start(config, inputs)
     scene = Config().model_copy(update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": start})
     contact = config.contact
@@ -65,9 +65,9 @@ def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
 def summarise(
     cases: Sequence[CaseResult], problems: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
 ) -> dict[str, Any]:
-    """Build the summary; a failure adds `no_answer`.
+    """Build the summary; it contains `no_answer` if a case or problem failed.
 
-    problems  the known problems, as stored by their stage
+    problems  results of the known problems, as stored by their stage
     """
     failed = [*(case.name for case in cases if not case.ok), *(row["name"] for row in problems if not row["ok"])]
     total = len(cases) + len(problems)
@@ -76,7 +76,7 @@ def summarise(
         "known": list(problems),
         "passed": total - len(failed),
         "failed": len(failed),
-        # an ordinary method that did not arrive has no error
+        # an ordinary method that did not reach the end has no error
         "ordinary": [{name: value for name, value in asdict(row).items() if value is not None} for row in ordinary],
         "ordinary_cap": MAX_ORDINARY_EVALUATIONS,
         "ordinary_fine": FINE_ERROR,

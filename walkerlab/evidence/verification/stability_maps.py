@@ -22,7 +22,7 @@ STICTION_COLUMNS = {
     "error": "between both runs, in legs, radians, pendulum times, where they are compared",
     "rhs_evaluations": "right-hand sides evaluated",
 }
-"""Numbers of a cell of the map over stiction velocity and stiffness, in their order."""
+"""Values in a cell of the map over stiction velocity and stiffness, in order."""
 
 
 def run(
@@ -30,8 +30,8 @@ def run(
 ) -> Content:
     """Compute the missing cells of both maps.
 
-    checkpoint  holds cells of earlier runs, and receives new ones
-    jobs        processes
+    checkpoint  cells of earlier runs; new cells are added to it
+    jobs        number of processes
     """
     cells = config.stability.map_cells
     complete([WorkUnit(*unit) for unit in maps.units_of(cells)], checkpoint, "stability maps", progress, jobs)
@@ -40,7 +40,7 @@ def run(
 
 
 def stiction_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
-    """Outcomes of the default method over stiction velocity and stiffness."""
+    """Build the group of outcomes of the default method over stiction velocity and stiffness."""
     cells_by_axis = np.array([[results[f"stiction {i} {j}"] for j in range(cells)] for i in range(cells)])
     columns = dict(zip(STICTION_COLUMNS, np.moveaxis(cells_by_axis, 2, 0), strict=True))
     dims = ("stiction_velocity", "stiffness")
@@ -62,10 +62,9 @@ def stiction_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
 
 
 def step_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
-    """Results of semi-implicit Euler over step size and stiffness."""
-    cells_by_axis = np.array(
-        [np.reshape(results[f"step {j}"], (cells, 2)) for j in range(cells)]
-    )  # stiffness, step, of each
+    """Build the group of results of semi-implicit Euler over step size and stiffness."""
+    # (stiffness, step size, 2): verdict and error
+    cells_by_axis = np.array([np.reshape(results[f"step {j}"], (cells, 2)) for j in range(cells)])
     verdicts, errors = cells_by_axis.transpose(2, 1, 0)
     dims = ("step_size", "stiffness")
     text = "of the state at the end, in legs, radians, pendulum times"

@@ -1,4 +1,4 @@
-"""Starts of cases: a walker in its initial state, how it walks in either model, and what its walk must conserve."""
+"""Starts of cases: a walker in its initial state, its walk in either model, and quantities that must be conserved."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -24,18 +24,18 @@ from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, s
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 
-CENTRE_HEIGHT = 1  # index into the state of the free walker
-STRIKE_TOLERANCE = 1e-9  # share of the momentum by which a heel strike may seem to change it
-SAMPLE_RATE = 40
-REGAIN_TOLERANCE = 1e-3  # of the allowed residual: apparent decrease of dissipated energy by quadrature errors
+CENTRE_HEIGHT = 1  # index of the height of the centre of mass in the free walker's state
+STRIKE_TOLERANCE = 1e-9  # largest relative error of the quantities that must hold at a heel strike
+SAMPLE_RATE = 40  # samples per pendulum time
+REGAIN_TOLERANCE = 1e-3  # fraction of the allowed residual; quadrature errors may lower the dissipated energy by this
 
 
 @dataclass(frozen=True)
 class JudgedWalk:
-    """A walk of either model to be judged, with times in pendulum times of its walker.
+    """A walk in either model to be judged; times are in pendulum times of its walker.
 
     end         end time; None in the rigid model, whose walks end at a heel strike
-    residual_J  of the energy balance, or energy drift within a swing
+    residual_J  residual of the energy balance or, in the rigid model without springs, energy drift within a swing
     numbers     values that must be finite
     """
 
@@ -56,7 +56,7 @@ class CaseStart:
     residual_name: ClassVar[str]  # name of the residual
     config: WalksConfig
     start: State
-    energy: float  # m g L and the initial energy (J), the scale of residuals
+    energy: float  # J, m g L plus kinetic and stored energy at the start; the scale of residuals
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class RigidStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, _case: Case) -> list[Measure]:
-        """Measure what heel strikes must conserve."""
+        """Check heel strikes: the foot lands on the slope, momentum is conserved and energy does not grow."""
         record: RigidWalkResult = walk.record
         if not record.steps:
             return []
@@ -115,7 +115,7 @@ class ContactStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, end, walk.energy_balance_residual_J, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
-        """Measure, on a sampled walk, whether friction and damping return energy."""
+        """Measure the energy that friction and damping seem to return; empty if the walk was not sampled."""
         record: ContactWalkResult = walk.record
         if record.samples is None or record.samples.dissipated_J.shape[0] < 2:
             return []
@@ -124,7 +124,7 @@ class ContactStart(CaseStart):
         return [Measure("energy regained from friction and damping", back, REGAIN_TOLERANCE * case.balance)]
 
     def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
-        """Momentum balance of a walk that has an answer and a duration."""
+        """Measure the momentum balance, if the walk has an answer and a duration."""
         if not walk.outcome.answered or walk.record.end_time_s <= 0.0:
             return NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")
         return momentum_finding(self.config, self.scene, self.start, case)
@@ -134,7 +134,7 @@ Start = RigidStart | ContactStart
 
 
 def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
-    """The config's method, with its tolerances multiplied by `tighter`, within the case's budget."""
+    """Return the config's method and tolerances with the case's budget; `tighter` multiplies both tolerances."""
     solver = start.config.solver
     settings = solver.rigid if isinstance(start, RigidStart) else solver.contact
     return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
@@ -142,12 +142,12 @@ def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerance
 
 @cache
 def gait_of(walker: RigidModel, seed: int) -> RigidGait | None:
-    """Find a walker's gait; cached, since most cases of a catalogue are one walker on other ground."""
+    """Find a walker's gait; cached, because most cases of a catalogue differ only in the ground."""
     return find_gaits(walker, seed).gait
 
 
 def prepare_start(config: WalksConfig, case: Case) -> Start | None:
-    """Prepare the start of a case; None if it, or the pads' pitch, depends on a gait that does not exist."""
+    """Prepare the start of a case; returns None if the start or the pad pitch needs a gait that does not exist."""
     walker = rigid_walker(config)
     if isinstance(config.start, str):
         gait = gait_of(walker, config.seed)

@@ -1,4 +1,4 @@
-"""Measures and verdict of a case."""
+"""Measures of a case's walk, and the result of judging it."""
 
 import math
 from dataclasses import dataclass
@@ -8,18 +8,18 @@ from walkerlab.config.stability import Case
 from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"
-"""A measure of cost, not of correctness: left out where the largest of all is shown."""
+"""Name of the measure of cost. It says nothing about correctness, so it never counts as the worst measure."""
 
-MAGNIFIED: Final = 10.0  # by how much a walk may magnify the errors of its steps
+MAGNIFIED: Final = 10.0  # factor by which a walk may magnify the errors of its steps
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One independent measure of a run, dimensionless."""
+    """An independent, dimensionless measure of a walk."""
 
     measure: str
     value: float
-    limit: float  # up to which the value is right
+    limit: float  # largest acceptable value
 
     @property
     def ok(self) -> bool:
@@ -32,7 +32,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class NotMeasured:
-    """A measure that could not be taken, and why."""
+    """A measure that could not be taken, with the reason."""
 
     measure: str
     why: str
@@ -53,9 +53,9 @@ class CaseResult:
     rhs_evaluations: Annotated[int, Label("1", "right-hand sides evaluated")]
     wall_s: float
     findings: tuple[Measure, ...]  # measures taken
-    remarks: tuple[str, ...] = ()  # further faults
-    second_method: str = ""  # method compared with; empty if none could walk the case
-    second_tried: str = ""  # methods that failed, or why none was tried
+    remarks: tuple[str, ...] = ()  # descriptions of further faults
+    second_method: str = ""  # second method, for comparison; empty if no other method had an answer
+    second_tried: str = ""  # failed methods with their outcomes, or the reason why none was tried
     not_measured: tuple[NotMeasured, ...] = ()  # measures that could not be taken
 
     @property
@@ -70,16 +70,16 @@ class CaseResult:
 
 
 def finite(value: float) -> float:
-    """The value, or 1e300 in place of one that is not finite: results hold no NaN."""
+    """Return the value, or 1e300 if it is not finite, because results may not contain NaN."""
     return float(value) if math.isfinite(value) else 1e300
 
 
 def promised(case: Case, rtol: float, steps: int) -> float:
-    """Largest expected difference of two walks' times, in pendulum times.
+    """Return the largest expected difference between the times of two walks, in pendulum times.
 
-    rtol   larger of their tolerances
-    steps  of the solver, in both walks
+    rtol   the larger relative tolerance of the two walks
+    steps  number of solver steps in both walks together
 
-    Each step may err by rtol times values of order one.
+    The error of a step may reach rtol, since values are of order one.
     """
     return min(case.agreement, MAGNIFIED * rtol * steps)

@@ -10,17 +10,17 @@ from walkerlab.exchange.planar import PlanarModel
 from walkerlab.physics.solvers.system import Floats
 
 Forces = Callable[[float, Floats, Floats], Floats]
-"""Generalised forces from time, coordinates and velocities; the result is overwritten by the next call."""
+"""Function of time (s), coordinates and velocities that returns generalised forces; the next call overwrites them."""
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """An engine's integrator."""
+    """Properties of an engine's integrator."""
 
-    order: int  # nominal
-    most_steps: int  # budget of a run
-    adapts: bool = False  # whether steps follow a tolerance
-    for_contact_only: bool = False  # whether it equals another integrator in the absence of contact
+    order: int  # nominal order
+    most_steps: int  # step budget of a run
+    adapts: bool = False  # whether the step size follows a tolerance
+    for_contact_only: bool = False  # whether it differs from another integrator only on the engine's own contact
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class OwnContact:
 
 
 OnStep = Callable[[float, Floats, Floats], bool]
-"""Told time (s), coordinates and velocities at the end of every step of an engine; whether to go on."""
+"""Called with time (s), coordinates and velocities after every step of an engine; returns whether to continue."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class Stepping:
     """Integrator and step control of an engine's run."""
 
     integrator: str
-    step_s: float  # step size, or the largest one where steps are adaptive
+    step_s: float  # step size; the largest one if steps are adaptive
     tolerance: float | None = None  # None for fixed steps
 
 
 class Simulation(ABC):
-    """Model in an engine, in its start state."""
+    """Model in an engine, built in its start state."""
 
     def __init__(
         self,
@@ -59,30 +59,30 @@ class Simulation(ABC):
         """Build the model at coordinates q (root freedoms, then hinges; m, rad) and velocities v.
 
         forces  external forces on the walker
-        own     the engine's own ground contact
+        own     the engine's own ground contact, if it is used
         """
         self.stepping, self.forces, self.own = stepping, forces, own
         self.build(model, q, v)
 
     @abstractmethod
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
-        """Build the model in the engine, with `self.own` and `self.forces` where they are not None."""
+        """Build the model in the engine, with `self.own` and `self.forces` unless they are None."""
 
     @abstractmethod
     def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
-        """Advance until a time, for at most `steps` steps, or until `on_step` returns False."""
+        """Advance to `until_s` in at most `steps` steps; stop early if `on_step` returns False."""
 
     @abstractmethod
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Enable or disable a foot's ground; has no effect without the engine's own contact."""
+        """Enable or disable the ground under a foot; has no effect without the engine's own contact."""
 
 
 class Adapter(Protocol):
-    """A module that drives one engine, and imports it only when a model is built."""
+    """A module that drives one engine; it imports the engine only when a model is built."""
 
-    INTEGRATORS: Mapping[str, Integrator]  # by name
-    CONTACTS: Mapping[str, str]  # integrator of each contact model
+    INTEGRATORS: Mapping[str, Integrator]  # integrators by name
+    CONTACTS: Mapping[str, str]  # name of the integrator for each contact model
     CANNOT_EXPRESS: tuple[str, ...]  # limitations, for the report
 
     def tuned(self, model: str, target: EngineContact) -> OwnContact:
-        """Settings with which a contact model comes closest to the target."""
+        """Return the settings with which a contact model comes closest to the target."""

@@ -1,9 +1,9 @@
 """Drake: point contact with Hunt-Crossley damping, continuous or discrete (SAP, Similar, Lagged, TAMSI).
 
-The walk takes place in Drake's x-y plane. With stiffness k and dissipation d the normal force is k x (1 + d x'), so
-at rest under the weight m g, x = m g / k and the damping is m g d. SAP is linear: its damping is k times the relaxation
-time. Friction rises with s = v / v_s, v_s the stiction tolerance, as 10 s^3 - 15 s^4 + 6 s^5 in the continuous model
-and as s / sqrt(1 + s^2) in Lagged; SAP regularises it internally.
+The walk takes place in Drake's x-y plane. With stiffness k and dissipation d the normal force is k x (1 + d x'), so at
+rest under the weight m g the penetration x is m g / k and the damping m g d. SAP is linear: its damping is k times the
+relaxation time. With s the slip velocity over the stiction tolerance, friction rises as 10 s^3 - 15 s^4 + 6 s^5 in the
+continuous model and as s / sqrt(1 + s^2) in Lagged; SAP regularises it internally.
 
 Source: Drake documentation, Multibody: contact modeling; Castro, Permenter, Han (2022).
 """
@@ -25,7 +25,7 @@ INTEGRATORS = {
     "runge_kutta3 adaptive": adapter.Integrator(3, 60_000, adapts=True),
     "discrete": adapter.Integrator(1, 45_000, for_contact_only=True),
 }
-EMBEDDED_METHODS = ("runge_kutta3",)  # adaptive by default
+EMBEDDED_METHODS = ("runge_kutta3",)  # adapt their steps by default
 CONTACTS = {"sap": "discrete", "lagged": "discrete", "hunt-crossley": "runge_kutta3 adaptive"}
 APPROXIMATIONS = {"sap": "kSap", "lagged": "kLagged"}
 CANNOT_EXPRESS = (
@@ -38,13 +38,13 @@ CANNOT_EXPRESS = (
 
 
 def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
-    """Solve the closed forms above for the target."""
+    """Compute the settings that meet the target, from the closed forms at the top of this module."""
     from scipy.optimize import brentq
 
     stiffness = target.mass * target.gravity / target.penetration
     omega = math.sqrt(target.gravity / target.penetration)
     load = target.creep_load / target.friction
-    # the slip over the stiction tolerance at which the model gives this share of full friction
+    # slip velocity / stiction tolerance at which friction is the fraction `load` of full friction
     share = load / math.sqrt(1.0 - load * load)
     if model not in APPROXIMATIONS:
         share = brentq(lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s * s) - load, 0.0, 1.0, xtol=1e-15)
@@ -129,7 +129,7 @@ class DrakeRun(adapter.Simulation):
         return x[self._order], x[self._rates]
 
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Allow or exclude a ball's collisions, by a filter of its own."""
+        """Allow or exclude a foot's collisions with the floor; each foot has its own filter."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
         if not self._feet or has_ground == (ball not in self._declared):
@@ -145,7 +145,7 @@ class DrakeRun(adapter.Simulation):
 
 
 def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
-    """Add bodies, joints and feet; returns joints in coordinate order, the feet's geometries and the floor's."""
+    """Add bodies, joints and feet; returns the joints in coordinate order and the geometries of feet and floor."""
     from pydrake.geometry import HalfSpace, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import ContactModel
@@ -176,7 +176,7 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Hinge a link to its parent, or give the base its freedoms."""
+    """Join a link to its parent by a hinge, or the base to the world with its freedoms; returns the joints."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 
@@ -197,7 +197,7 @@ def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body
 
 
 def material(own: adapter.OwnContact) -> Any:
-    """Surface properties of feet and floor alike: each contributes half of the compliance."""
+    """Return the surface properties of feet and floor, each of which contributes half of the compliance."""
     from pydrake.geometry import AddContactMaterial, ProximityProperties
     from pydrake.multibody.plant import CoulombFriction
 
@@ -209,13 +209,13 @@ def material(own: adapter.OwnContact) -> Any:
         friction=CoulombFriction(settings["friction"], settings["friction"]),
     )
     if "relaxation_time" in settings:
-        # the times of both surfaces add up
+        # the relaxation times of both surfaces add up
         properties.AddProperty("material", "relaxation_time", 0.5 * settings["relaxation_time"])
     return properties
 
 
 def add_forces(builder: Any, plant: Any, forces: adapter.Forces, place: Any) -> None:
-    """Add a system that computes the ground's forces from the plant's state at every evaluation.
+    """Add a system that computes the external forces from the plant's state at every evaluation.
 
     place  index of each coordinate in Drake's order
     """

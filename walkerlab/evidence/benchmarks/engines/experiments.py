@@ -1,4 +1,7 @@
-"""The three experiments in other engines: same law, own law, no contact; each compared with our own walk."""
+"""Three experiments in other engines, each compared with our own solution: same law, own law and no contact.
+
+Same law: our contact law in the engine's integrators. Own law: the engine's own contact model.
+"""
 
 import math
 import time
@@ -27,47 +30,47 @@ from walkerlab.physics.solvers.system import Floats, derivative
 SAME_LAW_STEPS = (4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5, 6.25e-6, 3.125e-6)  # s
 OWN_LAW_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)  # s
 SWING_STEPS = (8e-3, 4e-3, 2e-3, 1e-3)  # s
-ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # where steps are adapted
-ERROR_GOAL = 1e-5  # error on the same law from which on nothing finer is run
-SETTLED_CHANGE = 1e-4  # relative change of the period on an engine's own law, after which nothing finer is run
-LARGEST_STEP_S = 0.01  # where they are
-START_FACTORS = (0.95, 0.99)  # of the gait's velocities
+ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)  # tolerances of adaptive integrators
+ERROR_GOAL = 1e-5  # error under our law below which no finer run is made
+SETTLED_CHANGE = 1e-4  # relative change of the period on an engine's own contact below which no finer run is made
+LARGEST_STEP_S = 0.01  # largest step of adaptive integrators
+START_FACTORS = (0.95, 0.99)  # factors on the gait's velocities
 TUNING_STEP_S = 2e-5
 COMPARED_TOUCHES, OWN_TOUCHES = 2, 10
-INTO_NEXT_STEP = 0.9  # share of the step after the last touch at which states are compared
+INTO_NEXT_STEP = 0.9  # states are compared at this fraction of the step after the last compared touch
 SWING_S = 0.48
-RUN_TIMEOUT_S = 120.0  # with a run, before its process is ended
+RUN_TIMEOUT_S = 120.0  # time limit of a run, after which its process is killed
 OUR_METHOD = "radau5"
 OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-ADAMS_RTOL = 1e-7  # of the walk that engines' own contact is held against
+ADAMS_RTOL = 1e-7  # relative tolerance of our walk under ADAMS's law, with which engines' own contact is compared
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 UNLIMITED_BUDGET = 100_000_000  # right-hand sides
 UNLIMITED_S = 1e9
-STEP_ALLOWANCE = 2  # times as long as the walk under ADAMS's law another may take
+STEP_ALLOWANCE = 2  # factor on the step budget on an engine's own contact, where a walk may last longer than ours
 OUR_REPEATS = 3
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Our walk of a scene at tight tolerance, by two methods."""
+    """Our walk of a scene at a tight tolerance, by two methods."""
 
     until_s: float
     end: Floats  # state at `until_s`
     touches_s: Floats
     agreement: float  # largest difference between the two methods
-    walk: ContactWalkResult  # ten steps, for periods
+    walk: ContactWalkResult  # ten steps, for the comparison of periods
 
 
 def simulate(
     scene: EngineScene, method: str, rtol: float, steps: int, until_s: float | None = None
 ) -> ContactWalkResult:
-    """Walk the scene with this project's solver; with `until_s` the state at that time is sampled."""
+    """Simulate the scene with our own solver, sampling the state at `until_s` if it is not None."""
     tolerances = Tolerances(method, rtol, 1e-2 * rtol, UNLIMITED_BUDGET, track_energy=False)
     return walk_contact(scene.ours, scene.ground, False, STANCE_FOOT, scene.start, tolerances, steps, until_s)
 
 
 def make_truth(scene: EngineScene) -> Truth | None:
-    """Compute the reference of a scene; None if the walk ends before states can be compared."""
+    """Compute the reference of a scene; returns None if the walk ends before states can be compared."""
     walk = simulate(scene, *REFERENCES[0], OWN_TOUCHES)
     if walk.touch_time_s.size <= COMPARED_TOUCHES:
         return None
@@ -83,7 +86,7 @@ def make_truth(scene: EngineScene) -> Truth | None:
 
 
 def sampled_end(result: ContactWalkResult) -> Floats | None:
-    """State at a walk's second sample, the first being its start; None if not reached."""
+    """Return the state at a walk's second sample (the first is the start), or None if it was not reached."""
     reached = result.samples is not None and len(result.samples.states) > 1
     return np.asarray(result.samples.states[1]) if result.samples is not None and reached else None
 
@@ -96,14 +99,14 @@ class EngineExperiment:
     engine: str
     version: str
     experiment: str
-    truth: Truth | None = None  # what runs are compared with, if they are
+    truth: Truth | None = None  # reference for the runs; None if they are not compared
 
     def row(
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
     ) -> EngineRow:
-        """Evaluate a run, or record why it was lost (`start`: velocities over those of the gait)."""
-        # on the same law: errors of the end state and of touch times; on own contact: error of the last period of
-        # completed walks from the gait
+        """Evaluate a run, or record why it was lost; `start`: initial velocities as a multiple of the gait's."""
+        # under our law, the errors are those of the end state and the touch times; on the engine's own contact, the
+        # error is that of the last period, for completed walks from the gait
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
         step_s, tolerance = stepping.step_s, stepping.tolerance
         if isinstance(answer, TaskLost):
@@ -114,7 +117,7 @@ class EngineExperiment:
         touches, truth = answer.touches_s, self.truth
         if touches.size >= 2:
             period_s, length_m = float(np.diff(touches)[-1]), float(np.diff(answer.along_m)[-1])
-            if answer.slips_m.size == touches.size:  # else its foot did not lift
+            if answer.slips_m.size == touches.size:  # otherwise the last foot has not lifted
                 slip_m = float(answer.slips_m[-1])
         if truth is not None and self.experiment == OWN_LAW:
             if period_s is not None and answer.outcome == Outcome.WALKED.label and start == 1.0:
@@ -133,7 +136,7 @@ class EngineExperiment:
 def our_walk(
     scene: EngineScene, rtol: float, touches: int, until_s: float | None = None, repeats: int = 1
 ) -> runs.WalkAnswer:
-    """Time our own walk over `touches` steps, or until a time within the next step."""
+    """Time our own walk over `touches` steps, or until `until_s` in the step after them; median of `repeats`."""
     walls = []
     for _ in range(repeats):
         start_s = time.process_time()
@@ -145,7 +148,7 @@ def our_walk(
 
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
-    """Yield our runs over a ladder of tolerances, then walks under ADAMS's law from the starts of own contact."""
+    """Yield our runs over a ladder of tolerances, then our walks with which engines' own contact is compared."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
     our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
@@ -158,7 +161,7 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
 
 
 def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> list[Stepping]:
-    """An integrator's step sizes, or tolerances where it adapts them, from coarse to fine."""
+    """Return an integrator's step sizes, or its tolerances if it is adaptive, from coarse to fine."""
     if integrator.adapts:
         return [Stepping(name, LARGEST_STEP_S, tolerance) for tolerance in ADAPTIVE_TOLERANCES]
     return [Stepping(name, h) for h in steps_s]
@@ -166,7 +169,7 @@ def steppings(name: str, integrator: Integrator, steps_s: Sequence[float]) -> li
 
 @dataclass(frozen=True)
 class EngineOnScene:
-    """One engine on one scene, in a process of its own."""
+    """Experiments with one engine on one scene, in a separate process."""
 
     engine: Engine
     scene: EngineScene
@@ -176,7 +179,7 @@ class EngineOnScene:
     def walk(
         self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
-        """Walk on our law, or on the engine's own contact, for at most `most` engine steps."""
+        """Walk under our law, or on the engine's own contact if given, for at most `most` engine steps."""
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.started(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
@@ -185,7 +188,7 @@ class EngineOnScene:
         return experiment.row(called, stepping, answer, start), answer
 
     def same_law(self) -> Iterator[EngineRow]:
-        """Yield runs of each integrator on our law, from coarse to fine."""
+        """Yield runs of each integrator under our law, from coarse to fine."""
         for name, integrator in self.engine.adapter().INTEGRATORS.items():
             if integrator.for_contact_only:
                 continue
@@ -214,8 +217,9 @@ class EngineOnScene:
         return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
 
     def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
-        """Yield runs on own contact over step sizes from the gait, then from other starts at the second finest step."""
-        # adaptive walks from the gait share one step budget; no walk is begun that would exceed it
+        """Yield walks on the engine's own contact: from the gait, coarse to fine, then from other starts."""
+        # other starts are simulated at the second finest step
+        # adaptive walks from the gait share one step budget; the next walk is assumed to take as many steps as the last
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
         most = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps
@@ -236,7 +240,7 @@ class EngineOnScene:
             yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in START_FACTORS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
-        """Simulate the hinged walker's passive swing with each integrator."""
+        """Simulate the hinged walker's passive swing with each integrator; returns results and lost runs."""
         scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
         n = len(model.chain)
         start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
@@ -267,7 +271,7 @@ def has_settled(coarse: EngineRow, fine: EngineRow) -> bool:
 
 
 def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> tuple[Floats, Any]:
-    """Swing by our equations with SciPy's DOP853: its end, and a function for the mechanical energy of a state."""
+    """Return the swing's end state, by our equations and SciPy's DOP853, and the function energy(state) (J)."""
     from scipy.integrate import solve_ivp
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
@@ -289,6 +293,6 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
 
 
 def least_wall(rows: Sequence[EngineRow], error: float) -> float | None:
-    """Shortest run time (s) among runs with at most this error."""
+    """Return the shortest run time (s) of the runs with at most this error, or None if there is no such run."""
     good = [row for row in rows if row.error is not None and row.error <= error]
     return min((row.wall_s for row in good if row.wall_s is not None), default=None)

@@ -1,7 +1,7 @@
 """Exudyn: a kinematic tree in minimal coordinates, explicit and implicit integrators, a ball on a triangle as contact.
 
-The walk takes place in Exudyn's x-y plane. The contact force is k d^e + c d', and friction rises linearly to full
-friction over a zone of slip; exponent and stiffness are those of ADAMS.
+The walk takes place in Exudyn's x-y plane. The contact force is k d^e + c d' with the k and e of ADAMS's law; friction
+rises linearly with the slip velocity until it is full.
 
 Source: Exudyn documentation, ObjectKinematicTree and ObjectContactSphereTriangle.
 """
@@ -39,7 +39,7 @@ EXPLICIT_METHODS = ("ExplicitEuler", "RK44")
 
 
 def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
-    """Use the target's own parameters, and derive the zone over which friction rises."""
+    """Compute the settings that meet the target, including the slip velocity at which friction is full."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {
         "contact_stiffness": target.mass * target.gravity / target.penetration**target.exponent,
@@ -108,7 +108,7 @@ class ExudynRun(adapter.Simulation):
 
 
 def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces | None) -> tuple[Any, list[int]]:
-    """Add the tree; returns its object number and each link's joint index."""
+    """Add the model's tree to the system; returns its object number and the joint index of each link."""
     import exudyn as exu
     from exudyn.itemInterface import ObjectKinematicTree
 
@@ -152,12 +152,12 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
 def add_contacts(
     system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact
 ) -> Iterator[Any]:
-    """Add a ball on a large triangle for each foot; yields the object numbers."""
+    """Add contact for each foot, between a ball and a large triangle; yields the object numbers."""
     import exudyn as exu
     from exudyn import itemInterface
 
     settings, r = own.settings, PLANE_M
-    plane = exu.Vector3DList([[-r, 0.0, r], [r, 0.0, r], [0.0, 0.0, -r]])  # its normal upwards
+    plane = exu.Vector3DList([[-r, 0.0, r], [r, 0.0, r], [0.0, 0.0, -r]])  # its normal points upwards
     floor = system.AddObject(itemInterface.ObjectGround())
     for ball in model.balls:
         place = [*np.subtract(ball.centre_m, model.links[ball.link].point_m), 0.0]

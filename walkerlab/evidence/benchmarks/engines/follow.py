@@ -1,7 +1,7 @@
-"""Apply the walking rules to an engine's walk from outside: touches, lifts, pads, knees and outcome.
+"""Walking rules applied to an engine's walk from outside: touches, lifts, pads, knees and outcome.
 
-An engine yields states at the ends of its steps only. Within a step a foot's height is taken as the cubic through its
-values and velocities, so a touch is located to fourth order in the step.
+An engine yields states only at the ends of its steps. Within a step a foot's height is the cubic through its heights
+and velocities at both ends, so a touch is located to fourth order in the step.
 """
 
 import math
@@ -26,31 +26,31 @@ from walkerlab.physics.solvers.system import Floats
 
 Feet = tuple[FootMotion, FootMotion]
 CROSSING_HALVINGS = 60
-DIVERGED_M = 1e4  # m: where only the feet of a run that has lost its numbers get to
+DIVERGED_M = 1e4  # a run with a foot farther away than this has diverged
 
 
 @dataclass(frozen=True, order=True)
 class Turn:
-    """A knee's lock or release: at which share of a step, and by which event function."""
+    """Lock or release of a knee within a step."""
 
-    share: float
-    event: int
+    share: float  # fraction of the step at which it occurs
+    event: int  # index of its event function
 
 
 class RuleFollower:
     """State of a walk under the walking rules, updated after each step of the engine.
 
-    scene       with the currently locked knees
-    walk_state  memory of the walk
+    scene       scene with the currently locked knees
+    walk_state  state of the walk apart from its coordinates
     outcome     None while the walk continues
-    turn        lock or release within the last step, which is then discarded
+    turn        lock or release of a knee within the last step; such a step is discarded
     watches     whether knees are monitored
     """
 
     def __init__(self, scene: EngineScene, steps: int, q: Floats, v: Floats, *, carries: bool = True) -> None:
         """Start a walk of at most `steps` steps with both feet on the ground.
 
-        carries  whether our contact law acts; otherwise the engine has its own, and only drives act
+        carries  whether our contact law acts; if not, the engine uses its own contact, and we apply only the drives
         """
         self.walk_state = new_walk_state(scene.ours, scene.ground.terrain, STANCE_FOOT, steps, scene.start)
         self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)
@@ -60,15 +60,15 @@ class RuleFollower:
         self.watches = True
         self._feet: Feet
         self._see(scene, q, v)
-        # both stand on the ground, inside or outside by rounding
+        # both feet stand on the ground, but rounding may put them slightly above it
         first, second = (foot._replace(height=min(foot.height, -sys.float_info.min)) for foot in self._feet)
         self._feet = first, second
         self._edges = [self._edges_of(foot) for foot in range(2)]
 
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
-        """Bind the compiled function to a scene's model, with the arguments that stay the same, and evaluate it."""
+        """Bind the compiled function to a scene's model and its constant arguments, and evaluate it once."""
         size, state = scene.model.size, self.walk_state
-        # its progress is the walk state's own array, so it is current at every call
+        # the system shares the walk state's progress array, which is therefore current at every call
         system = on_ground(scene.walker, self._ground, progress=state.progress)
         self.scene, self._fixed = scene, (system, scene.model.chain)
         self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)
@@ -78,29 +78,29 @@ class RuleFollower:
         self._feet, self._bends = self.feet(q, v), self._bends_in(q, v)
 
     def feet(self, q: Floats, v: Floats) -> Feet:
-        """Motion of both feet; q and v are contiguous arrays."""
+        """Return the motion of both feet; q and v must be contiguous arrays."""
         self._call(*self._fixed, 0.0, q, v, self._motion, self._none)
         first, second = self._motion.tolist()
         return FootMotion(*first), FootMotion(*second)
 
     def forces(self, time_s: float, q: Floats, v: Floats) -> Floats:
-        """Generalised forces on the walker, in memory that the next call overwrites."""
+        """Return the generalised forces on the walker, in memory that the next call overwrites."""
         self._call(*self._fixed, time_s, q, v, self._motion, self._forces)
         return self._forces
 
     def _bends_in(self, q: Floats, v: Floats) -> list[tuple[float, float]]:
-        """Extension (rad) and its rate (rad/s) of each knee, zero for a locked knee."""
+        """Return the extension (rad) of each knee and its rate (rad/s); both are zero for a locked knee."""
         return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self.scene.knee_places]
 
     def _edges_of(self, foot: int) -> tuple[float, float]:
-        """Edges (m) of the pad or gap under a foot; infinite on ordinary ground."""
+        """Return the edges (m) of the pad or gap under a foot; infinite on ground without pads."""
         terrain = self.scene.ground.terrain
         if not terrain.has_pads:
             return -math.inf, math.inf
         return cell_edges(terrain, foot, int(self.walk_state.cells[foot]))
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
-        """Update with the state at a step's end; returns whether the ground under a foot may have changed."""
+        """Update the walk after an engine step; returns whether the ground under a foot may have changed."""
         before, now = self._feet, self.feet(q, v)
         if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
             self._end(int(Outcome.SOLVER_FAILED))
@@ -160,7 +160,7 @@ class RuleFollower:
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
-        """First lock or release of a knee within a step of h (s), or None."""
+        """Return the first lock or release of a knee within a step of h (s), or None."""
         walk_state, turns = self.walk_state, []
         stance = walk_state.progress.stance
         pushing_s = pulse_left(self._fixed[0], self.time_s)
@@ -186,7 +186,7 @@ class RuleFollower:
         return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Apply the pending lock or release of a knee; return coordinates and velocities for the present locks."""
+        """Lock or release the knee in `turn`; return coordinates and velocities of the model with the new locks."""
         walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
         if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
             contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
@@ -226,7 +226,7 @@ class RuleFollower:
 
 
 def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
-    """Share of a step of h (s) at which the cubic through values and rates at its ends crosses zero."""
+    """Return the fraction of a step of h (s) at which the cubic through values and rates at its ends crosses zero."""
     low, high = 0.0, 1.0
     for _ in range(CROSSING_HALVINGS):
         middle = 0.5 * (low + high)
@@ -238,13 +238,13 @@ def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
 
 
 def foot_within_step(old: FootMotion, new: FootMotion, share: float, h: float) -> FootMotion:
-    """Foot at a share of a step: height by the cubic, all other values interpolated linearly."""
+    """Interpolate a foot at a fraction of a step: its height by the cubic, all other values linearly."""
     straight = FootMotion(*(a + share * (b - a) for a, b in zip(old, new, strict=True)))
     height = cubic(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h, share)
     return straight._replace(height=height)
 
 
 def cubic(x0: float, v0: float, x1: float, v1: float, h: float, s: float) -> float:
-    """Value at share s of the cubic through values and slopes at both ends of a step."""
+    """Return the value, at the fraction s of a step, of the cubic through values and rates at its ends."""
     r = 1.0 - s
     return r * r * ((1.0 + 2.0 * s) * x0 + s * h * v0) + s * s * ((3.0 - 2.0 * s) * x1 - r * h * v1)

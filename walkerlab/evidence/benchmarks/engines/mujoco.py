@@ -1,4 +1,4 @@
-"""MuJoCo: soft convex contact in constraint space, fixed steps; `exchange/mjcf.py` tunes it."""
+"""MuJoCo: soft convex contact in constraint space, tuned by `exchange/mjcf.py`; fixed steps."""
 
 from typing import Any
 
@@ -21,7 +21,7 @@ INTEGRATOR_CODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
 def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
-    """Solve the closed forms of `exchange.mjcf` for the target."""
+    """Compute the settings that meet the target, from the closed forms of `exchange.mjcf`."""
     return adapter.OwnContact(model, contact_settings(target))
 
 
@@ -29,7 +29,7 @@ class MujocoRun(adapter.Simulation):
     def build(self, model: PlanarModel, q: Floats, v: Floats) -> None:
         import mujoco
 
-        mujoco.set_mjcb_passive(None)  # it is global; remove the last run's
+        mujoco.set_mjcb_passive(None)  # the callback is global: remove that of the last run
         self._advance = mujoco.mj_step
         self._model = mujoco.MjModel.from_xml_string(model_xml(model, self.own))
         self._model.opt.timestep = self.stepping.step_s
@@ -52,7 +52,7 @@ class MujocoRun(adapter.Simulation):
 
 
 def force_callback(forces: adapter.Forces, data: Any) -> Any:
-    """Callback for passive forces; MuJoCo calls it in every stage of every integrator."""
+    """Build the callback for passive forces, which MuJoCo calls in every stage of every integrator."""
     q, v, passive_forces = data.qpos, data.qvel, data.qfrc_passive
 
     def passive(_model: Any, _data: Any) -> None:
@@ -62,7 +62,7 @@ def force_callback(forces: adapter.Forces, data: Any) -> Any:
 
 
 def model_xml(model: PlanarModel, own: adapter.OwnContact | None) -> str:
-    """Write the model as MJCF, with a floor for its feet where the engine has its own contact."""
+    """Write the model as MJCF, with a floor for its feet if the engine's own contact is used."""
     contact, floor = None if own is None else own.settings, ""
     if own is not None:
         place = f'pos="0 0 {model.balls[0].ground_m!r}" contype="0" conaffinity="1"'

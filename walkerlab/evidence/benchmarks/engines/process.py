@@ -1,4 +1,4 @@
-"""An engine in a process of its own, so that a crash or hang does not stop the stage."""
+"""Separate process for an engine, so that a crash or hang does not stop the stage."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from typing import TypeVar
 
 from walkerlab.pipeline.workers import Worker, WorkerDiedError, WorkerTimeoutError
 
-START_UP_S = 60.0  # for a first task, which loads the engine and compiles
+START_UP_S = 60.0  # extra time for the first task, which loads the engine and compiles
 R = TypeVar("R")
 
 
 @dataclass(frozen=True)
 class TaskLost:
-    """Why a task has no result."""
+    """Record of a task without a result."""
 
-    why: str
+    why: str  # reason for the missing result
     timed_out: bool = False
 
 
 class OwnProcess:
-    """Runs tasks one after the other in a worker that is restarted after a crash or time-out.
+    """Runs tasks one after another in a worker process, which is restarted after a crash or time-out.
 
-    The worker is silenced and has a folder of its own, since engines print and write logs.
+    The worker's output is suppressed and it has its own folder, since engines print and write logs.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class OwnProcess:
         self._folder.cleanup()
 
     def do(self, task: Callable[[], R], timeout_s: float) -> R | TaskLost:
-        """Run a picklable task; returns its result or why it was lost. Raises RuntimeError after `abandon`."""
+        """Run a picklable task; returns its result, or `TaskLost` if there is none; RuntimeError after `abandon`."""
         if self._abandoned:
             raise RuntimeError("the process was abandoned")
         if self._worker is None:
@@ -56,7 +56,7 @@ class OwnProcess:
         except WorkerDiedError as died:
             self._end()
             return TaskLost(f"the engine's process ended with code {died.exit_code_of_worker}")
-        except Exception as error:  # whatever an engine raises is its row's outcome
+        except Exception as error:  # an engine's exception is recorded in the row of its run
             return TaskLost(traceback.format_exception_only(error)[0].strip()[:200])
 
     def abandon(self) -> None:

@@ -16,9 +16,9 @@ EXTRA = "pip install 'walkerlab[engines]'"
 
 @dataclass(frozen=True)
 class Engine:
-    """An engine."""
+    """A physics engine with which our walks are compared."""
 
-    name: str  # in output, and of its adapter module
+    name: str  # name in output, and of its adapter module
     module: str  # import name of its package
     package: str  # distribution name
 

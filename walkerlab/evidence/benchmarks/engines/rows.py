@@ -1,4 +1,4 @@
-"""Rows of results in other engines."""
+"""Rows of results from other engines."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -22,10 +22,10 @@ class EngineRow:
     experiment: Annotated[str, Label("1", "experiment")]
     integrator: Annotated[str, Label("1", "integrator, or contact model on its own law")]
     start: Annotated[float, Label("1", "velocities of the start over those of the gait")]
-    # largest step, for an adaptive run that did not finish
+    # for an adaptive run that was lost, the largest step allowed
     step_s: Annotated[float, Label("s", "step size, the mean one where steps are adapted")]
     tolerance: Annotated[float | None, TOLERANCE]
-    error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # on own contact, of the period relative to ADAMS's law
+    error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # the reference is our walk under ADAMS's law
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
     wall_s: Annotated[float | None, RUN_TIME]  # processor time of the loop; None if the process was lost
     period_s: Annotated[float | None, Label("s", "period of the last step")]
@@ -33,12 +33,12 @@ class EngineRow:
     slip_m: Annotated[float | None, Label("m", "net slip of the last step")]
     steps: Annotated[int, Label("1", "steps walked")]
     outcome: Annotated[str, Label("1", "outcome")]
-    why: str = ""  # error message of a run without an outcome
+    why: str = ""  # error message of a lost run
 
 
 @dataclass(frozen=True)
 class SwingRow:
-    """A swing without ground; the first run has no order."""
+    """A swing without ground; an integrator's first run has no observed order."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]

@@ -1,4 +1,4 @@
-"""Tasks for an engine's process: a walk, a swing without ground, and a ball and a block on its own contact."""
+"""Tasks for an engine's process: a walk, a swing without ground, and tests of its contact with a ball and a block."""
 
 import math
 import time
@@ -18,26 +18,23 @@ from walkerlab.physics.hybrid.contact_state import steps_with_lift
 from walkerlab.physics.mechanics.assembly import Anchor
 from walkerlab.physics.solvers.system import Floats
 
-TIME_ROUNDING = 1e-9
-UNLIMITED_STEPS = 10_000_000  # steps
-STEADY_STEP_FACTOR = 5  # of the step size, where only a steady end state is needed
+TIME_ROUNDING = 1e-9  # relative
+UNLIMITED_STEPS = 10_000_000
+STEADY_STEP_FACTOR = 5  # factor on the step size if only a steady end state is needed
 
 
 @dataclass(frozen=True)
 class WalkAnswer:
-    """A walk in an engine.
-
-    touches  (steps,) s; along: (steps,) m; slips: (steps,) m, without the last step if its foot did not lift
-    """
+    """Result of a walk in an engine."""
 
     outcome: str
     end: Floats | None  # final state of the free walker; None unless the walk was completed
-    touches_s: Floats
-    along_m: Floats
-    slips_m: Floats
-    steps: int  # of the engine
-    time_s: float  # simulated
-    wall_s: float  # processor time of the loop, in a process of its own
+    touches_s: Floats  # (steps,) touch times
+    along_m: Floats  # (steps,) footholds along the slope
+    slips_m: Floats  # (steps,) net slips; the last step has none if its foot has not lifted
+    steps: int  # engine steps
+    time_s: float  # simulated time
+    wall_s: float  # processor time of the loop
 
 
 @dataclass(frozen=True)
@@ -47,8 +44,8 @@ class WalkTask:
     engine: str
     stepping: Stepping
     scene: EngineScene
-    touches: int  # after which the walk ends
-    until_s: float  # latest end, s
+    touches: int  # number of touches after which the walk ends
+    until_s: float  # latest end
     own: OwnContact | None  # the engine's tuned contact; None for our law
     most: int  # step budget of the engine
 
@@ -67,7 +64,7 @@ class WalkTask:
 
 
 class EngineWalk:
-    """Walk in an engine as a sequence of models, one between each lock or release of a knee and the next."""
+    """Walk in an engine; after each lock or release of a knee it continues in a new model."""
 
     def __init__(self, task: WalkTask) -> None:
         self.task, self.engine = task, PHYSICS_ENGINES[task.engine]
@@ -94,7 +91,7 @@ class EngineWalk:
                 self.q, self.v = rules.go_on(self.q, self.v)
 
     def _simulate(self, until_s: float) -> None:
-        """Simulate from the present state to `until_s`, by a whole number of steps where they are fixed."""
+        """Simulate from the current state to `until_s`; fixed steps are shortened so that a whole number fits."""
         task, rules, span = self.task, self.rules, until_s - self.time_s
         stepping = task.stepping
         if not self.engine.adapter().INTEGRATORS[stepping.integrator].adapts:
@@ -131,7 +128,7 @@ class EngineWalk:
 
 @dataclass(frozen=True)
 class SwingAnswer:
-    end: Floats  # (2 n) absolute angles and velocities
+    end: Floats  # (2 n) absolute angles (rad) and velocities (rad/s)
     wall_s: float
 
 
@@ -180,7 +177,7 @@ def record_motion(engine: Simulation, steps: int, until_s: float) -> EngineMotio
 
 
 def pinned_model(scene: EngineScene) -> planar.PlanarModel:
-    """Model of the scene's walker hinged at the centre of its stance foot."""
+    """Return the model of the scene's walker, hinged at the centre of its stance foot."""
     foot = scene.assembly.feet[STANCE_FOOT]
     base = Anchor(foot.body, foot.centre_m)
     return planar.planar_model(scene.assembly, base, planar.HINGED, scene.gravity, scene.locked)
@@ -192,20 +189,20 @@ class TuningAnswer:
 
     own: OwnContact
     penetration: float  # m, of the ball at rest
-    damping_ratio: float  # of the ball about its rest
-    friction: float  # of the block that slides
+    damping_ratio: float  # damping ratio of the ball's oscillation about rest
+    friction: float  # friction coefficient of the sliding block
     creep_velocity: float  # m/s, of the block that stands on an incline
 
 
 @dataclass(frozen=True)
 class TuningTask:
-    """Tune an engine's own contact and measure it with a dropped ball and a sliding block."""
+    """Task that tunes an engine's own contact and measures it with a dropped ball and a sliding block."""
 
     engine: str
     contact: str
     target: EngineContact
-    step_s: float  # of recorded motions
-    sliding_velocity: float  # m/s
+    step_s: float  # step size of recorded motions
+    sliding_velocity: float  # m/s, lowest velocity in the measurement of sliding friction
 
     def run(self) -> TuningAnswer:
         bench = Bench(self, PHYSICS_ENGINES[self.engine].adapter().tuned(self.contact, self.target))
@@ -215,19 +212,19 @@ class TuningTask:
 
 
 class Bench:
-    """A heavy ball that cannot turn, on level or inclined ground: bouncing ball and sliding block in one."""
+    """A heavy ball that cannot turn, on level or inclined ground; it serves as bouncing ball and sliding block."""
 
     def __init__(self, task: TuningTask, own: OwnContact) -> None:
-        """Derive from the target `omega` and `settling_s`, several times the slower time constant."""
+        """Derive from the target `omega` (rad/s) and `settling_s`, eight times the slower time constant."""
         self.task, self.own, self.target = task, own, task.target
         self.omega, ratio = math.sqrt(self.target.gravity / self.target.penetration), self.target.damping_ratio
         slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
         self.settling_s = 8.0 / slow
 
     def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
-        """Simulate the ball for `time_s` from `depth` (m) inside the ground, pulled by `along` times its weight.
+        """Simulate the ball from `depth` (m) inside the ground; `along` times its weight pulls it along the ground.
 
-        h  step (s)
+        h  step size (s)
         """
         target, adapter = self.target, PHYSICS_ENGINES[self.task.engine].adapter()
         link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
@@ -242,22 +239,22 @@ class Bench:
         return record_motion(engine, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
 
     def at_rest(self) -> float:
-        """Penetration (m) at rest of a ball dropped from the surface."""
+        """Return the penetration (m) at rest of a ball dropped from the surface."""
         return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
-        """Damping ratio of the oscillator fitted to the ball's accelerations about rest."""
+        """Fit an oscillator to the ball's accelerations and return its damping ratio; depth at rest in m."""
         omega = self.omega
         motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
-        # means of two ends of a step stand for its middle, whatever the engine's own rule
+        # the mean of a step's two ends stands for its middle, whatever the engine's integration rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
         (k, c), *_ = np.linalg.lstsq(middle, -np.diff(motion.v[:, 1]) / np.diff(motion.t), rcond=None)
         stiffness, damping = k / depth, c / (depth * omega)
         return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
 
     def friction(self, depth: float) -> float:
-        """Deceleration over gravity of a sliding block, once its penetration has settled."""
+        """Return the deceleration of a sliding block, divided by gravity; depth: penetration at rest (m)."""
         target, settled = self.target, self.settling_s
         start = self.task.sliding_velocity + target.friction * target.gravity * 1.25 * settled
         motion = self.after(1.25 * settled, self.task.step_s, 0.0, depth, (start, 0.0))
@@ -266,6 +263,6 @@ class Bench:
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
-        """Creep velocity (m/s) of a block standing on an incline."""
+        """Return the creep velocity (m/s) of a block standing on an incline; depth: penetration at rest (m)."""
         target, h = self.target, STEADY_STEP_FACTOR * self.task.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])

@@ -1,4 +1,4 @@
-"""Walks taken to other engines, and the walkers that engines do not support."""
+"""Scenes for other engines, and checks for walkers that they do not support."""
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
@@ -12,7 +12,7 @@ from walkerlab.scene.parts import assembly_of
 
 
 def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> tuple[EngineScene, ...]:
-    """Return a config's walks on its own ground; ConfigError for a walker that other engines do not support."""
+    """Return a config's scenes for engines; raises ConfigError for a walker that other engines do not support."""
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(

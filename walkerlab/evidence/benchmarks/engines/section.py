@@ -99,7 +99,7 @@ LIMIT_COLUMNS = (Column("engine"), Column("cannot express", wide=True))
 
 
 def swings(runs: Sequence[Row]) -> Table:
-    """Table of the hinged swing: each integrator's finest run, and the orders observed on the way to it."""
+    """Build the table of the hinged swing: each integrator's most accurate run, and the orders of all its runs."""
     finest = []
     for swung in grouped(runs, "scene", "engine", "integrator").values():
         orders = ", ".join(number(run["order"], 3) for run in swung if run["order"] is not None)

@@ -28,7 +28,7 @@ from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content
 
 RATIO_LEVELS = (1e-3, 1e-5)
-THREE_DIGITS = 5e-4  # relative
+THREE_DIGITS = 5e-4  # relative error
 
 
 @dataclass
@@ -47,7 +47,7 @@ class EngineFindings:
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Measure every installed engine on every scene, `jobs` at a time; raises NoAnswer if none is installed."""
+    """Measure all installed engines on all scenes, `jobs` at a time; raises NoAnswer if no engine or walk exists."""
     engines = installed()
     findings = EngineFindings(left_out=[*missing_engines(), *hinge_left_out(config, "engines")])
     if not engines:
@@ -113,7 +113,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
 
 
 def make_content(findings: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
-    """Build groups and summary; `rigid`: summary of `fixedpoint`, if the start or the pads depend on it."""
+    """Build groups and summary; `rigid`: summary of the stage `fixedpoint`, if the start or the pads depend on it."""
     rows, truths = findings.rows, findings.truths
     stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
     groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
@@ -154,7 +154,7 @@ def make_content(findings: EngineFindings, rigid: Mapping[str, Any] | None) -> C
 
 
 def series_by_name(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
-    """Rows of an experiment started on the gait, by engine and integrator (or contact), from coarse to fine."""
+    """Return an experiment's rows that start on the gait, by engine and integrator (or contact), coarse to fine."""
     series: dict[str, list[EngineRow]] = {}
     for row in rows:
         if row.scene == scene and row.experiment == experiment and row.engine != OURS and row.start == 1.0:
@@ -163,7 +163,7 @@ def series_by_name(rows: Sequence[EngineRow], scene: str, experiment: str) -> di
 
 
 def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """Run time of each engine over ours on the same law, for each error level that both reach."""
+    """Return each engine's run time divided by ours under our law, for each error level that both reach."""
     our_rows = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
     by_engine: dict[str, list[EngineRow]] = {}
     for series in series_by_name(rows, scene, SAME_LAW).values():
@@ -179,7 +179,7 @@ def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]
 
 
 def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
-    """Contact whose finest walk comes closest to ADAMS's law; None if no walk reaches the end."""
+    """Return the contact whose finest walk comes closest to ADAMS's law; None if no walk reaches the end."""
     finest = [series[-1] for series in series_by_name(rows, scene, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:
@@ -190,7 +190,7 @@ def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
 
 def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, dict[str, float]]:
     """Return the largest step (s) with three correct digits of the last period, by experiment and name."""
-    # relative to the reference on the same law, and to the finest run on an engine's own
+    # digits are checked against the reference under our law, and against the finest run on an engine's own contact
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
@@ -203,7 +203,7 @@ def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth
 
 
 def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float | None) -> float | None:
-    """Largest step, going up from the finest, with three correct digits; None without a coarser step to confirm it."""
+    """Return the largest step (s) up to which all runs have three correct digits, or None if there is none."""
     good = None
     if target is None:
         return None
@@ -211,12 +211,13 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
         if row.outcome != "walked" or row.period_s is None or abs(row.period_s / target - 1.0) > THREE_DIGITS:
             break
         good = row.step_s
+    # on an engine's own contact the finest run is the target itself, so it is no evidence
     finest_only = experiment == OWN_LAW and good == runs[-1].step_s
     return None if finest_only else good
 
 
 def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """Return the last refinement's effect: on the same law the error's factor, otherwise the period's change (s)."""
+    """Return the last refinement's effect: the errors' ratio (same law), or the change of the period (s, own law)."""
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():
         for name, runs in series_by_name(rows, scene, experiment).items():

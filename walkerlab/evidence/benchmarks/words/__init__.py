@@ -6,7 +6,7 @@ from walkerlab.views.prose import Prose, f
 
 
 def plainly(number: float) -> str:
-    """Format three digits without a power of ten."""
+    """Format a number to three digits, without a power of ten."""
     return f"{float(f'{number:.3g}'):g}"
 
 
