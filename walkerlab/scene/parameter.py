@@ -33,10 +33,7 @@ class Parameter:
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
         """Return the config at another value, with defaults that depend on it; None if the schema rejects the value."""
-        try:
-            return self._changed(config, value)
-        except ValidationError:
-            return None
+        return config_with(config, (self,), (value,))
 
     def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
         """Build the error, with the reason, for a value that the config key `key` requests and the schema rejects."""
