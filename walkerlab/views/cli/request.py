@@ -34,7 +34,7 @@ OF_KIND = re.compile(r"\([^)]*\)")
 
 def keys_to_set(incomplete: str) -> list[str]:
     """Return the config keys that complete a word, each with the `=` that `--set` needs."""
-    # Imported here and below: only completion in a shell needs them.
+    # Imported here and below: only shell completion needs the lists.
     from walkerlab.config.reference import keys
 
     of_kinds = (OF_KIND.sub("", row.key) for row in keys() if row.key != "extends")

@@ -24,7 +24,7 @@ DIGITS = 6
 IS_ERROR = re.compile(r"residual|drift|error|balance|uncertainty")
 """Words in the names of error measures, whose relative change means nothing."""
 ROUNDING_SI = 1e-9
-"""Size (SI) below which values are at rounding level or at the solver's tolerance."""
+"""Magnitude (SI units) below which values are at the level of rounding or of the solver's tolerance."""
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:

@@ -31,7 +31,7 @@ DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its result; typer.Exit(4) if it has no answer, or the errors of `execute`."""
+    """Run a stage as requested and print its result; raises typer.Exit(4) without an answer, or as `execute` does."""
     try:
         report_on(request, stage, graph)
     except ConfigError as error:
@@ -39,7 +39,7 @@ def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
 
 
 def report_on(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its result; ConfigErrors have no position in the config file yet."""
+    """Run a stage as requested and print its result; its ConfigErrors lack the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     config, folder = request.resolved, request.folder
     if options.dry:
@@ -56,7 +56,7 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
 
 
 def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
-    """If no gait was found, begin the advice with suggestions of nearby gaits."""
+    """Begin the advice with suggestions of nearby gaits if no gait was found."""
     error = report.no_answer
     if error is None or report.stage not in SEARCHING or "no gait" not in error.message:
         return report
@@ -74,7 +74,7 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 def write_config(request: Request, report: StageReport, name: str) -> Path:
-    """Write a config with a stage's parameters that extends the request's config; StorageError if that fails."""
+    """Write a config that extends the request's config by a stage's parameters; StorageError if that fails."""
     start = config_to_extend(request.config)
     base = load(Path(start)).config
     typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)

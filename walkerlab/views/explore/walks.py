@@ -65,7 +65,7 @@ class ExploredConfig:
 
     config: str | None  # value of `--config`
     sets: tuple[str, ...]  # values of `--set`
-    runs: Path  # the folder of all runs
+    runs: Path  # folder of all runs
     changes: Mapping[str, Any]  # values by key, applied after `sets`
     models: Sequence[str] = ()  # models that walk
     called: str | None = None  # name on the page; None for the config's own name

@@ -26,7 +26,7 @@ from walkerlab.views.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WID
 FILLS = 0.95
 """Maximum fraction of the available width that a legend, title or label fills."""
 ROWS = 3
-"""Legend rows that fit in a figure's nominal height; longer legends make it taller."""
+"""Legend rows that fit in a figure's nominal height; longer legends make the figure taller."""
 SHRINKS = 0.7
 """Exponent that relates a figure's height to its width; below 1, since text shrinks less than the figure."""
 

@@ -80,7 +80,7 @@ class Curve:
 
 
 def curve_of(group: Group, name: str) -> Curve:
-    """Read a quantity along a branch; stable stretches end at a bifurcation or, without one, at a stable gait."""
+    """Read a quantity along a branch and at its bifurcations; a stretch between two points is stable if both are."""
     value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
     if "mark_after" not in group.variables:
         return Curve(value, quantity, stable[:-1] & stable[1:], ())
@@ -96,7 +96,7 @@ def curve_of(group: Group, name: str) -> Curve:
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step, solid where stable, with bifurcations; return the kinds of these bifurcations."""
+    """Plot a quantity of every step, solid where stable, with bifurcations; return the kinds of the bifurcations."""
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
     bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]

@@ -122,7 +122,7 @@ def draw_trade_off(results: Results) -> Drawn:
 
 
 def semi_axis_of_region(freedom: float) -> float:
-    """Return the semi-axis of a two-parameter 95 % region in standard errors: sqrt(2 F), F(2, `freedom`) at 95 %."""
+    """Return the semi-axis (standard errors) of a 95 % region of two parameters: sqrt(2 F), F(2, `freedom`) at 95 %."""
     return math.sqrt(freedom * math.expm1(-2.0 / freedom * math.log(0.05)))
 
 
@@ -139,7 +139,7 @@ def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str
 
 
 def draw_worth(results: Results) -> Drawn:
-    """Plot the information lost without each measured quantity; the caption names the quantity that carries most."""
+    """Plot the information lost without each measured quantity; the caption names the most informative one."""
     shares = results[IDENTIFY_STAGE].summary["contributions"]
     names = [name.rpartition("_")[0].replace("_", " ") for name in shares]
     figure, axes = panels(0.9 + 0.35 * len(names))

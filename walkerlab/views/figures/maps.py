@@ -25,7 +25,7 @@ from walkerlab.views.figures.walks import TUNE_STAGE, claims_in, redoes_the_proc
 WHITE: Final = "#FFFFFF"
 SKY: Final = "#56B4E9"
 LOG_SPAN: Final = 50.0
-"""Smallest ratio of the extreme values for which geometrically spaced values get a logarithmic axis."""
+"""Ratio of largest to smallest value above which geometrically spaced values get a logarithmic axis."""
 Kind = tuple[str, str, NDArray[np.bool_]]
 """A kind of cell: colour, label, and mask of the cells."""
 
@@ -65,7 +65,7 @@ def edges(centres: NDArray[Any]) -> NDArray[Any]:
 
 
 def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
-    """Whether the values are spaced geometrically and their extremes have at least the ratio `span`."""
+    """Whether the values are spaced geometrically and the largest is at least `span` times the smallest."""
     if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < span:
         return False
     gaps, plain = np.diff(np.log(np.sort(values))), np.diff(np.sort(values))
@@ -198,7 +198,7 @@ MAPS: Final = "stability-maps"
 STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
 _LAW: Final = Contact().in_si()
 PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
-SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # range of errors that the colours distinguish in each map
+SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # ranges of errors that the colours distinguish: stiction map, step map
 VERDICT_COLOURS: Final = {
     "fine": SKY,
     "wrong silently": VERMILLION,
@@ -209,7 +209,7 @@ VERDICT_COLOURS: Final = {
 
 
 class OverStiffness:
-    """Draws two panels, outcomes and errors, over stiffness and a second coordinate."""
+    """Figure with two panels, outcomes and errors, over stiffness and a second coordinate."""
 
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
         self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
@@ -227,7 +227,7 @@ class OverStiffness:
         return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
 
     def draw_errors(self, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]) -> None:
-        """Shade the cells `there` by error, clipped to `ends`; give cells of other kinds their fixed colours."""
+        """Shade the selected cells by error, clipped to `ends`; give cells of other kinds their fixed colours."""
         shown = np.ma.masked_where(~there, np.clip(self.cells["error"], *ends))
         mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
         self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")

@@ -66,7 +66,7 @@ class Sticks:
     time: Array  # (samples,) s
     hip: Array  # (samples, 2)
     feet: Array  # (samples, leg, 2)
-    strikes: Array  # (steps,) s
+    strikes: Array  # (steps,) times of the heel strikes, s
     landings: Array  # (1 + steps, 2) positions of the first stance foot and of each landing
     slope: float  # rad
     knees: Array | None = None  # (samples, leg, 2); None for straight legs

@@ -46,7 +46,7 @@ STRIKE_WIDTH = 0.6
 
 
 def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
-    """Return the values that a study claims for this scene; empty for other scenes."""
+    """Return the values claimed by a study for this scene; empty for other scenes."""
     return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 

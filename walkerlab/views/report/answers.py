@@ -181,7 +181,7 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 
 def continuation(summary: Summary) -> list[str | Table]:
-    """Summarise the families and list every bifurcation; `walkerlab show` has branches and exponents."""
+    """Summarise the families and list every bifurcation; `walkerlab show` lists branches and exponents."""
     from walkerlab.views.report.sections import families
 
     branches = count(len(summary["branches"]), "branch", "branches")
@@ -229,7 +229,7 @@ def measurements_to_make(summary: Summary) -> list[str | Table]:
 
 
 def engines(summary: Summary) -> list[str | Table]:
-    """Report the conclusions for each scene; `walkerlab show` has every run."""
+    """Report the conclusions for each scene; `walkerlab show` lists every run."""
     conclusions = [
         f"{scene}, {experiment}: {text}"
         for scene, concluded in summary["conclusions"].items()

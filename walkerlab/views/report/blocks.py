@@ -126,7 +126,7 @@ class Walker:
     style: str
     track: Track  # thinned motion
     strikes: tuple[float, ...]  # times of the heel strikes (s)
-    # postures, each a line through the joints (mm along and below the slope)
+    # postures, each a line through the joints: mm along the slope, and mm normal to it (down is positive)
     stills: tuple[tuple[tuple[int, int], ...], ...]
     ends: str = ""
     pushes: bool = False  # whether the trailing foot pushes off as the other foot lands

@@ -32,7 +32,7 @@ class Page:
     study: Source | None = None  # the study reproduced, or None
     relation: str = "Redoes"  # begins the line on the study: Redoes, or After if the scene differs
     pending: tuple[str, ...] = ()  # results still being computed
-    run: str = ""  # name of the run for advised commands; empty for the default run
+    run: str = ""  # name of the run for suggested commands; empty for the default run
 
 
 def render(page: Page) -> str:
@@ -47,7 +47,7 @@ def render(page: Page) -> str:
 
 
 def digest_of(script: str) -> str:
-    """Return the hash of a script that allows it to run under the page's content security policy."""
+    """Return the hash by which the page's content security policy recognises its own script."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 

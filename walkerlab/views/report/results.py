@@ -31,7 +31,7 @@ class Results:
 
     @property
     def claims(self) -> Sequence[Mapping[str, Any]]:
-        """Values that a study claims for this scene, with verdicts; empty for other scenes."""
+        """Values claimed by a study for this scene, with verdicts; empty for other scenes."""
         return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:

@@ -72,7 +72,7 @@ def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], 
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity; `names` are by option. First results may lack nested quantities."""
+    """Raise ConfigError for an unknown quantity in `names` (by option); first results may lack nested quantities."""
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

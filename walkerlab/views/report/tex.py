@@ -11,7 +11,7 @@ from walkerlab.views.report.tables import Table, flat
 COLUMN_DIGITS: Final = 5
 """Significant digits of a column's largest number or, if its numbers differ too much, of each number."""
 MAX_PLAIN: Final = 1e6
-"""Size from which numbers are written with a power of ten."""
+"""Magnitude from which numbers are written with a power of ten."""
 EMPTY_CELL: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, siunitx}"
 DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")

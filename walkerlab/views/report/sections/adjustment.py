@@ -72,7 +72,7 @@ LOSS_HEADS = {
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
 }
-"""Energy losses per step: stored name, label, and the rigid model's counterpart."""
+"""Energy losses per step: stored name, label, and text for the rigid model."""
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
