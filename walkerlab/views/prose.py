@@ -1,4 +1,4 @@
-"""Texts as Jinja templates: a file per subject with a macro per paragraph."""
+"""Texts kept as Jinja templates, with a file per subject and a macro per paragraph."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 BLANKS = re.compile(r"[ \n]+")
-"""Ends of a template's lines; narrow and unbreakable blanks within numbers do not count."""
+"""Blanks and line ends of a template, but not the narrow and no-break spaces within numbers."""
 BETWEEN_PARTS = re.compile(r"(?:^|[ \n])\|(?=[ \n]|$)")
 """Separator of the parts of a text, as in 'one | two'."""
 
@@ -24,7 +24,7 @@ def parts(text: str) -> list[str]:
 
 
 def f(value: float, spec: str) -> str:
-    """Format a number by a format specification, such as .4f."""
+    """Format a number with a format specification, such as .4f."""
     return format(value, spec)
 
 
@@ -34,18 +34,18 @@ def percent(share: float, digits: int = 3) -> str:
 
 @dataclass(frozen=True)
 class Prose:
-    """The paragraphs in a folder of templates, as plain text."""
+    """Renders paragraphs from a folder of templates as plain text."""
 
     folder: Path
     filters: Sequence[Callable[..., Any]]  # functions that templates may call by name; an unknown name is an error
-    known: Mapping[str, Any]  # global values of the templates
+    known: Mapping[str, Any]  # global variables of the templates
 
     @cached_property
     def templates(self) -> Environment:
-        # Imported here: what says nothing needs no templates.
+        # Imported here: commands that print no prose need no Jinja.
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-        made = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)  # plain: pages escape it
+        made = Environment(loader=FileSystemLoader(self.folder), undefined=StrictUndefined)  # pages escape it later
         made.filters |= {function.__name__: function for function in self.filters}
         made.globals |= self.known
         return made
@@ -65,5 +65,5 @@ class Prose:
         return parts(self(name, *values))
 
     def terms(self, name: str, *values: Any) -> dict[str, str]:
-        """Return words and meanings of a macro whose parts have the form 'word: meaning'."""
+        """Return the words and meanings in a macro whose parts have the form 'word: meaning'."""
         return {word: meaning for word, _, meaning in (part.partition(": ") for part in self.parts(name, *values))}

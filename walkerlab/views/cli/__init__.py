@@ -1,1 +1,1 @@
-"""The command line: options, printing, exit codes; everything else is imported by the command that needs it."""
+"""The command line: options, output and exit codes; each command imports everything else that it needs."""

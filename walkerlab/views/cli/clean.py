@@ -13,7 +13,7 @@ from walkerlab.views.cli.request import Request
 
 
 def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
-    """Delete the files of these stages from the run's folder, or from all, once confirmed; also folders left empty.
+    """Delete these stages' files from the run's folder, or from every run's, once confirmed; remove folders left empty.
 
     Raises typer.BadParameter without a terminal to confirm on, LockedError (with `--no-wait`) and StorageError.
     """
@@ -43,7 +43,7 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
 
 
 def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
-    """Describe files, one line each, with one line for a run's figures and one for the chunks of each sweep."""
+    """List files, one line each, but one line for a run's figures and one for the chunks of each sweep."""
     lines: dict[str, list[Path]] = {}
     for path in files:
         stem = {CHUNKS: f"{path.stem.rpartition('-')[0]}-*", FIGURES: "*"}.get(path.parent.name, path.name)

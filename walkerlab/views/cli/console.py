@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SILENCE_S = 8.0
-"""Longest silence without a terminal while a stage runs."""
+"""Longest silence (s) while a stage runs without a terminal."""
 
 ENOUGH_DONE, ENOUGH_S = 0.1, 3.0
-"""Share of the parts and time before their rate predicts the remaining time: the first parts are not typical."""
+"""Fraction of the parts, and time (s), needed to predict the remaining time: the first parts are not typical."""
 
 
 class Console:
-    """Reporter of the command line: a `pipeline.progress.Progress`."""
+    """Reporter of the command line; implements `pipeline.progress.Reporter`."""
 
     def __init__(self, quiet: bool = False, verbose: bool = False, open_page: bool = False) -> None:
         self.quiet = quiet
@@ -76,8 +76,8 @@ class Console:
             self.shown = self.show(path)
 
     def show(self, page: Path | str) -> bool:
-        """Open a file or address in a browser; return whether one was found."""
-        # Imported here: few pages are shown.
+        """Open a file or address in a browser; return whether a browser was found."""
+        # Imported here: most commands show no page.
         import webbrowser
 
         place = page if isinstance(page, str) else page.resolve()
@@ -110,7 +110,7 @@ class Console:
                 print(text, file=sys.stderr, flush=True)
 
     def _talk(self, end: threading.Event) -> None:
-        """Report the running stages whenever nothing was printed for a while."""
+        """Report the running stages whenever nothing has been printed for a while."""
         while not end.wait(0.5):
             if time.monotonic() - self._said_at >= SILENCE_S:
                 self._say("; ".join(line.describe() for line in self._lines()))
@@ -122,7 +122,7 @@ class Console:
     def _show_bars(self) -> None:
         if self._live is not None:
             return
-        # Imported here: no bar, no rich.
+        # Imported here: only progress bars need rich.
         from rich.console import Console as Terminal
         from rich.live import Live
 
@@ -142,15 +142,15 @@ class Console:
 
 
 class StageLine:
-    """A running stage: its current work and progress."""
+    """A running stage, with its current work and progress."""
 
     def __init__(self, console: Console, stage: str, place: str, expected_s: float | None) -> None:
         self.console, self.stage, self.place, self.expected_s = console, stage, place, expected_s
         self.label, self.kernel = stage, ""
         self.total: int | None = None
         self.done = 0
-        self.progress: list[tuple[int, float]] = []  # parts done, and computing time then (s)
-        self.compiled_s = 0.0  # in the current piece of work
+        self.progress: list[tuple[int, float]] = []  # parts done, and computing time up to then (s)
+        self.compiled_s = 0.0  # compile time within the current piece of work (s)
         self.compiling_since = 0.0
         self.began = self.work_began = time.monotonic()
 
@@ -169,7 +169,7 @@ class StageLine:
         self.console.note(text)
 
     def compiling(self, kernel: str) -> None:
-        """Exclude compiling from the computing time; `kernel` is empty when it ends."""
+        """Exclude compilation from the computing time; `kernel` is the function being compiled, empty at the end."""
         now = time.monotonic()
         if self.kernel and not kernel:
             self.compiled_s += now - self.compiling_since
@@ -193,7 +193,7 @@ class StageLine:
         return ", ".join(parts)
 
     def computed_s(self) -> float:
-        """Duration of the current piece of work without compiling (s)."""
+        """Return the time spent on the current piece of work (s), without compilation."""
         now = time.monotonic()
         compiled = self.compiled_s + (now - self.compiling_since if self.kernel else 0.0)
         return now - self.work_began - compiled

@@ -53,9 +53,9 @@ TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "t
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY, STEPS = "trajectory", "steps"
 COLUMN_WIDTHS = {1: 252.0, 2: 516.0}
-"""Width of one or two columns of a journal, pt."""
+"""Width of one or two columns of a journal (pt)."""
 DPI = 300
-"""Resolution that journals ask of pictures."""
+"""Resolution that journals ask for (pixels per inch)."""
 STORED_WITH = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
@@ -88,7 +88,7 @@ def export_from(
 
 def draw_walker(config: Path, target: Target, console: Console) -> Path:
     """Draw the walker of a config with its dimensions; ConfigError for a bad config or format."""
-    # Imported here: other exports draw no walker.
+    # Imported here: no other export draws a walker.
     from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
     from walkerlab.views.figures.measures import draw_measures
@@ -107,13 +107,13 @@ def hyphenate(words: str) -> str:
 
 
 def caption_name(caption: str) -> str:
-    """Turn a caption's first words, up to a comma or colon, into a file name."""
+    """Make a file name from a caption's first words, up to a comma or colon."""
     return hyphenate(re.split("[,:]", caption)[0])
 
 
 def page_tables(folder: RunFolder) -> dict[str, Table]:
-    """Return every table of a run's page by its short caption, or by its whole one where that is ambiguous."""
-    # Imported here: figures need no page.
+    """Return the tables of a run's page by short caption, or by full caption where the short one is ambiguous."""
+    # Imported here: exporting a figure needs no page.
     from walkerlab.views.report.registry import pages_of
     from walkerlab.views.report.results import Results
 
@@ -130,8 +130,8 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
 
 
 def find_item(folder: RunFolder, name: str) -> Illustration | Table:
-    """Return the figure or table of a name; ConfigError, with the run's items, for an unknown name."""
-    # Imported here: a table needs no drawing.
+    """Find a figure or table by name; if there is none, ConfigError with a list of the run's items."""
+    # Imported here: tables of the paper's values need no drawing code.
     from walkerlab.views.figures.registry import FIGURES
 
     figures = {illustration.name: illustration for illustration in FIGURES}
@@ -154,7 +154,7 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
 
 
 def plan_run(folder: RunFolder) -> Executor:
-    """Return an executor with the run's current results; without any if its config is no longer valid."""
+    """Return an executor with the run's current results, but without stages if the run's config is no longer valid."""
     config = config_of(folder)
     stages = () if config is None else PIPELINE.stages
     executor = Executor(config or Config(), FolderResults(folder, elsewhere=False), stages)
@@ -165,7 +165,7 @@ def plan_run(folder: RunFolder) -> Executor:
 def figure(
     folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
 ) -> bytes:
-    """Draw a figure as on the page, in this size (width in pt, pixels per inch); StaleError without its results."""
+    """Draw a figure as on the page; size: width (pt), pixels per inch. StaleError if its results are missing."""
     stored = results_in(folder, illustration.stages)
     run, plot = plan_run(folder), PIPELINE["plot"]
     inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
@@ -210,7 +210,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
 
 
 def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
-    """Write the steps of a walk, as `identify --level steps` reads them; StaleError if it takes none."""
+    """Return a CSV file of a walk's steps for `identify --level steps`; StaleError if the walk takes no step."""
     with results_to_show(folder, [model], console.warn) as results:
         groups = the_result(results, folder, model).groups
     if STEPS not in groups:
@@ -222,13 +222,13 @@ def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
 
 
 def touch_angles(steps: Group, trajectory: Group) -> NDArray[np.float64]:
-    """Read the angle (steps,) of the leg that touches at the end of each step; leg 1 touches first."""
+    """Return the angle (steps,) in rad of the leg that touches down at the end of each step; leg 1 touches first."""
     legs = [np.interp(steps["touch_time_s"], trajectory["time"], leg) for leg in trajectory["angle"].T]
     return np.asarray(np.where(np.arange(steps["touch_time_s"].size) % 2 == 0, *legs))
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
-    """Write a walk over time: a column per variable and leg (CSV), or a netCDF file."""
+    """Return a walk over time as CSV (a column per variable and leg) or netCDF; StaleError if none is stored."""
     with results_to_show(folder, [model], console.warn) as results:
         stored = the_result(results, folder, model)
     group = stored.groups.get(TRAJECTORY)
@@ -259,13 +259,13 @@ class Film:
     """Options of an animation."""
 
     model: str  # stage whose walk is shown
-    steps: int | None  # number of steps from the first; None lets `film_times` choose
-    rate: int  # pictures per second
+    steps: int | None  # number of steps shown, from the first; None lets `film_times` choose
+    rate: int  # frames per second
     slower: float  # slow-motion factor
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """Return the stage to show, by default the contact model's walk; ConfigError if `model` is not a walk."""
+    """Return `model`, by default contact-sim (simulate if only that has run); ConfigError if it is not a walk."""
     if model is not None and model not in MODEL_NAMES:
         raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODEL_NAMES)}.")
     rigid, contact = MODEL_NAMES
@@ -306,7 +306,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
 
 
 def gif(pictures: Iterable[Any], rate: int) -> bytes:
-    """Encode the pictures as an endlessly repeating GIF."""
+    """Encode the pictures as an endlessly looping GIF."""
     from PIL import Image
 
     frames = [Image.fromarray(picture).quantize(64) for picture in pictures]

@@ -1,4 +1,4 @@
-"""Failures at the edge: one message, one advice, one exit code; bugs keep their traceback."""
+"""Expected failures of a command: a message, advice and an exit code; bugs keep their traceback."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 @contextlib.contextmanager
 def exit_on_failure(request: Request) -> Iterator[None]:
-    """Turn expected failures into a message on stderr and an exit code, and with `--json` into an object."""
+    """Turn expected failures into a message on stderr and an exit code; with `--json`, also print a JSON object."""
     raise_on(signal.SIGTERM, KeyboardInterrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background job is to ignore it
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background jobs ignore it
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
     def print_failed(error: WalkerlabError) -> None:
-        """With `--json`, print the object of a failed command."""
+        """With `--json`, print an object that describes the failure."""
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
@@ -62,7 +62,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
 
 
 def discard_output() -> None:
-    """Redirect stdout to nowhere, so that flushing at exit does not fail again."""
+    """Redirect stdout to the null device, so that flushing it at exit does not fail again."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
@@ -71,7 +71,7 @@ def discard_output() -> None:
 def print_result(
     request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None
 ) -> None:
-    """Print a result as text lines or as the JSON object `value`; exit non-zero if it holds an error."""
+    """Print a result as text lines or, with `--json`, as the object `value`; exit non-zero if there is an error."""
     if request.as_json:
         print_json(value if error is None else value | {"error": error.as_json()})
     else:

@@ -1,4 +1,4 @@
-"""The program: one command for each stage of the pipeline, and the house-keeping commands."""
+"""The command-line program: one command for each stage of the pipeline, and the housekeeping commands."""
 
 import atexit
 import gc
@@ -19,15 +19,15 @@ from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
 
 
 def main() -> None:
-    """Run the program on this process's arguments, and exit with its code."""
-    # What a command loads stays to its end: to look for garbage in it, again and again and then once more, takes longer
-    # than a warm search for gaits.
+    """Run the program with this process's arguments, and exit with its code."""
+    # Loaded modules stay until the command ends; searching them for garbage again and again would take longer than a
+    # warm search for gaits.
     gc.set_threshold(300_000, 50, 100)
     atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
     def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:
-        # Imported here: help loads no compiler, and who warns has loaded it.
+        # Imported here: help must not load the compiler, which is loaded anyway when it warns.
         from walkerlab.physics.kernel_cache import CacheWarning
 
         own = category is CacheWarning
@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def print_whatever_there_is_to_print() -> None:
-    """Discard output if stdout is closed, and escape characters that its encoding lacks, such as undecodable names."""
+    """Discard output to closed streams, and escape characters without encoding, as in undecodable file names."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
@@ -47,7 +47,7 @@ def print_whatever_there_is_to_print() -> None:
 
 
 class Commands(TyperGroup):
-    """Commands listed with their whole purpose, which click would cut."""
+    """Command group whose help shows the full purpose of each command, which click would truncate."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
@@ -58,7 +58,7 @@ class Commands(TyperGroup):
 
 
 def program(graph: Graph = PIPELINE) -> typer.Typer:
-    """Build the command line of a pipeline."""
+    """Build the command line for a pipeline."""
     app = typer.Typer(
         name="walkerlab",
         cls=Commands,
@@ -81,7 +81,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
 def print_version(requested: bool) -> None:
     """Print the version, with the code's commit if it is known, and exit."""
     if requested:
-        # Imported here: nothing else that is answered on sight asks git.
+        # Imported here: only this option needs git.
         from walkerlab.pipeline.store.commit import commit_of_package
 
         commit = commit_of_package(Path(walkerlab.__file__).parent)
@@ -108,7 +108,7 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
 
     @command(app, *shared, name=stage.name, purpose=stage.purpose, sets=own)
     def run(request: Request) -> None:
-        # Imported here: help loads neither a config nor an array.
+        # Imported here: help must load neither the config nor NumPy.
         from walkerlab.views.cli.stage import run_stage
 
         run_stage(request, graph[request.instead or stage.name], graph)

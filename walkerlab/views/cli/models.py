@@ -15,7 +15,7 @@ from walkerlab.views.cli.target import Target, write_file
 
 
 def write_model(run: str, runs: Path, target: Target, law: str | None, console: Console) -> list[Path]:
-    """Write the walker of a run or config, after computing its gait if necessary.
+    """Write a model of the walker of a run or config, computing its gait first if necessary.
 
     Raises ConfigError for an unknown run or format or a walker that the format cannot express, NoAnswer without a gait.
     """

@@ -19,7 +19,7 @@ from typer.core import TyperCommand
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.failures import exit_on_failure
 
-# Help loads neither a config nor an array.
+# Imported for types only: help must load neither the config nor NumPy.
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 RUNS = Path("runs")
 OF_KIND = re.compile(r"\([^)]*\)")
-"""The kind of a block that has several: `walker(kneed)`."""
+"""Kind of a block that has several kinds, as in `walker(kneed)`."""
 
 
 def keys_to_set(incomplete: str) -> list[str]:
-    """Complete config keys, each with the `=` that `--set` needs."""
-    # Imported here and below: only a shell that completes asks.
+    """Return the config keys that complete a word, each with the `=` that `--set` needs."""
+    # Imported here and below: only shell completion needs the lists.
     from walkerlab.config.reference import keys
 
     of_kinds = (OF_KIND.sub("", row.key) for row in keys() if row.key != "extends")
@@ -42,12 +42,12 @@ def keys_to_set(incomplete: str) -> list[str]:
 
 
 def keys_to_vary(incomplete: str) -> list[str]:
-    """Complete config keys, without the `=`."""
+    """Return the config keys that complete a word, without the `=`."""
     return [key.removesuffix("=") for key in keys_to_set(incomplete)]
 
 
 def configs_and_files(incomplete: str) -> list[str]:
-    """Complete names of built-in configs and of YAML files."""
+    """Return the built-in configs and the YAML files whose names complete a word."""
     from walkerlab.config.files import builtin_names
 
     folder, slash, stem = incomplete.rpartition("/")
@@ -56,7 +56,7 @@ def configs_and_files(incomplete: str) -> list[str]:
 
 
 class SetByOption(str):
-    """A setting KEY=VALUE made from a stage's own option; messages show the option as the user typed it."""
+    """A setting KEY=VALUE made from a stage's own option; messages quote the option as the user typed it."""
 
     source: str
 
@@ -67,20 +67,20 @@ class SetByOption(str):
 
 
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
-    """Declare a field of a request that commands may offer as an option, with its flags and its help."""
+    """Declare a field of a request that commands may offer as an option; `flags` and `about` are typer's arguments."""
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})
 
 
 def as_parameter(entry: Field[Any]) -> inspect.Parameter:
-    """Convert such a field to a parameter of a function whose signature typer reads."""
+    """Convert a field declared by `option` to a parameter in a signature that typer reads."""
     kind, declared = inspect.Parameter.KEYWORD_ONLY, entry.metadata["option"]
     return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, declared])
 
 
 def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
-    """Convert a stage's own options (values by flag; None if not given) to settings.
+    """Convert a stage's own options to settings; `values` are by flag, None if not given.
 
-    Raises typer.BadParameter for an option without the options it needs, and for malformed bounds.
+    Raises typer.BadParameter for malformed bounds, and for an option given without the options that it needs.
     """
     settings = []
     for option in options:
@@ -103,7 +103,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
 
 
 def bounds(flag: str, values: Sequence[str], form: str) -> str:
-    """Convert pairs of numbers by name to a YAML block; typer.BadParameter unless NAME=A:B, or [NAME] for null."""
+    """Convert texts NAME=A:B (or NAME for null, if `form` allows it) to a YAML block; otherwise typer.BadParameter."""
     either = r"([^=]+)(?:=([^:]+):([^:]+))" + ("?" if "[" in form else "")
     parts = [re.fullmatch(either, value) for value in values]
     if None in parts:
@@ -113,7 +113,7 @@ def bounds(flag: str, values: Sequence[str], form: str) -> str:
 
 
 def pairs(flag: str, values: Sequence[str], kind: type) -> str:
-    """Convert pairs NAME=VALUE,... to a YAML block; a lone unit is the unit of its kind. Floats stay unquoted."""
+    """Convert texts NAME=VALUE,... to a YAML block; a unit without a name applies to its kind. Floats stay unquoted."""
     # Imported here: few commands read files of other programs.
     from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
@@ -126,7 +126,7 @@ def pairs(flag: str, values: Sequence[str], kind: type) -> str:
 
 
 def own_parameter(name: str, option: "Option") -> inspect.Parameter:
-    """Return a stage's own option as a parameter of a function whose signature typer reads."""
+    """Convert a stage's own option to a parameter in a signature that typer reads."""
     complete = keys_to_vary if option.metavar == "KEY" else None
     declared = typer.Option(option.flag, metavar=option.metavar, help=option.help, autocompletion=complete)
     kind: Any = list[str] if "=" in option.metavar or option.type is list else option.type
@@ -140,8 +140,8 @@ def own_parameter(name: str, option: "Option") -> inspect.Parameter:
 class Request:
     """Options shared by commands; options that a command does not offer keep their defaults."""
 
-    command: str  # as it is typed
-    own: tuple[SetByOption, ...] = ()  # settings of the config from options of its own
+    command: str  # name of the command as typed
+    own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
     instead: str = ""  # stage that an option runs instead of the command's own; empty if there is no such option
     full: bool = option(
         "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
@@ -178,12 +178,12 @@ class Request:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """All changes of the config, as settings for `--set`."""
+        """All changes of the config in the form of `--set`."""
         return (*(self.sets or ()), *self.own)
 
     @property
     def typed(self) -> str:
-        """The options that select the run, each after a space; empty for the default config."""
+        """Options that select the run, each after a space; empty for the default run."""
         words = [] if self.config is None else ["-c", self.config]
         for setting in self.settings:
             words += ["--set", setting]
@@ -194,14 +194,14 @@ class Request:
 
     @property
     def processes(self) -> int:
-        """Number of processes that may work at once."""
+        """Number of processes that may run at once."""
         if self.jobs is not None:
             return self.jobs
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     @cached_property
     def resolved_run(self) -> "ResolvedRun":
-        """The config and its run folder; shows the config's warnings. ConfigError if the config is invalid."""
+        """The config and its run folder, after showing the config's warnings; ConfigError if the config is invalid."""
         from walkerlab.pipeline.resolve import resolve
 
         run = resolve(self.config, self.settings, self.strides, self.runs, self.name)
@@ -217,7 +217,7 @@ class Request:
 
     @property
     def run_dir(self) -> Path | None:
-        """The run's folder; None until something has asked for it."""
+        """The run's folder, or None if the run has not been resolved."""
         return self.folder.path if "resolved_run" in vars(self) else None
 
     @property
@@ -234,23 +234,23 @@ class Request:
 
 
 OF_A_RUN = ("config", "sets", "strides", "name", "runs")
-"""The options that say which run is meant."""
+"""Options that select the run."""
 OF_TALK = ("as_json", "quiet", "verbose")
-"""The options that say how much is printed, and how."""
+"""Options for the form and amount of output."""
 
 
 class KeysAreNoOptions(TyperCommand):
-    """A command that advises `--set KEY=VALUE` when a user types a config key as an option."""
+    """A command that suggests `--set KEY=VALUE` if a user types a config key as an option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the options; for an unknown option that names a key, the error shows its `--set`."""
+        """Parse the options; if an unknown option is a config key, the error message suggests `--set`."""
         try:
             return super().parse_args(ctx, args)
-        except Exception as error:  # click's NoSuchOption, which each version of typer has in another place
+        except Exception as error:  # click's NoSuchOption; its module depends on typer's version
             typed = str(getattr(error, "option_name", ""))
             name = typed.lstrip("-").replace("-", "_")
             keys = keys_to_vary("") if name and any(option.name == "sets" for option in self.params) else []
-            keys.sort(key=lambda key: not key.startswith(f"{self.name}."))  # its own block is meant first
+            keys.sort(key=lambda key: not key.startswith(f"{self.name}."))  # prefer the command's own block
             key = next((key for key in keys if name in (key, key.rpartition(".")[2])), None)
             if key is not None:
                 message = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"
@@ -266,7 +266,7 @@ def command(
     asks: type[Request] = Request,
     sets: Sequence["Option"] = (),
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add the decorated function to a program as a command: it takes a request, then its own options.
+    """Add the decorated function, which takes a request and its own options, to a program as a command.
 
     shared   fields of the request that the command offers as options
     name     name of the command; default: the function's
@@ -278,7 +278,7 @@ def command(
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         typed = name or function.__name__
-        names = {f"set_{option.flag[2:]}": option for option in sets}  # `from` alone is no name of a parameter
+        names = {f"set_{option.flag[2:]}": option for option in sets}  # `from` cannot be a parameter's name
 
         def run(**arguments: Any) -> None:
             values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}

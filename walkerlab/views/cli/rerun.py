@@ -17,7 +17,7 @@ SHORT = 12
 
 
 def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
-    """Recompute an artifact in an empty folder and compare; ConfigError without one, StaleError if it differs."""
+    """Recompute an artifact in an empty folder and compare; ConfigError if it is missing, StaleError if it differs."""
     try:
         stored = read(path)
     except (FileNotFoundError, NotADirectoryError):

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from walkerlab.pipeline.store.runfolder import RunFolder
 
 SAME_CHANGE = 1e-12
-"""Relative change below which two numbers are shown as the same."""
+"""Relative change below which two numbers are shown as equal."""
 DIGITS = 6
-"""Significant digits of a headline number."""
+"""Significant digits of a headline value."""
 IS_ERROR = re.compile(r"residual|drift|error|balance|uncertainty")
-"""In the names of numbers that are errors: a relative change of one says nothing."""
+"""Words in the names of error measures, whose relative change means nothing."""
 ROUNDING_SI = 1e-9
-"""Numbers (SI) below it are at rounding or at the solver's tolerance."""
+"""Magnitude (SI units) below which values are at the level of rounding or of the solver's tolerance."""
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
@@ -54,13 +54,13 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
 
 
 def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
-    """Name two runs: by their names, or by their folders if the names are equal."""
+    """Return labels of two runs: their names or, if these are equal, their folders."""
     first, second = folders
     return (first.name, second.name) if first.name != second.name else (str(first.path), str(second.path))
 
 
 def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
-    """Draw both walks into the first run's folder of figures."""
+    """Draw both runs' walks overlaid into the first run's figures folder; return the files."""
     from walkerlab.pipeline.store.files import make_folder, write_atomically
     from walkerlab.views.figures.walks import draw_runs
 
@@ -89,7 +89,7 @@ def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figure
 def lines(
     folders: tuple[RunFolder, RunFolder], comparison: RunDifference, figures: list[Path], every: bool
 ) -> list[str]:
-    """Describe changed keys of the config and changed headline values; with `every` all differing values."""
+    """Describe changed config keys and changed headline values or, with `every`, all values that differ."""
     from walkerlab.views.report.numbers import number
     from walkerlab.views.report.tables import aligned
     from walkerlab.views.report.text import in_words
@@ -123,7 +123,7 @@ def differs(pair: Pair) -> bool:
 
 
 def percent(pair: Pair) -> str:
-    """Format a relative change in percent; empty for error measures and for values at rounding."""
+    """Format a relative change in percent; empty for error measures and for values at rounding level."""
     if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
         return ""
     return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"

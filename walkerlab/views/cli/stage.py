@@ -1,4 +1,4 @@
-"""A stage's command: run it, or say what would happen; then print the result."""
+"""A stage's command: run the stage or show what would be computed, then print the result."""
 
 import itertools
 import os
@@ -26,12 +26,12 @@ from walkerlab.views.report.tables import aligned
 SEARCHING = ("fixedpoint", "report")
 """Stages that look for gaits nearby if the config has no gait."""
 WRITES_CONFIG = {"design": "optimum", "identify": "identified"}
-"""Stages that end in a config, with its name."""
+"""Stages that write a config, with the config's name."""
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its answer; typer.Exit(4) without an answer, else as `execute` raises."""
+    """Run a stage as requested and print its result; raises typer.Exit(4) without an answer, or as `execute` does."""
     try:
         report_on(request, stage, graph)
     except ConfigError as error:
@@ -39,7 +39,7 @@ def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
 
 
 def report_on(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its answer; its ConfigError names no place in a file."""
+    """Run a stage as requested and print its result; its ConfigErrors lack the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     config, folder = request.resolved, request.folder
     if options.dry:
@@ -56,11 +56,11 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
 
 
 def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
-    """Lead the advice of a missing gait by the nearest slopes that have one."""
+    """Begin the advice with suggestions of nearby gaits if no gait was found."""
     error = report.no_answer
     if error is None or report.stage not in SEARCHING or "no gait" not in error.message:
         return report
-    # Imported here: most commands find their gait.
+    # Imported here: most commands find a gait.
     from walkerlab.scene.gait_suggestions import suggest_gaits
 
     suggestions = suggest_gaits(request.resolved, request.typed)
@@ -74,7 +74,7 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 def write_config(request: Request, report: StageReport, name: str) -> Path:
-    """Write a stage's parameters to a new config that extends the request's; StorageError if that fails."""
+    """Write a config that extends the request's config by a stage's parameters; StorageError if that fails."""
     start = config_to_extend(request.config)
     base = load(Path(start)).config
     typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
@@ -92,10 +92,10 @@ def write_config(request: Request, report: StageReport, name: str) -> Path:
 
 
 def report_lines(request: Request, report: StageReport) -> list[str]:
-    """Describe the result: what was computed, where it is, and what to do next."""
+    """Describe the result: what was computed, where it is stored, and what to do next."""
     if report.artifact is None:
         return [f"{report.stage}: no result", *omission_lines(request, report)]
-    # the reason for no answer, and the advice, appear once: as the error
+    # without an answer, reason and advice are printed once, as the error
     separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
     own = {key: value for key, value in report.summary.items() if key not in separate}
     if "html" in own:
@@ -107,7 +107,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
     else:
         answers = answer(report.stage, own)
-        # that there is no answer is kept, too, but nobody would look there for a result
+        # an artifact without an answer is stored too, but is not worth pointing to
         lines = [*answers, *([""] if answers else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE:
         # Imported here: most stages draw nothing.

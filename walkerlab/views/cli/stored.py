@@ -18,7 +18,7 @@ from walkerlab.views.report.tables import aligned
 from walkerlab.views.report.text import describe_summary
 
 SHORT = 12
-"""Characters of a digest that are shown to people."""
+"""Number of a digest's characters shown in text output."""
 NOT_CURRENT = ("stale", "missing", "damaged")
 
 
@@ -84,7 +84,7 @@ def state_of(step: Step) -> str:
 
 
 def why(step: Step) -> str:
-    """Explain a result's state; empty where the state says enough."""
+    """Explain a result's state; empty if the state needs no explanation."""
     return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 
@@ -99,7 +99,7 @@ def whys(steps: Sequence[Step]) -> Iterator[str]:
 
 
 def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
-    """Return the error of `--check`, or None if every result is current."""
+    """Return the error for `--check`, or None if every result is current."""
     counts = Counter(state for step in steps if (state := state_of(step)) in NOT_CURRENT)
     if not counts:
         return None
@@ -123,7 +123,7 @@ def print_stored(request: Request, graph: Graph, stage: str) -> None:
 
 
 def as_json(stored: Stored) -> dict[str, Any]:
-    """Describe an artifact without the arrays' values."""
+    """Describe an artifact as JSON, without the values of its arrays."""
 
     def labels(variable: Variable) -> dict[str, Any]:
         shape = list(variable.values.shape)
@@ -147,6 +147,7 @@ def as_json(stored: Stored) -> dict[str, Any]:
 
 
 def lines(stored: Stored) -> list[str]:
+    """Describe an artifact in lines: summary, arrays and provenance."""
     result = ["summary", *describe_summary(stored.summary)]
     for path, group in stored.groups.items():
         result.append(path)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SUMMARY_KEYS = ("of", "parameters", "points", "done", "failed", "outcomes", "endings", "numerical_error")
 """Keys of a sweep's summary that `--json` prints."""
 LISTED_POINTS = 20
-"""Points that a dry run lists."""
+"""Maximum number of points that a dry run lists."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
         chosen, address = engine_named(request.engine)
         loaded, over = request.loaded, request.over or ()
-        block = loaded.config.sweep or Sweep()  # what the options leave open
+        block = loaded.config.sweep or Sweep()  # settings for which no option is given
         own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
         question = build_sweep(
             request.stage or block.stage,
@@ -103,7 +103,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             return
         with chosen.start_early(order) as engine:
             run = SweepRun(question, loaded, request.folder, graph)
-            # What is needed at the end is loaded while others compute.
+            # Modules needed at the end are loaded while the workers compute.
             threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
 
             def check(available: Collection[str]) -> None:
@@ -155,7 +155,7 @@ def format_duration(seconds: float) -> str:
 
 
 def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
-    """Return the keys that every command's JSON object has."""
+    """Return the keys that the JSON object of every command has."""
     return {
         "stage": "sweep",
         "run_dir": str(request.folder.path),
@@ -167,7 +167,7 @@ def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
 
 
 def show_result(request: SweepRequest, swept: "Swept") -> None:
-    """Draw and print a sweep; typer.Exit if points are missing."""
+    """Plot a sweep and print its result; typer.Exit if points failed."""
     from walkerlab.pipeline.store.files import write_atomically
     from walkerlab.pipeline.sweeps.result import as_csv as table_of
     from walkerlab.views.report.sweep_page import draw

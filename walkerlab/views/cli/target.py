@@ -18,12 +18,12 @@ from walkerlab.views.cli.console import Console
 class Target:
     """Destination of an export."""
 
-    to: str | None  # a format, or a file name with that ending if `output` is None
-    output: Path | None  # the file; None derives its name from the run
+    to: str | None  # format, or file name if `output` is None
+    output: Path | None  # file; None derives its name from the run
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
 
     def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
-        """Return file and format, by default the first of `kinds`; ConfigError if unknown, given twice or protected."""
+        """Return file and format, by default the first of `kinds`; ConfigError for a bad format or a protected file."""
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
         ending = "" if output is None else output.suffix.removeprefix(".")
@@ -52,7 +52,7 @@ class Target:
 
 
 def write_file(path: Path, data: bytes, console: Console) -> Path:
-    """Write a file, with a warning if that changes an existing one; StorageError if the system refuses."""
+    """Write a file, warning if an existing one is replaced by different content; StorageError if the system refuses."""
     replaced = path.is_file() and path.read_bytes() != data
     try:
         write_through(path, data)

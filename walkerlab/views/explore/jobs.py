@@ -18,16 +18,16 @@ from walkerlab.views.explore.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
 EARLY = re.compile(r"page: (.+) \(partial")
-"""Progress line with which a command announces its first page."""
+"""Progress line with which a command announces a partial page."""
 JOB_PROGRAM = (
     "from walkerlab.pipeline.interrupts import end_with_parent; end_with_parent(); "
     "from walkerlab.views.cli.main import main; main()"
 )
-"""Run a command as `python -m walkerlab` does, and end it with the server."""
+"""Program that runs a command as `python -m walkerlab` does, and ends when the server ends."""
 
 
 class Job:
-    """Runs one job at a time, as the same command a user would type."""
+    """Runs one job at a time, as the command that a user would type."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
@@ -47,7 +47,7 @@ class Job:
         return 200, dict(self._told)
 
     def progress(self) -> dict[str, Any]:
-        """Return the latest progress message and, at the end, where the file is."""
+        """Return the latest progress message and, as soon as the file exists, its address."""
         return dict(self._told)
 
     def close(self) -> None:
@@ -82,7 +82,7 @@ class Job:
         """Run a command and return its JSON output; RuntimeError with its last message if it fails."""
         command = [sys.executable, "-c", JOB_PROGRAM, *words]
         lines = []
-        # Into a file: a pipe that nobody reads meanwhile would fill.
+        # stdout goes to a file, since a pipe would fill while only stderr is read
         with tempfile.TemporaryFile("w+") as output:
             with subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True

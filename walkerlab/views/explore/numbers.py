@@ -1,4 +1,4 @@
-"""The adjustable keys of a config: what each means, and the range of its slider."""
+"""The adjustable keys of a config, with their meaning and slider ranges."""
 
 import math
 from collections.abc import Iterator
@@ -18,16 +18,16 @@ FIRST: Final = (
 )  # fmt: skip
 """Keys shown before any search, in this order; a trailing dot means the whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
-"""Shown initially only if active; knee-lock keys appear in searches only."""
+"""Blocks whose keys are shown initially only if active; knee-lock keys appear in searches only."""
 OF_OTHERS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
 )  # fmt: skip
 """Keys that do not affect a walk."""
 AROUND: Final = 5.0
-"""Range of a slider, as a factor on its initial value in both directions."""
+"""Factor between a slider's initial value and either end of its range."""
 FAR_AROUND: Final = 100.0
-"""The same for keys known only by order of magnitude."""
+"""Factor for keys of which only the order of magnitude is known, listed in `BY_MAGNITUDE`."""
 BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
 DECADES: Final = 100.0
 """Ratio of bounds above which a slider is logarithmic."""
@@ -36,10 +36,10 @@ HALVINGS: Final = 10
 
 
 def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
-    """Yield each number, choice and switch of the walker with its value, as JSON.
+    """Yield a JSON object for each number, choice and switch of a config that affects a walk.
 
-    start   the config before anything was changed, which the sliders' ends and a reset go by
-    config  the same with its changes
+    start   the config before any change, which determines the sliders' ends and the reset values
+    config  the config with its changes
     """
     for path, field in leaves(Config, held=config):
         key = ".".join(path)
@@ -65,7 +65,7 @@ def rank(key: str, first: Any) -> int | None:
 
 
 def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
-    """Return the choices or slider range of a key; empty if its value must be typed."""
+    """Return the choices or the slider range of a key; empty if its value must be typed."""
     if isinstance(first, bool):
         return {"words": [True, False]}
     words = words_of(field.annotation)
@@ -84,7 +84,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         by = FAR_AROUND if any(part in key for part in BY_MAGNITUDE) else AROUND
         least, most = sorted((first / by, first * by))
         logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
-        # what is next to nothing can become what it is on other walkers
+        # a value close to zero must be able to reach the typical size
         most = max(most, ordinary) if logarithmic else most
     if unit != "deg":
         least, most = max(least, low), min(most, high)
@@ -98,7 +98,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
 
 
 def ordinary_size(key: str, unit: str, start: Config) -> float:
-    """Return the typical size of a walker's quantity with this unit; 0 if unknown."""
+    """Return the typical size of a quantity with this unit for the walker; 0 if unknown."""
     mass, leg, gravity = start.walker.total_mass_kg, start.walker.leg_length_m, start.gravity_m_s2
     speed = math.sqrt(gravity * leg)
     if key.startswith("ground."):
@@ -111,7 +111,7 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
 
 
 def gaits_by(key: str, start: Config) -> Parameter | None:
-    """Return a key as a parameter to follow gaits along; None if no model depends on it."""
+    """Return the key as a parameter along which gaits can be followed; None if no model depends on it."""
     try:
         return parameter_of(key, start)
     except ConfigError:
@@ -119,7 +119,7 @@ def gaits_by(key: str, start: Config) -> Parameter | None:
 
 
 def last_allowed(parameter: Parameter, start: Config, first: float, end: float) -> float:
-    """Return the valid value closest to a slider's end, given the config's other values."""
+    """Return the valid value closest to a slider's end, with the config's other values kept."""
     if parameter.config_at(start, end) is not None:
         return end
     good, bad = first, end

@@ -1,4 +1,4 @@
-"""The page of `walkerlab explore`: the report's player and style, with a script that queries the server."""
+"""The page of `walkerlab explore`: the report's player and style, and a script that queries the server."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def start_name(base: ExploredConfig) -> str:
 
 
 def choices(base: ExploredConfig) -> list[str]:
-    """List the other configs offered: built-in ones, and the YAML files in the working folder."""
+    """List the other configs to choose from: built-in ones, and the YAML files in the working folder."""
     own = sorted(path.name for path in Path().glob("*.yaml"))
     return [name for name in (*builtin_names(), *own) if name != start_name(base)]
 
@@ -42,9 +42,9 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
         start_name=start_name(base),
         configs=choices(base),
         anchor="walk",
-        # An empty player, filled by the script.
+        # An empty player, which the script fills.
         block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 1.0, (0, 0, 1, 1)),
-        # The only texts that are markup already: files of this package.
+        # Markup only for the package's own files; all other texts are escaped.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),
     )

@@ -34,21 +34,21 @@ class Desk:
     """A worker process that answers only the newest waiting request."""
 
     def __init__(self, drops: bool = False) -> None:
-        """Start the worker; `drops`: whether a newer question ends the work on an older one."""
+        """Start the worker; `drops`: whether a new request cancels the one in progress."""
         self.drops, self.compiling, self.compiled = drops, "", 0
         self.worker = self._hire()
         self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
 
     def _hire(self) -> Worker:
         worker = Worker(("walkerlab.views.explore.walks",))
-        if self.drops:  # nobody waits for it
+        if self.drops:  # background work yields to other processes
             os.setpriority(os.PRIO_PROCESS, worker.process.pid, NICE)
         return worker
 
     def ask(self, call: Callable[[], Answered]) -> Answered:
         """Run the call in the worker once it is free; status 409 if a newer request arrived meanwhile.
 
-        A call whose worker dies is given to another one, once: an idle worker may have died before.
+        If the worker dies, a new one runs the call, once: the old worker may have died while idle.
         """
         with self._count:
             self._newest += 1
@@ -57,13 +57,13 @@ class Desk:
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
             deaths = 0
-            # again, if what was to end the question before has come late, or if the worker died while nobody asked
+            # repeat the call if the signal for an earlier request arrived late, or if the worker died while idle
             while number == self._newest:
                 try:
                     answer = self.worker.do(call, self._note_compilation)
                 except WorkerDiedError as error:
                     self.worker = self._hire()
-                    deaths += error.exit_code_of_worker != -GIVE_WAY  # not even begun
+                    deaths += error.exit_code_of_worker != -GIVE_WAY  # the signal kills a worker that has not begun
                     if deaths > 1:
                         return failure(500, error.message, error.advice)
                 except Exception as error:
@@ -92,13 +92,13 @@ class Server(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", port), Handler)
         self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
         self.cookie = f"walkerlab-explore-{self.server_port}"
-        # what is drawn in the background keeps nobody waiting who turns a number
+        # curves plotted in the background must not delay the answer to a moved slider
         self.desk, self.background = Desk(), Desk(drops=True)
         self._thread: threading.Thread | None = None
 
     @property
     def host(self) -> str:
-        """Host and port as a browser sends them."""
+        """Host and port as a browser sends them in requests."""
         return f"127.0.0.1:{self.server_port}"
 
     @property
@@ -112,7 +112,7 @@ class Server(ThreadingHTTPServer):
         self._thread.start()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Report errors, except closed connections."""
+        """Report errors, except those of closed connections."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
@@ -128,7 +128,7 @@ class Server(ThreadingHTTPServer):
         self.server_close()
 
     def question(self, body: Mapping[str, Any]) -> ExploredConfig:
-        """Parse a request body; TypeError if it is malformed."""
+        """Read the requested config from a request body; TypeError if the body is malformed."""
         known = walks.WALK_STAGES.keys()
         changes, models = body.get("set", {}), body.get("models", list(known))
         if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= known:
@@ -142,7 +142,7 @@ class Server(ThreadingHTTPServer):
         return replace(question, config=config_name, sets=())
 
     def answer(self, path: str, body: Mapping[str, Any]) -> Answered:
-        """Answer a POST request; TypeError if it is malformed."""
+        """Answer a POST request; TypeError if its body is malformed."""
         question = self.question(body)
         if path == "/api/walk":
             return self.desk.ask(partial(walks.walk, question))
@@ -176,7 +176,7 @@ def save(question: ExploredConfig, name: Any) -> Answered:
 
 
 class Handler(BaseHTTPRequestHandler):
-    """Handles one request."""
+    """Handles one HTTP request."""
 
     server: Server
     timeout = 60
@@ -200,7 +200,7 @@ class Handler(BaseHTTPRequestHandler):
             file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
             if address.path.startswith("/runs/") and file.is_relative_to(runs) and file.is_file():
                 return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
-        except (ValueError, OSError):  # no address, or none that can be read
+        except (ValueError, OSError):  # malformed address, or unreadable file
             pass
         return self.answer(*failure(404, f"there is no {self.path}"))
 
@@ -217,7 +217,7 @@ class Handler(BaseHTTPRequestHandler):
             self.answer(*failure(400, f"a request is JSON: {form}; `config`, if given, must be one of the page's"))
 
     def local(self) -> bool:
-        """Whether the request comes from this server's own page; otherwise answer 403."""
+        """Return whether the request comes from this server's own page; if not, send status 403."""
         own = f"http://{self.server.host}"
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
             return True
@@ -225,7 +225,7 @@ class Handler(BaseHTTPRequestHandler):
         return False
 
     def cookie(self) -> str:
-        """Return the token in this server's cookie; each server on a machine has its own."""
+        """Return the token from this server's cookie; its name contains the port, so that servers do not share it."""
         parts = dict(part.partition("=")[::2] for part in self.headers.get("Cookie", "").split("; "))
         return parts.get(self.server.cookie, "")
 
@@ -233,7 +233,7 @@ class Handler(BaseHTTPRequestHandler):
         return self.headers.get("Authorization", "").removeprefix("Bearer ")
 
     def allowed(self, token: str) -> bool:
-        """Whether the token is right; otherwise answer 401."""
+        """Return whether the token is right; if not, send status 401."""
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))
@@ -246,15 +246,15 @@ class Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         headers = {"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"}
         if status == 200 and "text/html" in kind:
-            # The links of a report, to its other pages, carry no token.
+            # Links between the pages of a report carry no token.
             headers["Set-Cookie"] = f"{self.server.cookie}={self.server.token}; HttpOnly; SameSite=Strict"
         if policy:
             headers["Content-Security-Policy"] = policy
         for name, value in headers.items():
             self.send_header(name, value)
-        with contextlib.suppress(ConnectionError):  # whoever asked has left the page
+        with contextlib.suppress(ConnectionError):  # the page may have been closed
             self.end_headers()
             self.wfile.write(body)
 
     def log_message(self, *_: object) -> None:
-        """Do not log single requests."""
+        """Do not log requests."""

@@ -1,4 +1,4 @@
-"""Answers computed in the worker: stage summaries, and motions to draw."""
+"""Answers computed in a worker: summaries of stages, and motions to draw."""
 
 import json
 import shlex
@@ -36,17 +36,17 @@ GIVE_WAY = signal.SIGUSR1
 
 
 class SupersededError(BaseException):
-    """A newer request waits. A BaseException, so that no handler mistakes it for a failure."""
+    """Raised when a newer request waits; a BaseException, so that no handler mistakes it for a failure."""
 
 
 class GivingWay(Silent):
-    """Progress that abandons a request between two gaits once a newer one waits.
+    """Progress that abandons a request once a newer one waits, but only between two gaits.
 
-    Nowhere else: what a signal interrupts where it arrives, such as an import, may stay half done.
+    Acting on the signal wherever it arrives might interrupt an import halfway.
     """
 
     def __init__(self) -> None:
-        """Install the handler for superseding requests."""
+        """Install the handler of the signal that announces a newer request."""
         self._superseded = False
         signal.signal(GIVE_WAY, self._give_way)
 
@@ -63,12 +63,12 @@ class GivingWay(Silent):
 class ExploredConfig:
     """A config with changes."""
 
-    config: str | None  # as `--config` has it
-    sets: tuple[str, ...]  # as `--set` has them
-    runs: Path  # the folder of all runs
-    changes: Mapping[str, Any]  # values by key, over the sets
-    models: Sequence[str] = ()  # those that walk
-    called: str | None = None  # as the page calls it; None is the config's name
+    config: str | None  # value of `--config`
+    sets: tuple[str, ...]  # values of `--set`
+    runs: Path  # folder of all runs
+    changes: Mapping[str, Any]  # values by key, applied after `sets`
+    models: Sequence[str] = ()  # models that walk
+    called: str | None = None  # name on the page; None for the config's own name
 
     @property
     def options(self) -> list[str]:
@@ -78,7 +78,7 @@ class ExploredConfig:
 
     @property
     def all_sets(self) -> list[str]:
-        """All changes in the form of `--set`."""
+        """All changes of the config in the form of `--set`."""
         plain = {key: value if isinstance(value, str) else json.dumps(value) for key, value in self.changes.items()}
         return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
 
@@ -88,7 +88,7 @@ class ExploredConfig:
         return resolve(self.config, self.all_sets, None, self.runs).loaded
 
     def refusal(self, error: WalkerlabError) -> Answered:
-        """Describe why the config is invalid, naming the change responsible if it can be identified."""
+        """Describe why the config is invalid, and name the change responsible if it can be identified."""
         key = next((key for key in self.changes if key in error.message), next(iter(self.changes), None))
         value = None if key is None else self.changes[key]
         return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
@@ -103,7 +103,7 @@ def sets_of(config: Config) -> tuple[str, ...]:
 
 @cache
 def memory() -> MemoryResults:
-    """Results of earlier requests in this process."""
+    """Return the store for the results of earlier requests in this process."""
     return MemoryResults()
 
 
@@ -113,7 +113,7 @@ def walk(question: ExploredConfig) -> Answered:
         loaded = question.loaded
         config = loaded.config
         wanted = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
-        # The walks first: they leave the gait behind, and it is then there without being sought again.
+        # Compute the walks first: they store the gait, so that it need not be found again.
         with kernel_cache.watch_compilation(tell):
             answers = {
                 stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")
@@ -150,7 +150,7 @@ def numbers(question: ExploredConfig) -> Answered:
 def along(question: ExploredConfig) -> Answered:
     """Follow gaits over one key: values, quantities and stability along each model's branches.
 
-    The question's changes hold the block `continuation`: key, ends and points. Status 409 if a newer question came.
+    The request's changes contain the block `continuation`: key, ends and points. Status 409 if a newer request came.
     """
     try:
         config = question.loaded.config
@@ -159,20 +159,20 @@ def along(question: ExploredConfig) -> Answered:
         return question.refusal(error)
     except SupersededError:
         return SUPERSEDED
-    # the steps of an attractor have periods, but they are no branch
+    # skip attractors, which have step periods but are no branches
     branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
     curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}
 
 
 def walkable(branch: Group) -> bool:
-    """Whether on any gait of a branch the ground never has to pull."""
+    """Whether a branch has a gait in which the ground never has to pull."""
     forces = branch.variables.get("min_normal_force_N")
     return forces is None or bool((forces.values > 0.0).any())
 
 
 def curve(branch: Group) -> dict[str, list[Any]]:
-    """Return the quantities along a branch, from each gait's first step."""
+    """Return quantities along a branch, from the first step of each gait."""
     period, length = branch["step_period"][:, 0], branch["step_length"][:, 0]
     multipliers = abs(branch["multiplier_real"] + 1j * branch["multiplier_imag"]).max(axis=1)
     found = {
@@ -185,7 +185,7 @@ def curve(branch: Group) -> dict[str, list[Any]]:
 def config_text(question: ExploredConfig, name: str) -> str:
     """Write the config as YAML that extends its starting point and lists only differences; ConfigError.
 
-    It says all where nothing can be extended: for a walker of another type than the paper's that no file holds.
+    If the starting point has another type of walker, the whole config is written.
     """
     start, named = config_to_extend(question.config), replace(question, changes={**question.changes, "name": name})
     base, changed = load(Path(start)).config, named.loaded.config

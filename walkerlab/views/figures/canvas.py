@@ -1,4 +1,4 @@
-"""Blank figures, and reproducible files of finished figures."""
+"""Set up and lay out figures, and write them to reproducible files."""
 
 import contextlib
 import io
@@ -24,14 +24,14 @@ from walkerlab.labels import with_unit
 from walkerlab.views.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
 
 FILLS = 0.95
-"""Maximum fraction of the available width for a legend, title or label."""
+"""Maximum fraction of the available width that a legend, title or label fills."""
 ROWS = 3
-"""Legend rows that fit in a figure's nominal height; longer legends make it taller."""
+"""Legend rows that fit in a figure's nominal height; longer legends make the figure taller."""
 SHRINKS = 0.7
-"""Exponent that relates a figure's height to its width; letters keep their size."""
+"""Exponent that relates a figure's height to its width; below 1, since text shrinks less than the figure."""
 
 BETWEEN_DECADES: Final = ((15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Multiples of powers of ten that are labelled on axes spanning less than this factor."""
+"""Largest ratio of an axis's limits, and the multiples of powers of ten to label below that ratio."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 LONGEST: Final = 1e4
 """Largest number written without an exponent."""
@@ -39,7 +39,7 @@ LONGEST: Final = 1e4
 
 @contextlib.contextmanager
 def styled(width: float = WIDTH) -> Iterator[None]:
-    """Apply the project's style whatever the user's settings; figures are `width` inches wide."""
+    """Apply the project's style, ignoring the user's matplotlib settings; figures are `width` inches wide."""
     size = {"figure.figsize": (width, width)}
     with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
         yield
@@ -50,7 +50,7 @@ def is_narrow() -> bool:
 
 
 def blank(height: float) -> Figure:
-    """Create a figure of the style's width and `height` (inches); narrower figures are shrunk less in height."""
+    """Create a figure of the style's width; `height` (in) is for the default width and shrinks less than the width."""
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = Figure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
@@ -67,7 +67,7 @@ def label_of(words: str, unit: str) -> str:
 
 
 def label_ticks(axis: Axis) -> None:
-    """Label a logarithmic axis at as many decades as fit, and between decades where there are few."""
+    """Label as many decades of a logarithmic axis as fit, and values between them if the axis spans few."""
     least, last = axis.get_view_interval()
     between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, LONGEST)), ())
     axis.set_major_locator(LogLocator(subs=(1.0, *between)))
@@ -82,7 +82,7 @@ def error_axis(axes: Axes) -> None:
 
 
 def cost_axis(axes: Axes) -> None:
-    """Make the horizontal axis logarithmic; an empty panel says that it is empty."""
+    """Make the horizontal axis logarithmic; on an empty panel, write that no run reached the end."""
     if np.isfinite(axes.dataLim.intervalx).all():
         axes.set_xscale("log")
         label_ticks(axes.xaxis)
@@ -91,7 +91,7 @@ def cost_axis(axes: Axes) -> None:
 
 
 def power_of_ten(value: float, _place: float | None = None) -> str:
-    """Format a power of ten as an axis label, with signs large enough to read on a page."""
+    """Format a power of ten as an axis label, with superscripts large enough to read on a page."""
     return "10" + str(round(math.log10(value))).translate(RAISED)
 
 
@@ -100,7 +100,7 @@ def entry(label: str, **look: Any) -> Line2D:
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = None, edge: str = "upper") -> None:
-    """Draw a legend above all axes (`edge` "lower": below), in as few rows as fit."""
+    """Draw a legend above all axes, or below them if `edge` is "lower", in as few rows as fit."""
     where: dict[str, Any] = {"title": title, "alignment": "left", "loc": f"outside {edge} center"}
     for rows in range(1, len(handles) + 1):
         legend = figure.legend(handles=list(handles), ncols=-(-len(handles) // rows), **where)
@@ -112,12 +112,12 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
 
 
 def settle(figure: Figure) -> None:
-    """Lay the figure out once, so that all its files show the same drawing."""
+    """Lay the figure out once, so that all its files look the same."""
     engine = figure.get_layout_engine()
     assert engine is not None, "a figure is laid out once"
     engine.execute(figure)
     break_lines(figure)
-    # only now do labels have their lines, and axes of equal scales the size that they are left with
+    # wrapped labels and axes of equal scale change the layout, so compute it again
     engine.execute(figure)
     figure.set_layout_engine(None)
 
@@ -139,7 +139,7 @@ OF_PIXELS = ("png", "tiff")
 
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
-    """Return the figure in a format (SVG text stays text); `name` makes its ids unique among figures."""
+    """Return the figure as a file of one kind; `name` makes the ids in an SVG unique among figures."""
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
         "png": {"metadata": {"Software": None, "Title": title}},
@@ -155,7 +155,7 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
 
 @dataclass(frozen=True)
 class Drawing:
-    """The files of a figure as bytes, with its texts."""
+    """A figure's files as bytes, with its title and caption."""
 
     svg: bytes
     png: bytes
@@ -166,6 +166,6 @@ class Drawing:
 def files_of(
     figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
 ) -> list[bytes]:
-    """Plot a figure in the project's style, lay it out, and return a file of each kind."""
+    """Lay out a figure and return a file of each kind; `name` makes SVG ids unique among figures."""
     settle(figure)
     return [as_file(figure, kind, name, title, dpi) for kind in kinds]

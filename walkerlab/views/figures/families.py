@@ -1,4 +1,4 @@
-"""Figures of families of gaits: 13 bifurcation diagram, 14 multipliers, 16 regions in the plane of two parameters."""
+"""Figures of families of gaits: 13 (bifurcations), 14 (multipliers) and 16 (regions in a plane of two parameters)."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ NEED: Final = Need(STAGE, "branches", ("model", "period", "from", "to"), "no bra
 MODELS: Final = {"rigid": BLUE, "contact": ORANGE}
 MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
-FROM_FLIP: Final = 16  # points drawn from a flip to the first gait that is born there
+FROM_FLIP: Final = 16  # points plotted between a flip and the first gait computed on the branch that starts there
 OTHER_GAITS: Final = GREEN
-"""Colours of gaits outside the cascade of the one-step gait."""
+"""Colour of gaits outside the period-doubling cascade of the one-step gait."""
 
 
 @dataclass(frozen=True)
 class DrawnBranch:
-    """A branch (or a curve over two parameters) with its model."""
+    """A branch of gaits, or a bifurcation curve over two parameters, with its model."""
 
     model: str
     group: Group
@@ -48,13 +48,13 @@ class DrawnBranch:
 
     @property
     def colour(self) -> str:
-        """Colour of the model; gaits outside the one-step gait and its cascade have their own colours."""
+        """Colour of the model, or `OTHER_GAITS` if the period is not a power of two."""
         period = self.period
         return MODELS[self.model] if period & (period - 1) == 0 else OTHER_GAITS
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
-    """Return all branches, or all curves, in the order in which they were followed."""
+    """Yield all branches, or all curves, of each model in the order in which they were followed."""
     groups = results[STAGE].groups
     for model in MODELS:
         for number in count():
@@ -64,23 +64,23 @@ def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]
 
 
 def parameter_of(results: Results) -> str:
-    """Axis label of the parameter, with its unit."""
+    """Return the axis label of the parameter, with its unit."""
     summary = results[STAGE].summary
     return label_of(axis_label(str(summary["over"])), str(summary["unit"]))
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A quantity of every step along a branch, including its bifurcations."""
+    """A quantity of every step along a branch, with the branch's bifurcations."""
 
-    value: NDArray[np.float64]  # (points,) of the parameter
-    quantity: NDArray[np.float64]  # (points, steps)
-    stable: NDArray[np.bool_]  # (points - 1,) whether the gaits between neighbours are
-    marks: tuple[tuple[int, str], ...]  # where the bifurcations are, and of which kind
+    value: NDArray[np.float64]  # (points,) parameter values
+    quantity: NDArray[np.float64]  # (points, steps) values of the quantity
+    stable: NDArray[np.bool_]  # (points - 1,) whether the gaits between neighbouring points are stable
+    marks: tuple[tuple[int, str], ...]  # index and kind of each bifurcation
 
 
 def curve_of(group: Group, name: str) -> Curve:
-    """Sample a quantity along a branch; stability changes at bifurcations, otherwise halfway between neighbours."""
+    """Read a quantity along a branch and at its bifurcations; a stretch between two points is stable if both are."""
     value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
     if "mark_after" not in group.variables:
         return Curve(value, quantity, stable[:-1] & stable[1:], ())
@@ -88,7 +88,7 @@ def curve_of(group: Group, name: str) -> Curve:
     places = group["mark_after"].astype(int)[order] + 1
     value = np.insert(value, places, group["mark_value"][order])
     quantity = np.insert(quantity, places, group[f"mark_{name}"][order], axis=0)
-    # a bifurcation bounds what is stable and what is not
+    # a bifurcation counts as stable, so that stable stretches reach up to it
     known, on_mark = np.insert(stable, places, True), np.insert(np.zeros(stable.size, bool), places, True)
     between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
     marks = zip(np.flatnonzero(on_mark).tolist(), group["mark_kind"][order].astype(str).tolist(), strict=True)
@@ -96,7 +96,7 @@ def curve_of(group: Group, name: str) -> Curve:
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step, solid where stable, with bifurcations; return the kinds of these."""
+    """Plot a quantity of every step, solid where stable, with bifurcations; return the kinds of the bifurcations."""
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
     bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]
@@ -116,8 +116,8 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the parameter values and quantities to plot between two points of a branch."""
-    # near the flip in which a branch begins, quantities separate as the root of the distance from the flip
+    """Return the parameter values and quantities to plot between two points of a branch, given by index."""
+    # from the flip at which a branch begins, the steps' values separate as the square root of the distance
     value, quantity = curve.value[begin : end + 1], curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
         return value, quantity
@@ -134,17 +134,17 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
 
 QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
-"""Margin around the stable gaits, relative to their span; unstable branches are cut there."""
+"""Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
 LEAST: Final = 0.05
-"""Minimum width of the bifurcation panel relative to the span, and minimum span of an axis relative to its values."""
+"""Minimum width of the bifurcation panel relative to the full range, and of a vertical axis relative to its values."""
 TOLD_APART: Final = 0.04
-"""Minimum distance between birth labels, relative to the axis."""
+"""Minimum distance between the labels of fold-born gaits, relative to the axis."""
 POINTS_BETWEEN: Final = 16
-"""Points between two branch points, to find extremes of a quantity and to draw multipliers."""
+"""Sampling points per interval of a branch, to find the extremes of a quantity and to plot multipliers."""
 
 
 def draw_branches(results: Results) -> Drawn:
-    """Plot both quantities over the full range (left) and, if there are bifurcations, around them (right)."""
+    """Plot step period and stance angle over the full range (left) and around the bifurcations, if any (right)."""
     summary = results[STAGE].summary
     branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
     parts = {"(a) full range": None} | ({"(b) bifurcations": close} if close else {})
@@ -185,7 +185,7 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """Find position and number of steps of fold-born gaits; of several too close to distinguish, the shortest."""
+    """List parameter value and steps of the gaits born in folds; of gaits too close to label, only the shortest."""
     folds = [
         (branch.period, float(curve.value[place]))
         for branch in branches
@@ -203,7 +203,7 @@ def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> li
 
 
 def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
-    """Label fold-born gaits above the axes, since some of their windows are as thin as a line."""
+    """Label gaits born in folds above the axes, since some of their windows are as thin as a line."""
     if births:
         above = axes.secondary_xaxis("top")
         above.set_xticks([value for value, _ in births], [str(period) for _, period in births])
@@ -211,7 +211,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
-    """Return the range with bifurcations, from just before the first to the end of the attractor."""
+    """Return the range around the bifurcations, up to the end of the attractor; None without bifurcations."""
     summary = results[STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]
     if not found:
@@ -223,7 +223,7 @@ def close_of(results: Results) -> tuple[float, float] | None:
 
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
-    """Set the limits so that stable gaits and one-step gaits fit in the range shown."""
+    """Return axis limits that fit the stable gaits in the range shown and, over the full range, all one-step gaits."""
     shown: list[NDArray[Any]] = [cloud[name].ravel() for _, cloud in clouds(results)]
     for branch in branches_of(results):
         curve = curve_of(branch.group, name)
@@ -241,7 +241,7 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
 
 
 def finely(along: NDArray[Any]) -> NDArray[np.float64]:
-    """Interpolate values known at the points of a branch to further points between them."""
+    """Interpolate values at the points of a branch, with `POINTS_BETWEEN` points per interval."""
     # Imported here: no other figure needs it.
     from scipy.interpolate import PchipInterpolator
 
@@ -253,8 +253,8 @@ def finely(along: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
-    """Sample the multipliers along a branch finely, (points, multipliers), largest first."""
-    # between points their polynomial is interpolated: where two multipliers meet, they turn as roots do
+    """Return densely sampled multipliers along a branch (points, multipliers), largest first."""
+    # interpolate the coefficients of their polynomial: the multipliers themselves have kinks where two of them meet
     known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
     found = np.array([np.roots(row) for row in finely(np.array([np.poly(row).real for row in known]))])
     return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
@@ -269,10 +269,10 @@ GAITS: Final[dict[str, tuple[dict[str, Any], ...]]] = {
     ),
     "contact": ({"color": ORANGE}, {"color": VERMILLION, "linestyle": "--"}, {"color": GREY, "linestyle": "-."}),
 }
-"""Line styles of a model's one-step gaits, in the order in which they were found."""
+"""Line styles of each model's one-step gaits, in the order in which they were found."""
 DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
 FARTHEST: Final = 1.6
-"""Half-width of the complex plane shown; multipliers of unstable gaits may lie far outside."""
+"""Half-width of the visible part of the complex plane; multipliers of unstable gaits may lie far outside."""
 
 
 def draw_multipliers(results: Results) -> Drawn:
@@ -317,7 +317,7 @@ OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
 
 def draw_plane(results: Results) -> Drawn:
-    """Plot regions by attractor, and every bifurcation curve over them, by model, kind and period."""
+    """Colour the plane by attractor, and plot the bifurcation curves over it, styled by model, kind and period."""
     figure, axes = panels(4.4)
     regions = results[STAGE].groups.get("rigid/regions")
     key: list[Artist] = []
@@ -342,7 +342,7 @@ def draw_plane(results: Results) -> Drawn:
 
 
 def region_kinds(regions: Group) -> list[Kind]:
-    """Return colour, name and cells of each attractor that occurs."""
+    """Return colour, name and cells of each kind of attractor that occurs."""
     period = regions["period"]
     other = (period > 0) & ~np.isin(period, list(DOUBLED))
     kinds = [(colour, f"{n} step{'s' if n > 1 else ''}", period == n) for n, colour in DOUBLED.items()]

@@ -1,4 +1,4 @@
-"""Figures of ground forces, compared with the friction cone, and of the energy lost per step, by cause."""
+"""Figures of ground forces, with the friction cone, and of the energy lost in each step, by cause."""
 
 from typing import Any, Final
 
@@ -30,27 +30,27 @@ DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOST, TOTAL), NO_ENERGIES)
 STRIDES, STEPS = 2, 40
-"""Steps shown of forces (few enough to tell impacts apart) and of energies."""
+"""Strides shown of the forces (few enough to tell impacts apart), and steps shown of the energy losses."""
 OF_SAMPLES: Final = 0.99
-"""Fraction of loaded samples in view: an impact's force is many times the weight."""
+"""Fraction of the loaded samples that is in view; impact forces are many times the weight."""
 NOTHING: Final = 1e-3
 """Fraction of the energy lost below which a cause is not drawn."""
 
 
 def draw_forces(results: Results) -> Drawn:
-    """Plot both forces over time (left) and against each other (right)."""
+    """Plot normal force and friction over time (left) and against each other, with the friction cone (right)."""
     result = results[CONTACT_STAGE]
     whole = walk_of(result, CONTACT)
     walk, every = whole.first(STRIDES), whole[NORMAL]
     loads, pulls = walk[NORMAL], walk[FRICTION]
-    # the normal force (N) up to which it is shown
+    # upper limit of the normal-force axis (N)
     top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
     figure = blank(4.4)
     parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
     normal, friction, cone = parts["normal"], parts["friction"], parts["cone"]
     key: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
     steepest = 0.0
-    # no cone where no foot feels any friction
+    # draw no cone if there is no friction
     for name, style in (("static", "-"), ("dynamic", "--")) if result[TRAJECTORY][FRICTION].any() else ():
         coefficient = float(result.identity.config_slice["contact"][f"{name}_friction"])
         bound: dict[str, Any] = {"color": BLACK, "linewidth": 1.0, "linestyle": style}
@@ -83,8 +83,8 @@ def draw_forces(results: Results) -> Drawn:
 
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
-    """Return the energy (J) lost per step, by cause and colour; the knees account for the rest."""
-    # the last samples before touches: an impact falls between two samples, and is not to be divided among two steps
+    """Return the energy (J) lost in each step by cause (label, colour); the rest is attributed to the knees."""
+    # take the last sample before each touchdown: an impact then counts entirely towards the step that it starts
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOST.items()}
     given = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
@@ -94,7 +94,7 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
 
 
 def draw_losses(results: Results) -> Drawn:
-    """Plot a stacked bar per step; the caption says how much a step loses (J), and to what."""
+    """Plot a stacked bar per step; the caption gives the mean loss (J) by cause, leaving out the first step."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
     figure, axes = panels(2.9)
     steps = np.arange(1, 1 + min(STEPS, next(iter(found.values())).size))

@@ -1,4 +1,4 @@
-"""Figures of an identified walk: its steps, residuals, trade-off of parameters, and worth of the measurements."""
+"""Figures of an identified walk: steps, residuals, trade-off of parameters, and the information in each measurement."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ TWO_SIGMA: Final = 2.0
 STEP_PANEL_HEIGHT: Final = 1.7
 MEASURED: Final = "measured_"
 LEG_LOOKS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
-MAX_RESIDUALS: Final = 4000  # residuals drawn of each leg
-PHASE_INTERVALS: Final = 25  # intervals of the step's phase, each with the mean residual
-LEADING: Final = 0.1  # share of a combination's largest change, from which a parameter is named
+MAX_RESIDUALS: Final = 4000  # approximate number of residuals plotted for each leg
+PHASE_INTERVALS: Final = 25  # intervals of the step's phase over which residuals are averaged
+LEADING: Final = 0.1  # smallest change, relative to the largest one in a combination, at which a parameter is named
 
 
 def quantities(steps: Group) -> list[str]:
-    """Return the measured quantities: period, length, angle."""
+    """Return the names of the measured quantities: period, length, angle."""
     return sorted((name.removeprefix(MEASURED) for name in steps.variables if name.startswith(MEASURED)), reverse=True)
 
 
@@ -39,7 +39,7 @@ def axis_name(quantity: str) -> str:
 
 
 def draw_steps(results: Results) -> Drawn:
-    """Plot measured steps over predicted ones; caption: number of steps and the share inside the bands."""
+    """Plot measured steps over predicted ones; the caption gives their number and the fraction inside the bands."""
     steps = results[IDENTIFY_STAGE].groups["steps"]
     names, number = quantities(steps), 1 + steps["step"]
     figure, axes = panels(0.6 + STEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
@@ -60,7 +60,7 @@ def draw_steps(results: Results) -> Drawn:
 
 
 def draw_residuals(results: Results) -> Drawn:
-    """Plot residuals per step, and of angles in phase; caption: number of steps, whether angles are among them."""
+    """Plot the residuals of each step and, if angles were measured, of the angles over the phase of the step."""
     groups = results[IDENTIFY_STAGE].groups
     steps, samples = groups["steps"], groups.get("samples")
     names, number = quantities(steps), 1 + steps["step"]
@@ -79,7 +79,7 @@ def draw_residuals(results: Results) -> Drawn:
 
 
 def draw_residuals_in_phase(panel: Axes, samples: Group) -> None:
-    """Plot the residuals of the angles over the phase of the step, with the mean of each interval."""
+    """Plot the residuals of the angles over the phase of the step, with their mean in each interval."""
     phase, residual = samples["phase"], 1e3 * samples["residual_rad"]
     every, bins = (
         max(1, phase.size // MAX_RESIDUALS),
@@ -97,7 +97,7 @@ def draw_residuals_in_phase(panel: Axes, samples: Group) -> None:
 
 
 def draw_trade_off(results: Results) -> Drawn:
-    """Plot the 95 % region of the two worst-determined combinations over the two parameters that show it best."""
+    """Plot the 95 % region of the two worst-determined combinations, over the two parameters that show it best."""
     rows, freedom = (results[IDENTIFY_STAGE].summary[name] for name in ("estimates", "degrees_of_freedom"))
     semi_axis = semi_axis_of_region(freedom)
     moves, values = results[IDENTIFY_STAGE].groups["worst"]["moves"], np.array([row["value"] for row in rows])
@@ -122,12 +122,12 @@ def draw_trade_off(results: Results) -> Drawn:
 
 
 def semi_axis_of_region(freedom: float) -> float:
-    """Return the semi-axis of the 95 % region of two parameters, in standard errors: sqrt(2 F) of 2 and `freedom`."""
+    """Return the semi-axis (standard errors) of a 95 % region of two parameters: sqrt(2 F), F(2, `freedom`) at 95 %."""
     return math.sqrt(freedom * math.expm1(-2.0 / freedom * math.log(0.05)))
 
 
 def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str:
-    """Say how far the leading parameters move together, as in 'slope + 25 %, foot radius − 19 %'."""
+    """Describe how the leading parameters change together, as in 'slope + 25 %, foot radius − 19 %'."""
     sizes = [move / (abs(row["value"]) or 1.0) for row, move in zip(rows, move.tolist(), strict=True)]
     largest = max(sizes, key=abs)
     parts = []
@@ -139,7 +139,7 @@ def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str
 
 
 def draw_worth(results: Results) -> Drawn:
-    """Plot the information that would be lost without each measured quantity; caption: the one worth most."""
+    """Plot the information lost without each measured quantity; the caption names the most informative one."""
     shares = results[IDENTIFY_STAGE].summary["contributions"]
     names = [name.rpartition("_")[0].replace("_", " ") for name in shares]
     figure, axes = panels(0.9 + 0.35 * len(names))

@@ -23,16 +23,16 @@ Draw = Callable[[Results], Drawn]
 
 @dataclass(frozen=True)
 class Need:
-    """Variables that a drawing requires of a stage's result, and the scene whose reference it requires."""
+    """Variables that a figure needs from a stage's result, and optionally a scene whose reference it needs."""
 
     stage: str
     group: str
     variables: tuple[str, ...]
-    or_else: str  # reason, as text, for which a result may lack them
+    or_else: str  # reason to report if the result lacks them
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why the requirement is not met, or None; `absent`: why results are not there, by stage."""
+        """Return why the requirement is not met, or None; `absent`: reason for each missing result, by stage."""
         if self.stage not in results:
             why = absent.get(self.stage)
             return f"it needs {self.stage}" + (f": {why}" if why else "")
@@ -47,12 +47,12 @@ class Need:
 class Illustration:
     """An illustration drawn from stored results."""
 
-    name: str  # of its files, without suffix
-    needs: tuple[Need, ...]  # what it cannot be drawn without; what else is there is drawn too
-    draw: Draw  # the figure, and what the caption's template takes of the results; called within the common style
-    number: int | None = None  # the paper's; None if the paper has no such figure
-    words: str = ""  # file in `words/` with its title, its caption and what one sees; the figure's name if empty
-    scene: str = ""  # what those words are about, if a file serves several figures
+    name: str  # file name without suffix
+    needs: tuple[Need, ...]  # results without which it cannot be drawn; other results are drawn if available
+    draw: Draw  # draws the figure and returns it with the caption's arguments; called within the common style
+    number: int | None = None  # number in the paper; None if the paper has no such figure
+    words: str = ""  # file in `words/` with title, caption and text alternative; default: the figure's name
+    scene: str = ""  # first argument of the templates, if one file serves several figures
 
     def say(self, what: str, *values: Any) -> str:
         return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)
@@ -63,7 +63,7 @@ class Illustration:
 
     @property
     def alt_text(self) -> str:
-        """Text alternative in one or two sentences; may be empty."""
+        """Text alternative of one or two sentences; may be empty."""
         return self.say("seen")
 
     def caption(self, results: Results) -> str:
@@ -79,24 +79,24 @@ class Illustration:
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why the illustration cannot be drawn, or None; `absent`: why results are not there, by stage."""
+        """Return why the illustration cannot be drawn, or None; `absent`: reason for each missing result, by stage."""
         reasons = (need.missing_in(results, absent) for need in self.needs)
         return next((reason for reason in reasons if reason is not None), None)
 
     @property
     def heading(self) -> str:
-        """Title with the paper's figure number."""
+        """Title, preceded by the paper's figure number if it has one."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
     def render(self, results: Results) -> Drawing:
-        """Draw the files and texts; equal results give equal bytes."""
+        """Return the files and texts; equal results give equal bytes."""
         with styled():
             figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)
         return Drawing(svg, png, self.title, self.say("caption", *caption_values))
 
     def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
-        """Return the figure in a format and width (pt); raster parts use `dpi`."""
+        """Return the figure as a file of the given kind and width (pt); raster parts use `dpi`."""
         with styled(POINT * width):
             return files_of(self.draw(results)[0], self.name, self.heading, [kind], dpi)[0]
 

@@ -1,4 +1,4 @@
-"""Maps of cells: figure 11 (starts that walk), figure 15 (basins of attraction), and where methods are reliable."""
+"""Maps of cells: figure 11 (starts that walk), figure 15 (basins of attraction), and the reliability of methods."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from walkerlab.views.figures.walks import TUNE_STAGE, claims_in, redoes_the_proc
 WHITE: Final = "#FFFFFF"
 SKY: Final = "#56B4E9"
 LOG_SPAN: Final = 50.0
-"""Ratio of largest to smallest value from which evenly spaced powers get a logarithmic axis."""
+"""Ratio of largest to smallest value above which geometrically spaced values get a logarithmic axis."""
 Kind = tuple[str, str, NDArray[np.bool_]]
-"""Kinds of cells: colour, label, and which cells."""
+"""A kind of cell: colour, label, and mask of the cells."""
 
 
 def discrete(colours: Sequence[str]) -> dict[str, Any]:
-    """Return the colour map and norm that give integers from 0 their colours."""
+    """Return a colour map and norm that assign the colours to the integers 0, 1, ... in order."""
     return {
         "cmap": ListedColormap(list(colours)),
         "norm": BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours)),
@@ -39,7 +39,7 @@ def discrete(colours: Sequence[str]) -> dict[str, Any]:
 
 
 def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
-    """Draw each cell in the colour of its kind with `draw`; return the legend entries."""
+    """Draw each cell in the colour of its kind, using `draw`; return the legend entries."""
     draw(np.argmax(np.array([where for _, _, where in kinds]), axis=0), **discrete([colour for colour, *_ in kinds]))
     return patches((colour, label) for colour, label, _ in kinds)
 
@@ -49,12 +49,12 @@ def patches(kinds: Iterable[tuple[str, str]]) -> list[Artist]:
 
 
 def ends_among(outcomes: Any) -> list[tuple[str, str]]:
-    """Return colours and labels of the outcomes that occur."""
+    """Return colour and label of each outcome that occurs."""
     return [(OUTCOME_TEXTS[item].colour, item.label) for item in map(Outcome, np.unique(outcomes).tolist())]
 
 
 def edges(centres: NDArray[Any]) -> NDArray[Any]:
-    """Return the cell edges, halfway between neighbouring values on their own scale."""
+    """Return cell edges halfway between neighbouring values (geometric mean if the values are spaced geometrically)."""
     scale = np.log(centres) if is_logarithmic(centres) else centres
     if scale.size == 1:
         found = np.array([scale[0] - 0.5, scale[0] + 0.5])
@@ -65,7 +65,7 @@ def edges(centres: NDArray[Any]) -> NDArray[Any]:
 
 
 def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
-    """Whether values are evenly spaced powers that span a wide enough range."""
+    """Whether the values are spaced geometrically and the largest is at least `span` times the smallest."""
     if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < span:
         return False
     gaps, plain = np.diff(np.log(np.sort(values))), np.diff(np.sort(values))
@@ -88,7 +88,7 @@ STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 
 def draw_starts(results: Results) -> Drawn:
-    """Plot both models' maps on equal axes, coloured by outcome, with contours of more steps."""
+    """Plot the starts for both models on equal axes, coloured by outcome, with contours of the number of steps."""
     cells, summary = results[TUNE_STAGE]["map"], results[TUNE_STAGE].summary
     across, up = cells[SWING], cells[STANCE]
     marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
@@ -126,11 +126,11 @@ NO_ATTRACTOR: Final = -1
 
 
 def draw_basins(results: Results) -> Drawn:
-    """Plot attractors and failures by colour (left) and steps to settle by brightness (right)."""
+    """Plot attractors and failures by colour (left), and the number of steps to settle by brightness (right)."""
     summary, cells = results[BASIN].summary, results[BASIN]["basin"]
     plane = [str(name) for name in summary["plane"][:2]]
     xlim, ylim = (sides_of(cells[name]) for name in plane)
-    # of a grid over three coordinates, the middle plane
+    # show the middle plane of a grid over three coordinates
     shown = {name: cells[name] if cells[name].ndim == 2 else cells[name][:, :, cells[name].shape[2] // 2]
              for name in ("outcome", "attractor", "steps_to_settle")}  # fmt: skip
 
@@ -141,7 +141,7 @@ def draw_basins(results: Results) -> Drawn:
     figure, (left, right) = panels(3.9, 1, 2, sharex=True, sharey=True)
     key = draw_kinds(partial(draw, left), fates(shown["outcome"], shown["attractor"], summary))
     left.set_title("(a) outcome")
-    # on a scale of powers what has settled from its first step on has the colour of one step
+    # a logarithmic scale has no zero, so walks that are settled from the start get the colour of one step
     settled = np.ma.masked_where(shown["attractor"] == NO_ATTRACTOR, shown["steps_to_settle"].clip(min=1))
     right.set_title("(b) steps to the attractor")
     if settled.count():
@@ -165,13 +165,13 @@ def draw_basins(results: Results) -> Drawn:
 
 
 def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the outer edges of a row of cells with these centres."""
+    """Return the outer edges of a row of evenly spaced cells with these centres."""
     half = 0.5 * float(middles[1] - middles[0])
     return float(middles[0]) - half, float(middles[-1]) + half
 
 
 def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, Any]) -> list[Kind]:
-    """Return the kinds of attractors and failures that occur."""
+    """Return the kinds of cells that occur: attractors, walks that do not settle, and failures."""
     attractors = summary["attractors"]
     kinds: list[Kind] = [
         (ATTRACTORS[number % len(ATTRACTORS)], attractor_name(number, attractors), attractor == number)
@@ -187,7 +187,7 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
 
 
 def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
-    """Label an attractor by its period, with a letter where several share it."""
+    """Label an attractor by its period, and by a letter if several have the same period."""
     period = attractors[number]["period"]
     same = [other for other, row in enumerate(attractors) if row["period"] == period]
     letter = f" ({'abcdefghijklmnopqrstuvwxyz'[same.index(number) % 26]})" if len(same) > 1 else ""
@@ -198,7 +198,7 @@ MAPS: Final = "stability-maps"
 STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
 _LAW: Final = Contact().in_si()
 PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
-SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # errors told apart by colour
+SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # ranges of errors that the colours distinguish: stiction map, step map
 VERDICT_COLOURS: Final = {
     "fine": SKY,
     "wrong silently": VERMILLION,
@@ -209,7 +209,7 @@ VERDICT_COLOURS: Final = {
 
 
 class OverStiffness:
-    """Two panels over stiffness and another coordinate: outcomes, and errors."""
+    """Figure with two panels, outcomes and errors, over stiffness and a second coordinate."""
 
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
         self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
@@ -227,7 +227,7 @@ class OverStiffness:
         return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
 
     def draw_errors(self, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]) -> None:
-        """Draw errors by brightness with a colour bar, and cells of other kinds in their colours."""
+        """Shade the selected cells by error, clipped to `ends`; give cells of other kinds their fixed colours."""
         shown = np.ma.masked_where(~there, np.clip(self.cells["error"], *ends))
         mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
         self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")
@@ -238,7 +238,7 @@ class OverStiffness:
 
 
 def draw_stiction(results: Results) -> Drawn:
-    """Plot outcome (left) and error (right); the caption names the walk and counts the outcomes."""
+    """Plot outcomes (left) and errors (right) over stiffness and stiction velocity."""
     cells = results[MAPS]["stiction"]
     made = OverStiffness(cells, VELOCITY, ("(a) outcome", "(b) difference at a ten times tighter tolerance"))
     outcomes, compared = cells["outcome"], cells["compared"] == 1
@@ -255,7 +255,7 @@ def draw_stiction(results: Results) -> Drawn:
 
 
 def draw_step(results: Results) -> Drawn:
-    """Plot verdict (left) and error (right); the caption names the walk and counts the verdicts."""
+    """Plot verdicts (left) and errors (right) over stiffness and step size."""
     cells = results[MAPS]["step"]
     names = [item.partition(" ")[2] for item in str(cells.attrs["verdicts"]).split(", ")]
     made = OverStiffness(cells, STEP, ("(a) outcome", "(b) error of the final state"))

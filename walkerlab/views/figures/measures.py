@@ -1,4 +1,4 @@
-"""Figures of a walker's dimensions to scale, labelled with config keys: one leg upright, or each body on its own."""
+"""Drawings of a walker's dimensions to scale, labelled with config keys: one upright leg, or each body separately."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,27 +18,27 @@ AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 Point = tuple[float, float]
 
 HEIGHT, SMALL = 4.6, 7.5
-"""Width of the figure (in) and size of its letters (pt)."""
+"""Nominal height of the figure (in) and font size of its labels (pt)."""
 SMALL_ARC = 0.02
-"""Foot radius (leg lengths) below which the sole's centre has no label of its own."""
+"""Length (leg lengths) up to which a dimension has a label but no arrow, and the sole's centre no mark."""
 FAINT = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
 BEHIND, BENT = -0.3, -0.75
-"""Angles (rad) of the second leg and of its shank."""
+"""Angles (rad) of the second leg, or of its thigh, and of its shank."""
 BESIDE, FIRST_LANE = 0.62, 0.24
-"""Distance of mass labels (behind the leg) and of the first height dimensions (ahead of it), in leg lengths."""
+"""Distances from the leg (leg lengths): of the labels behind it, and of the first dimension line ahead of it."""
 LETTER, LINE = 0.0088, 0.0195
-"""Width and height of a letter as fractions of the picture's width."""
+"""Width of a character and height of a line of text, as fractions of the picture's width."""
 CLEAR = 0.05
 """Minimum distance between the centres of labels in a lane, in leg lengths."""
 PARTS_ROOM = 1.5
-"""Height of a body's picture relative to the body."""
+"""Height of a body's panel relative to the body."""
 
 
 @dataclass(frozen=True)
 class Length:
-    """A length of the config between two points that are level or above one another (m)."""
+    """A horizontal or vertical dimension (m) from the config, between two points."""
 
     key: str
     value: float
@@ -50,34 +50,34 @@ class Length:
 class UprightLeg:
     """Geometry of one leg, upright with its sole at the origin; lengths in m."""
 
-    joints: tuple[Point, ...]  # the leg's line from the hip down, without the sole
-    centre: Point  # of the sole's arc
+    joints: tuple[Point, ...]  # points of the leg's line from the hip down, without the sole
+    centre: Point  # centre of the sole's arc
     radius: float
     lengths: tuple[Length, ...]
-    masses: tuple[tuple[tuple[str, ...], Point], ...]  # what the config says of each, and where it is
+    masses: tuple[tuple[tuple[str, ...], Point], ...]  # labels and position of each mass
     top: float  # height of the torso's end, or of the hip
 
 
 def entry(key: str, value: float) -> str:
-    """Return `key: value` as a config writes it."""
+    """Format `key: value` as in a config."""
     return f"{key}: {value:g}"
 
 
 def mass_labels(walker: Any, prefix: str) -> tuple[str, ...]:
-    """Label a body's mass, and its inertia if it has one; `prefix` begins its config keys."""
+    """Return the labels of a body's mass and, if it has one, of its inertia; `prefix` begins its config keys."""
     inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
     mass = entry(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
     return (mass, entry(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
 
 
 def value_of(walker: Any, key: str, *otherwise: float) -> float:
-    """Return the value at a dotted key of the walker, or `otherwise`."""
+    """Return the value at a dotted key of the walker, or `otherwise` if it has none."""
     *blocks, last = key.split(".")
     return float(getattr(reduce(getattr, blocks, walker), last, *otherwise))
 
 
 def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
-    """Return the geometry of one leg for each walker type."""
+    """Return the geometry of one upright leg, with its dimensions and masses."""
     radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
     hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
     lengths: list[Length] = []
@@ -113,7 +113,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 
 def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
-    """Draw the walker's dimensions as SVG, PDF or PNG bytes; equal walkers and names give equal bytes."""
+    """Draw the walker's dimensions as a file of one kind (svg, pdf, png); equal walkers and names give equal bytes."""
     title = f"Dimensions of a walker of type {walker.type}"
     with styled():
         figure = draw_parts(walker) if isinstance(walker, PartsWalker) else draw_upright(walker)
@@ -121,13 +121,13 @@ def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
 
 
 def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
-    """Draw one leg upright on the slope with its dimensions, and the second leg pale behind it."""
+    """Draw one upright leg on the ground with its dimensions, and the second leg faintly behind it."""
     leg = upright(walker)
     length, centre = leg.joints[0][1], leg.centre
-    # the joints, and where the leg's line meets its sole's arc
+    # the leg's line ends where it meets the arc of the sole
     line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
     labels, lanes = arrange_labels(leg)
-    # letters keep their size, so that they take parts of the width, whatever the walker's length
+    # text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length
     behind = letters([words for words, *_ in labels])
     ahead = [letters([entry(dimension.key, dimension.value) for dimension in lane]) for lane in lanes]
     width = (BESIDE + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
@@ -146,7 +146,7 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     y = -0.1 * length
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
-    # the other leg, off the ground behind, its knee bent if it has one
+    # the second leg, behind and off the ground, with its knee bent if it has one
     second, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
     for angle, above, below in zip(angles, leg.joints, line[1:], strict=True):
         second.append(rotate(angle, above, below, second[-1]))
@@ -171,7 +171,7 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
 
 
 def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
-    """Return the labels behind the leg (colour, position, text) and the height dimensions, lane by lane."""
+    """Return the labels behind the leg (text, colour, position), and the vertical dimensions by lane."""
     length, lanes = leg.joints[0][1], list[list[Length]]()
     labels = [("\n".join(words), GREEN, spot) for words, spot in leg.masses]
     for dimension in (dimension for dimension in leg.lengths if dimension.value):
@@ -186,18 +186,18 @@ def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[
 
 
 def letters(texts: Sequence[str]) -> int:
-    """Width of the longest line in `texts`, with a margin."""
+    """Return the number of characters in the longest line of `texts`, plus a margin."""
     return max((len(line) + 2 for text in texts for line in text.split("\n")), default=0)
 
 
 def clear(dimension: Length, second: Length, length: float) -> bool:
-    """Whether two dimensions in one lane, and their labels, stay apart."""
+    """Whether two dimensions in one lane, and their labels, do not overlap."""
     between = 0.5 * abs(dimension.start[1] + dimension.end[1] - second.start[1] - second.end[1])
     return between > max(0.499 * (dimension.value + second.value), CLEAR * length)
 
 
 def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
-    """Place labels as close to the wanted heights as they fit, moving them up where those below need room."""
+    """Return label heights as close to the wanted ones as possible, raised where the labels below need room."""
     found = list(heights)
     for place in sorted(range(len(found)), key=found.__getitem__):
         found[place] = max(found[place], lowest + 0.5 * sizes[place])
@@ -206,24 +206,24 @@ def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -ma
 
 
 def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:
-    """Draw a leg from the hip over the knee to the sole, with the arc of the sole."""
+    """Draw a leg from the hip through any knee to the sole, with the arc of the sole."""
     axes.plot(*np.transpose(line), color=colour, linewidth=2.0, zorder=2)
     axes.plot(*np.transpose(line[:-1]), linestyle="none", marker="o", markersize=6, color=colour, mfc="white", zorder=4)
     across, up = np.subtract(line[-1], line[-2])
     around = np.arctan2(across, -up) + SOLE_ANGLES
     axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
-    if radius == 0.0:  # a point, perhaps ahead of the leg's line
+    if radius == 0.0:  # a point foot, perhaps ahead of the leg's line
         axes.plot(*np.transpose([line[-1], centre]), color=colour, linewidth=2.0, zorder=2)
 
 
 def rotate(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
-    """Rotate a point (rad) about the origin, then shift the origin to another point."""
+    """Rotate a point about `origin` by `angle` (rad), then move `origin` to `moved_to`."""
     (across, up), s, c = np.subtract(point, origin), np.sin(angle), np.cos(angle)
     return float(moved_to[0] + c * across - s * up), float(moved_to[1] + s * across + c * up)
 
 
 def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
-    """Draw a dimension between a point and one below it, with its label."""
+    """Draw a vertical dimension line at `x`, with its label to the right."""
     for point in (measure.start, measure.end):
         axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
     high, low = measure.start[1], measure.end[1]
@@ -233,7 +233,7 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
 
 
 def draw_parts(walker: PartsWalker) -> Figure:
-    """Draw each body of the second leg, and the bodies of neither leg, in its own frame."""
+    """Draw the bodies of the second leg, and those of neither leg, each in its own frame."""
     shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
     figure = blank(HEIGHT)
     for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
@@ -271,7 +271,7 @@ def draw_parts(walker: PartsWalker) -> Figure:
 
 
 def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[str, str, str, Point]]:
-    """List the points that the config defines on a body: label, colour, marker and position (m)."""
+    """Yield the points that the config defines on a body: label, colour, marker and position (m)."""
 
     def spot(point: Point) -> str:
         return f"[{point[0]:g}, {point[1]:g}]"

@@ -1,4 +1,4 @@
-"""All illustrations in display order, including those that evidence registers."""
+"""All illustrations in display order, including those that `walkerlab.evidence` registers."""
 
 from walkerlab.registration import registered
 from walkerlab.views.figures import (

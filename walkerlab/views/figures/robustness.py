@@ -1,4 +1,4 @@
-"""Figures of robustness: 17 over one parameter, from a sweep; 18 walks on rough ground."""
+"""Figures of robustness: 17 (over one parameter, from a sweep) and 18 (walks on rough ground)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
     ("largest step (mm)", "largest_step.{}.down_m", lambda step: -1e3 * step),
     ("speed (m/s)", "gaits.{}.speed_m_s", lambda speed: speed),
 )
-"""Axis label, sweep variable (with a slot for the model), and how to plot it."""
+"""Axis label, sweep variable (with a slot for the model's index), and conversion of its values for the plot."""
 SPEED: Final = "gaits.0.speed_m_s"
 ACTUATION_PANELS: Final = (
     ("cost of transport", "gaits.0.cost_of_transport", True),
@@ -40,17 +40,17 @@ ACTUATIONS: Final = {
     "impulse_N_s": ("push-off", BLUE, "s"),
     "torque_N_m": ("hip torque", VERMILLION, "^"),
 }
-"""Kinds of drive, as a sweep names them."""
+"""Label, colour and marker of each drive, by its parameter in the sweep."""
 UP: Final = "largest_step.{}.up_m"
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
 DASHES: Final = ("-", "--", "-.", ":")
 BELOW, BESIDE = 1.7, 0.4
-"""Height of the panels below the walker, and minimum room for axis labels beside it, in."""
+"""Mean height of the panels below the walker, and width of the axis labels beside it (in)."""
 
 
 def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:
-    """Return how to plot a `robustness` sweep: over one parameter, or by drive; None to plot it like any other."""
+    """Return the illustration of a robustness sweep over one parameter, or by drive; None for sweeps of other forms."""
     if can_be_drawn(group, parameters):
         return Illustration("figure-17", (), partial(over_one_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
@@ -58,7 +58,7 @@ def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration 
 
 
 def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
-    """Whether a robustness sweep varies one parameter and has gaits."""
+    """Whether a robustness sweep varies one parameter and has the variables of figure 17."""
     names = (name.format(0) for _, name, _ in PANELS)
     return len(parameters) == 1 and all(name in group.variables for name in names)
 
@@ -84,7 +84,7 @@ def over_one_parameter(group: Group, parameter: str, _results: Results) -> Drawn
 
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
-    """Return the points of a robustness sweep driven by each drive alone; None if points combine drives."""
+    """Return, for each drive, the points at which it acts alone; None if the sweep does not compare drives."""
     if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or ACTUATION_PANELS[0][1] not in group.variables:
         return None
     if any(group.variables[name].dims != group.variables["outcome"].dims for name in parameters):
@@ -94,7 +94,7 @@ def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.
 
 
 def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _results: Results) -> Drawn:
-    """Plot what each drive costs, and the disturbances it survives, over speed."""
+    """Plot the cost of each drive, and the disturbances that its gaits survive, over speed."""
     speed = group[SPEED].astype(float)
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(ACTUATION_PANELS), len(ACTUATION_PANELS), sharex=True)
     looks = {name: {"color": colour, "marker": marker} for name, (_, colour, marker) in ACTUATIONS.items()}
@@ -112,7 +112,7 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
 
 
 def on_rough_ground(results: Results) -> Drawn:
-    """Plot figure 18; its caption names the models, the walk shown (roughness in m, steps) and the walks per ground."""
+    """Plot figure 18; the caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
     result = results[STAGE]
     sticks, steps = sticks_of(result, "rough_walk/"), result["rough_steps"]
     across = sticks.in_plane(sticks.landings)[:, 0]
@@ -145,7 +145,7 @@ def on_rough_ground(results: Results) -> Drawn:
 
 
 def draw_shares(axes: Axes, steps: Group) -> None:
-    """Plot the share of walks still going over the number of steps, for each model and roughness."""
+    """Plot the fraction of walks still going over the number of steps, for each model and roughness."""
     for model, last, of_model in zip(steps["model"], steps["cut_off_at"], steps["steps"], strict=True):
         for walks, dash in zip(of_model, cycle(DASHES), strict=False):
             # a walk that was cut off has not failed

@@ -1,4 +1,4 @@
-"""The `plot` stage: draws every figure that has its results, as SVG and PNG."""
+"""The `plot` stage: draws every figure whose results are available, as SVG and PNG."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ def run(
     folder: Path,
     left_out: Sequence[LeftOut] = (),
 ) -> Content:
-    """Draw all figures that have their results into the run's folder; StorageError if one cannot be stored."""
+    """Draw all figures whose results are available into the run's folder; StorageError if one cannot be stored."""
     make_folder(folder / FOLDER)
     absent = {entry.what: entry.why for entry in left_out}
     reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
@@ -35,14 +35,14 @@ def run(
             drawn.append(draw(figure, inputs, folder))
             progress.advance()
         else:
-            for path in paths_of(figure).values():  # drawn by an earlier run, of results that are not there any more
+            for path in paths_of(figure).values():  # drawn by an earlier run from results that no longer exist
                 with storing(folder / path):
                     (folder / path).unlink(missing_ok=True)
-            # what only its own command computes, and nobody has asked for, is not left out
+            # figures of stages that run only on request are not reported as missing
             if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
                 missing.append({"what": figure.called, "why": why})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
-    # captions of measured run times are among them
+    # some captions quote measured run times
     return Content(
         {index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing}, timed=("figures",)
     )
@@ -60,7 +60,7 @@ def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> d
 
 
 def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
-    """Draw the figures that need only one stage's result; with `anew` also those that exist. Return their paths."""
+    """Draw the figures that need only `stage`, redrawing existing ones if `anew`; return the paths of all SVG files."""
     results = {stage: artifact.read(folder / f"{stage}.h5")}
     figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]
     make_folder(folder / FOLDER)
@@ -71,5 +71,5 @@ def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
 
 
 def paths_of(figure: Illustration) -> dict[str, str]:
-    """Return the paths of a figure's files in the run's folder."""
+    """Return the paths of a figure's files by kind, relative to the run's folder."""
     return {kind: f"{FOLDER}/{figure.name}.{kind}" for kind in ("svg", "png")}

@@ -1,4 +1,4 @@
-"""A walker to scale on its slope: figures 2 and 6, stick diagrams of one gait cycle, and animations."""
+"""Walkers drawn to scale on their slope: stick diagrams of one gait cycle (figures 2 and 6), and animations."""
 
 import math
 from collections.abc import Iterator
@@ -39,21 +39,21 @@ from walkerlab.views.figures.walks import (
 CYCLE = 2
 """Steps per gait cycle."""
 BETWEEN = 5
-"""Postures between two heel strikes."""
+"""Number of postures drawn between two heel strikes."""
 FAINT, FULL = 0.8, 2.2
-"""Line widths of legs between heel strikes and at them, pt."""
+"""Line widths (pt) of legs between heel strikes and at them."""
 HEADROOM, FOOTROOM, SIDEROOM = 0.19, 0.13, 0.12
-"""Free space around the walker, leg lengths."""
+"""Free space above, below and beside the walker (leg lengths)."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
-"""Half-angle of the sole's arc drawn, rad from the leg's line."""
+"""Angles (rad) of the points of a sole's arc, and of its middle, from the leg's line."""
 SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
 UNDER, BESIDE, ABOVE = 0.36, 0.7, 1.05
-"""Room for landing times below the lowest foot, and for axis labels and legend, in."""
+"""Room (in) for landing times below the lowest foot, for axis labels at the side, and for the legend."""
 SHAPE = 0.68
-"""Height of the axes relative to their width, unless the walker is taller or longer."""
+"""Maximum height of the axes relative to their width."""
 NO_STEPS = Group(
     {name: Variable(np.zeros(0), ("step",), unit, name) for name, unit in ((TOUCHES, "s"), ("touch_along_m", "m"))}
 )
@@ -66,25 +66,25 @@ class Sticks:
     time: Array  # (samples,) s
     hip: Array  # (samples, 2)
     feet: Array  # (samples, leg, 2)
-    strikes: Array  # (steps,) s
-    landings: Array  # (1 + steps, 2) where the first stance foot stands and each step's foot comes down
+    strikes: Array  # (steps,) times of the heel strikes, s
+    landings: Array  # (1 + steps, 2) positions of the first stance foot and of each landing
     slope: float  # rad
     knees: Array | None = None  # (samples, leg, 2); None for straight legs
-    radius: float = 0.0  # of the soles' arcs, m; the feet are their lowest points
-    head: Array | None = None  # (samples, 2), the torso's centre of mass; None without a torso
-    ground: tuple[Array, Array] | None = None  # as `ground_levels` says
+    radius: float = 0.0  # radius of the soles' arcs, m; the feet are their lowest points
+    head: Array | None = None  # (samples, 2) centre of mass of the torso; None without a torso
+    ground: tuple[Array, Array] | None = None  # ground levels as returned by `ground_levels`; None on even ground
     pushes: bool = False  # whether the trailing foot pushes off as the other one lands
-    ending: str = ""  # how the walk ended before its last step, such as fell; empty where it did not
+    ending: str = ""  # outcome of a walk that failed, such as fell; otherwise empty
 
     def pushing(self, time: float) -> int | None:
-        """Return the leg whose push-off is visible at a time (s), or None."""
+        """Return the leg whose push-off is shown at a time (s), or None."""
         step = int(np.searchsorted(self.strikes, time, side="right")) - 1
         late = step < 0 or time - self.strikes[step] > SEEN_S
         return None if late or not self.pushes else 1 - step % 2
 
     @property
     def top(self) -> Array:
-        """The highest point drawn (samples, 2): the torso's end, or the hip."""
+        """Highest point drawn (samples, 2): the torso's centre of mass, or the hip."""
         return self.hip if self.head is None else self.head
 
     @property
@@ -97,7 +97,7 @@ class Sticks:
         return self.radius > SMALL_FOOT * self.leg_length
 
     def leg(self, leg: int) -> Array:
-        """Return a leg's line (samples, points, 2) from the hip over any knee to the middle of the sole."""
+        """Return a leg's line (samples, points, 2) from the hip through any knee to the middle of the sole."""
         joints = [self.hip] if self.knees is None else [self.hip, self.knees[:, leg]]
         return np.stack([*joints, self.arc(leg, joints[-1], ARC_MIDDLE)[:, 0]], axis=1)
 
@@ -106,7 +106,7 @@ class Sticks:
         return self.arc(leg, self.hip if self.knees is None else self.knees[:, leg], ARC)
 
     def arc(self, leg: int, above: Array, angles: Array) -> Array:
-        """Return points of a sole at angles (rad) from the line between its centre and the joint above."""
+        """Return points of a sole (samples, angles, 2) at angles (rad) from the line of the leg through its centre."""
         centre = self.feet[:, leg] + np.array([0.0, self.radius])
         down = (centre - above) / np.linalg.norm(centre - above, axis=1, keepdims=True)
         ahead = np.stack((-down[:, 1], down[:, 0]), axis=1)
@@ -120,7 +120,7 @@ class Sticks:
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Select the samples at the start and heel strikes of the first cycle, and some between."""
+        """Return the indices of samples at the start and heel strikes of the first cycle, and of others in between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
         between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         if strikes.size <= CYCLE:
@@ -132,7 +132,7 @@ class Sticks:
 
 
 def sticks_of(result: Stored, under: str = "") -> Sticks:
-    """Read joint positions from a stored walk, or from its group `under`."""
+    """Read the joint positions of a stored walk; `under` is the prefix of its groups."""
     asked = result.identity.config_slice
     trajectory, walker = result[f"{under}trajectory"], asked["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
@@ -147,7 +147,7 @@ def sticks_of(result: Stored, under: str = "") -> Sticks:
     knees = joints("knee") if "knee_along_m" in trajectory.variables else None
     radius = float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
-        radius = 0.0  # a compass has point feet in the rigid model, whatever its ball feet
+        radius = 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
     ground = ground_levels(steps)
     pushes = asked["push_off"]["impulse_N_s"] != 0.0
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
@@ -184,14 +184,14 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
 
 
 def surrounding(points: Array, length: float) -> tuple[float, float, float, float]:
-    """Return left, bottom, right and top of the view around points (points, 2); m."""
+    """Return left, bottom, right and top (m) of a view around points (points, 2), with margins relative to `length`."""
     left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
     right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
     return left, bottom, right, top
 
 
 def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
-    """Draw legs, soles and torso at the given samples; legs differ in colour, line and foot."""
+    """Draw legs, soles and torso at the given samples; the legs differ in colour, line style and foot marker."""
     hip = sticks.in_plane(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
         lines, order = sticks.in_plane(sticks.leg(leg)[rows]), look.order + width
@@ -208,7 +208,7 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
 
 
 def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
-    """Label landings below the ground, and direction and slope above the walker's highest point (`path`)."""
+    """Label the landings with their times, and the walking direction with the slope above the highest points `path`."""
     length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
@@ -227,7 +227,7 @@ def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
 
 
 def draw_slope(axes: Axes, sticks: Sticks) -> None:
-    """Draw the ground as a plane, or as a level around each foothold, hatched below."""
+    """Draw the ground as a plane or, if uneven, as a level around each foothold, hatched below."""
     left, right = axes.get_xlim()
     depth = 0.02 * sticks.leg_length
     ends = np.array([left, right])
@@ -241,7 +241,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 
 
 def entries(sticks: Sticks) -> list[Artist]:
-    """Legend entries of the legs and of the walker's further parts."""
+    """Return the legend entries of the legs, the hip and any torso."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
     strike, between = entry("at heel strike", color=GREY, linewidth=FULL), entry("between", color=GREY, linewidth=FAINT)
     hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
@@ -270,7 +270,7 @@ def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
 
 
 def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
-    """Draw the pads, or the plane without pads; return the legend entries."""
+    """Draw the pads or, without pads, the ground; return the legend entries."""
     if pads is not None:
         return draw_pads(axes, sticks, pads)
     draw_slope(axes, sticks)
@@ -278,7 +278,7 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
 
 
 def draw_cycle(stage: str, results: Results) -> Drawn:
-    """Draw a model's walker on its pads or plane."""
+    """Draw one gait cycle of a stage's walk on its pads or plane (figures 2 and 6)."""
     result = results[stage]
     sticks, pads = sticks_of(result), result.groups.get("terrain")
     figure, axes = stick_diagram(sticks)
@@ -301,16 +301,16 @@ FIGURE_2, FIGURE_6 = (
 FIGURES = (FIGURE_2, FIGURE_6)
 
 SEEN_S, PUSH_SHARE = 0.08, 0.3
-"""How long a push-off is visible in an animation (leg-pendulum times), and its length (leg lengths)."""
+"""Time for which an animation shows a push-off (s), and length of the mark relative to the leg."""
 FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
 """Size (in) and resolution (pixels per in) of a frame: both sides are even, as video formats require."""
 STEPS_SHOWN = 4
 RELIEF, RELIEF_UNDER = 0.04, 0.075
-"""Maximum height of the exaggerated ground profile, and its distance below the ground, leg lengths."""
+"""Maximum height of the magnified ground profile, and its distance below the ground (leg lengths)."""
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
-    """Return the times (s) of `rate` frames a second; `steps` None: four, or the last four and the fall."""
+    """Return frame times (s) of a slow motion; by default of four steps or, for a fall, the last four and the fall."""
     # a fall is held for a second
     begin, shown = 0, STEPS_SHOWN if steps is None else steps
     if steps is None and sticks.ending:
@@ -323,7 +323,7 @@ def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> A
 
 
 def draw_relief(axes: Axes, sticks: Sticks) -> None:
-    """Draw the ground profile again below, exaggerated to be visible, with the factor."""
+    """Draw the ground profile again below the ground, magnified until visible, and print the factor."""
     if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[1]).max())):
         return
     room = RELIEF * sticks.leg_length / roughest
@@ -342,7 +342,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
 
 
 def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
-    """Render a frame (height, width, 3) for each time, on pads if there are any."""
+    """Yield an RGB frame (height, width, 3) for each time `at` (s)."""
     lines: list[tuple[Array, dict[str, Any]]] = [
         (sticks.leg(leg), {"color": look.colour, "linestyle": look.style}) for leg, look in enumerate(LEGS)
     ]
@@ -352,7 +352,7 @@ def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[N
         lines.append((np.stack((sticks.hip, sticks.head), axis=1), {"color": BLACK}))
     points = np.concatenate([line for line, _ in lines], axis=1)
     flat = points.reshape(points.shape[0], -1)
-    # between two samples, straight; both sides of a heel strike are samples, so none is cut across
+    # interpolate linearly; both sides of a heel strike are samples, so no interval spans one
     places = np.stack([np.interp(at, sticks.time, column) for column in flat.T], axis=1)
     shown = sticks.in_plane(places.reshape(at.size, *points.shape[1:]))
     ends = np.cumsum([line.shape[1] for line, _ in lines])[:-1]

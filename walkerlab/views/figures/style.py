@@ -1,7 +1,7 @@
 """Sizes, fonts, colours and line styles shared by all figures.
 
-Colours follow Okabe and Ito, for colour-blind readers; overlapping series also differ in brightness and line style,
-so that figures survive a grey printer.
+The colours are those of Okabe and Ito, for colour-blind readers; overlapping series also differ in brightness and line
+style, so that figures remain readable in greyscale.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ GREY: Final = "#7F7F7F"
 PALE: Final = "#EDEDED"
 
 WIDTH: Final = 7.2
-"""Width of a figure on the page, in: two columns of a journal."""
+"""Width of a figure on the page (in): two columns of a journal."""
 POINT: Final = 1.0 / 72.0
-"""Width of one column, in."""
+"""One point (in)."""
 PNG_DPI: Final = 160
 """Resolution of PNGs on the page; exports choose their own."""
 
@@ -60,7 +60,7 @@ RC: Final = {
 }
 """Settings on top of matplotlib's defaults, independent of the user's matplotlibrc; TrueType fonts for journals."""
 NARROW_BELOW: Final = 5.0
-"""Figure width (in) below which letters and lines are reduced."""
+"""Figure width (in) below which fonts and legends are smaller."""
 NARROW: Final = {
     "axes.labelsize": 7.2,
     "axes.titlesize": 7.2,
@@ -71,12 +71,12 @@ NARROW: Final = {
     "xtick.labelsize": 7.2,
     "ytick.labelsize": 7.2,
 }
-"""Further settings for one-column figures; exponents of 7.2 pt labels are 5 pt."""
+"""Further settings for one-column figures; superscripts in labels of 7.2 pt have 5 pt."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """Style of one series: `label` in legends, `width` in pt, `marker` at its heel strikes or feet."""
+    """Style of a series: legend label, colour, line style, line width (pt), marker and drawing order."""
 
     label: str
     colour: str

@@ -1,4 +1,4 @@
-"""Figures of a sweep: lines over one parameter, maps over two, scatter plots over each of more."""
+"""Figures of a sweep: lines over one parameter, maps over two, a scatter plot for each of three or more."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -27,7 +27,7 @@ MAX_LINES: Final = 5
 DASHES: Final = ("-", "--", "-.")
 STABILITY_BOUND: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
-"""Points shown individually in a panel; of more, an even selection is shown."""
+"""Maximum number of points plotted in a panel; of more, an even selection is shown."""
 PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "last_step_period_s", "spectral_radius", "step_length_m", "last_step_length_m", "steps",
     "slip_per_step_m", "max_penetration_m", "min_normal_force_N", "energy_drift_J", "end_time_s",
@@ -38,7 +38,7 @@ LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
-    """Return the quantities to plot by default: the well-known ones, then others that vary."""
+    """Return the quantities to plot by default: the preferred ones that vary or, without any, others that vary."""
     varying = []
     for name in group.variables:
         if is_number(group, name, dims) and name not in parameters:
@@ -50,7 +50,7 @@ def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> li
 
 
 def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
-    """Whether a variable has one number for each point."""
+    """Whether a variable has one number for each point of the sweep."""
     return name in group.variables and group.variables[name].dims == dims and group[name].dtype.kind in "fib"
 
 
@@ -75,7 +75,7 @@ def draw(
     against: str,
     _results: Results,
 ) -> Drawn:
-    """Caption data: what is plotted over what, outcomes, how gaps appear, and whether there is a line at one."""
+    """Plot a sweep; the caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
     a_map = len(dims) == 2 and not against and not in_lines(group, dims)
     if against:
         figure = one_over_another(group, dims, names, against)
@@ -91,7 +91,7 @@ def draw(
 
 
 def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], against: str) -> Figure:
-    """Plot each quantity in a row over another quantity, joining the points of a single parameter in order."""
+    """Plot each quantity over the quantity `against`, a row each; points of a single parameter are joined in order."""
     x = spread(group, against, dims)
     few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
@@ -112,12 +112,12 @@ def name_in_text(group: Group, name: str) -> str:
 
 
 def label(group: Group, name: str) -> str:
-    """Axis label of a variable, with its unit."""
+    """Return the axis label of a variable, with its unit."""
     return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
 
 
 def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
-    """Plot a row per quantity and a column per parameter, with lines where the parameter orders the points."""
+    """Plot a row per quantity and a column per parameter; points of a single, monotonic parameter are joined."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
     figure, axes = panels(0.5 + SWEEP_PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -142,7 +142,7 @@ def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], na
 
 
 def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
-    """Return a parameter's value at every point, flat."""
+    """Return a parameter's value at every point of the sweep, as a flat array."""
     values = numbers(group, parameter)
     if group.variables[parameter].dims == dims:
         return values.ravel()
@@ -152,7 +152,7 @@ def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
 
 
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
-    """Add the reference line, gaps and scales to a panel; missing: points without an answer."""
+    """Add stability bound, marks of gaps and scales to a panel; missing: parameter values of points without answer."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:
@@ -163,19 +163,19 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
 
 
 def marked(group: Group, names: Sequence[str]) -> list[Artist]:
-    """Legend entries for `finish_panel`."""
+    """Return the legend entries of what `finish_panel` draws."""
     gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
     stability = [entry(STABILITY_BOUND, color=GREY, linewidth=0.8)] if RADIUS in names else []
     return [*stability, *([entry("no answer", **MISSING)] if gaps else [])]
 
 
 def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
-    """Whether one of two parameters has few enough values to draw each as a line."""
+    """Whether there are two parameters, one of them with few enough values to draw a line for each."""
     return min(group["outcome"].shape) <= MAX_LINES and len(dims) == 2
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot each quantity in a row over one parameter, a line for each value of the shorter one."""
+    """Plot each quantity over the parameter with more values, with a line for each value of the other parameter."""
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
     x, values = numbers(group, across), group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
@@ -199,7 +199,7 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
 
 
 def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
-    """Label the ticks of a parameter that is not numeric."""
+    """Label the ticks of a non-numeric parameter on the axis `which` (x or y)."""
     values = group[parameter]
     if values.dtype.kind == "O" and group.variables[parameter].dims == (parameter,):
         getattr(axes, f"set_{which}ticks")(np.arange(values.size), [str(value) for value in values])
@@ -235,6 +235,6 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
 
 
 def numbers(group: Group, parameter: str) -> NDArray[Any]:
-    """Return a parameter's values, or positions if they are words."""
+    """Return a parameter's values, or their indices if they are words."""
     values = group[parameter]
     return np.arange(values.size, dtype=float) if values.dtype.kind == "O" else values.astype(float)

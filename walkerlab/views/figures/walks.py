@@ -1,4 +1,4 @@
-"""Figures of both models' walks: 5, 7 and 10 over time, 9 the limit cycles; and two runs overlaid."""
+"""Figures of both models' walks: 5, 7 and 10 (over time), 9 (limit cycles); and two runs overlaid."""
 
 from __future__ import annotations
 
@@ -46,21 +46,21 @@ STRIKE_WIDTH = 0.6
 
 
 def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
-    """Return the values that a study claims for this scene; empty for other scenes."""
+    """Return the values claimed by a study for this scene; empty for other scenes."""
     return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnWalk:
-    """A walk over time; `time`: (samples,) s."""
+    """A walk to plot over time; `time`: (samples,) s."""
 
-    look: Look  # of its model
-    outcome: str  # how it ended
-    steps: int  # how many steps it has in all
-    strikes: Array  # (shown steps,) s, times of the heel strikes
-    samples: Group  # what was stored over time
-    end: int | None = None  # number of the samples that are shown; None for all
-    recorded: bool = False  # whether it was recorded elsewhere, and has a name of its own
+    look: Look  # style of its model
+    outcome: str  # how the walk ended
+    steps: int  # number of steps of the whole walk
+    strikes: Array  # (shown steps,) times of the heel strikes, s
+    samples: Group  # variables stored over time
+    end: int | None = None  # number of samples shown; None for all
+    recorded: bool = False  # whether it was recorded elsewhere and has its own name
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.samples[name][: self.end]
@@ -81,14 +81,14 @@ class DrawnWalk:
 
 
 def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
-    """Return the walks whose trajectories have the given variables, the rigid model's first."""
+    """Return the walks whose trajectories have the given variables, that of the rigid model first."""
     every = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT), (RECORDED_STAGE, RECORDED))
     there = [(stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
     return [walk_of(results[stage], look) for stage, look in there]
 
 
 def recorded_look(result: Content) -> Look:
-    """Return the style of a recorded walk, under its name."""
+    """Return the style of a recorded walk, labelled with its name."""
     return replace(RECORDED, label=str(result.summary["name"]))
 
 
@@ -105,13 +105,13 @@ def touch_times(steps: Group) -> Array:
 
 
 def first_strides(walks: list[DrawnWalk], strides: int = PAPER_STRIDES) -> tuple[list[DrawnWalk], str]:
-    """Return the walks' first strides, and ' (the first 5 strides)' for the caption if that is not the whole walk."""
+    """Return the walks' first strides, and ' (the first 5 strides)' for the caption if any walk is longer."""
     cut = [walk.first(strides) for walk in walks]
     return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
 
 
 def time_axes(rows: int, row_height: float, walks: list[DrawnWalk]) -> tuple[Figure, list[Axes]]:
-    """Create axes that share the time axis, with the heel strikes of all walks."""
+    """Create panels that share the time axis, with lines at the heel strikes of all walks."""
     figure, column = panels(0.85 + rows * row_height, rows, sharex=True, squeeze=False)
     axes = list(column[:, 0])
     for panel in axes:
@@ -143,7 +143,7 @@ def line(axes: Axes, x: Array, y: Array, look: Look) -> None:
 
 
 def strike_entry(look: Look) -> Artist:
-    """Legend entry for a model's heel strikes, upright as in the figure."""
+    """Return the legend entry of a model's heel strikes, a vertical line as in the figure."""
     label = f"heel strike, {look.label.split()[0]}"
     return entry(label, color=look.colour, linestyle="none", marker="|", markersize=11.0, markeredgewidth=STRIKE_WIDTH)
 
@@ -164,7 +164,7 @@ def redoes_the_procedure(results: Results) -> bool:
 
 
 def draw_adjusted(results: Results) -> Drawn:
-    """Plot the rigid model from its start and the contact model from the adjusted start, a row per link."""
+    """Plot the rigid model from its start and the contact model from the adjusted start, a row per leg."""
     result, named = results[TUNE_STAGE], redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
     whole = []
@@ -207,11 +207,11 @@ LAST_STRIDE = 2
 """Steps per stride."""
 EARLIER_WIDTH = 0.5
 ARROW_LENGTH = 0.06
-"""Length of an arrow on the cycle, as a fraction of a step's samples."""
+"""Length of an arrow on the cycle, as a fraction of the samples of a swing or stance."""
 
 
 def draw_cycles(results: Results) -> Drawn:
-    """Plot a phase plane for each leg on equal scales; the caption says how much is shown and how the walks ended."""
+    """Plot a phase plane for each leg on equal scales; the caption gives the strides shown and how the walks ended."""
     walks, extent = first_strides(walks_with(results, STATES), CYCLES)
     figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
     for leg, panel in enumerate(axes):
@@ -233,7 +233,7 @@ def draw_cycles(results: Results) -> Drawn:
 
 def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     """Plot the last stride in the model's style, with earlier strides as thin lines below."""
-    # marked is the state just before each heel strike of the last stride: filled if the leg's own, open if not
+    # markers show the state just before a heel strike: filled if this leg strikes, open if the other does
     angle, velocity, look = walk["angle"][:, leg], walk["velocity"][:, leg], walk.look
     axes.plot(angle, velocity, color=look.colour, linewidth=EARLIER_WIDTH, zorder=look.order - 2)
     last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
@@ -270,11 +270,11 @@ SMALLEST_SPAN = 0.005
 """Minimum span of the mechanical-energy axis relative to the energy: a constant must look constant."""
 MARGIN = 0.08
 FEW = 0.005
-"""Fraction of samples inside impacts, which do not set the scale."""
+"""Fraction of the samples at each end of the range that do not set the scale, because they lie inside impacts."""
 
 
 def draw_energies(results: Results) -> Drawn:
-    """Plot each energy in a row."""
+    """Plot kinetic, potential and mechanical energy over time, a row each."""
     walks, extent = first_strides(walks_with(results, ENERGIES))
     figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])

@@ -1,1 +1,1 @@
-"""The report: one HTML page made from stored results alone; sections, their tables, and the template."""
+"""The report: HTML pages made from stored results alone, with their sections, tables and templates."""

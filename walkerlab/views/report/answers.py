@@ -1,6 +1,6 @@
 """Terminal answers: for each stage a headline, then tables with symbols, units and significant digits.
 
-Each answer imports the page sections that it needs, so that the others start faster.
+Each answer imports the page sections that it needs, so that other commands start faster.
 """
 
 import math
@@ -22,14 +22,14 @@ from walkerlab.views.report.words import words
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], Sequence[str | Table]]
-"""Paragraphs and tables."""
+"""Function that returns the paragraphs and tables of an answer."""
 
 FIRST_VALUES = 6
-"""Values shown at the start of a long row."""
+"""Number of values shown at the start of a long row."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """Return the lines that summarise a stage's result; empty without one. Stages without a text list their keys."""
+    """Return lines that summarise a stage's result; stages without an answer of their own list their keys."""
     if not summary:
         return []
     return lay_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(describe_summary(summary, short=True))
@@ -49,7 +49,7 @@ def lay_out(blocks: Iterable[str | Table]) -> list[str]:
 
 
 def fixedpoint(summary: Summary) -> list[str | Table]:
-    """Describe the gait, with both sets of equations side by side where the digits shown differ."""
+    """Describe the gait, with both sets of equations side by side if the digits shown differ."""
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
         return [f"No gait on a slope of {slope}: {summary['reason']}."]
@@ -76,7 +76,7 @@ def walk_row(title: str, key: str, digits: int = 4) -> Column:
 
 
 def energy_lost(dissipated: Mapping[str, float]) -> str:
-    """List the energy losses of a walk by cause; empty without losses."""
+    """List a walk's energy losses by cause; empty if nothing was lost."""
     return join_words(
         f"{quantity(lost, 'J', 3)} {CHANNELS.get(name, name)}" for name, lost in dissipated.items() if lost
     )
@@ -118,7 +118,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
-    """Format the steps to be shown, by number; an ellipsis replaces the middle of a long walk."""
+    """Format the quantities of the steps shown, by step number; '…' stands for the middle of a long walk."""
     from walkerlab.views.report.sections.walks import format_step
 
     every = {key: values for key in STEP_HEADS if (values := summary.get(key))}
@@ -133,14 +133,14 @@ def each_step(summary: Summary) -> dict[str, Summary]:
 
 
 def elide(values: Sequence[Any]) -> list[Any]:
-    """Return the values with '…' for the middle of a long row."""
+    """Replace the middle of a long row by '…'."""
     if len(values) <= 2 * FIRST_VALUES:
         return list(values)
     return [*values[:FIRST_VALUES], "…", *values[-2:]]
 
 
 def tune(summary: Summary) -> list[str | Table]:
-    """Say whether the start needs an adjustment, and describe the contact model's own gait."""
+    """Describe whether the start needs an adjustment, and the contact model's own gait."""
     from walkerlab.views.report.sections import adjustment
 
     gait = summary["gait"]
@@ -162,7 +162,7 @@ LAST_STEP = (
 
 
 def last_steps(summary: Summary, errors: Mapping[str, Summary]) -> Table:
-    """Compare both models' last steps with the gait's and, with knees, with the steps for each release instant."""
+    """Compare the last step of each model, the gait's step and, for knees, the last step for each release instant."""
     steps = []
     for name, step in summary["steps"].items():
         known_errors = {key: errors[name].get(f"step_{key}") for key in ("period_s", "length_m") if name in errors}
@@ -181,7 +181,7 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 
 def continuation(summary: Summary) -> list[str | Table]:
-    """Summarise the families and list every bifurcation; `show` has branches and exponents."""
+    """Summarise the families and list every bifurcation; `walkerlab show` lists branches and exponents."""
     from walkerlab.views.report.sections import families
 
     branches = count(len(summary["branches"]), "branch", "branches")
@@ -209,7 +209,7 @@ def best_walker(summary: Summary) -> list[str | Table]:
 
 
 def config_lines(summary: Summary) -> list[str]:
-    """Name the config that a stage wrote, and what to do with it."""
+    """Return lines that name the config that a stage wrote, and the next command."""
     file = summary.get("config")
     return [] if file is None else [f"config: {file}", f"next: `walkerlab report -c {shlex.quote(file)}`."]
 
@@ -229,7 +229,7 @@ def measurements_to_make(summary: Summary) -> list[str | Table]:
 
 
 def engines(summary: Summary) -> list[str | Table]:
-    """Report the conclusions for each scene; `show` has every run."""
+    """Report the conclusions for each scene; `walkerlab show` lists every run."""
     conclusions = [
         f"{scene}, {experiment}: {text}"
         for scene, concluded in summary["conclusions"].items()
@@ -250,7 +250,7 @@ def report(summary: Summary) -> list[str | Table]:
 
 
 paper_table = later("walkerlab.evidence.paper.sections", "table_of")
-"""Draw a table of the paper's values as its page has it."""
+"""Build a table of the paper's values as on the page about the paper."""
 
 ANSWERS: dict[str, Answer] = {
     "fixedpoint": fixedpoint,
@@ -272,7 +272,7 @@ ANSWERS: dict[str, Answer] = {
 
 
 def verdict(results: Mapping[str, Summary]) -> list[str]:
-    """Summarise a whole run in three paragraphs at most: gait, walks, and verdicts on the paper."""
+    """Summarise a whole run in at most three paragraphs: gait, walks, and verdicts on the paper."""
     walks = [(model.lower(), results[stage]) for stage, model in MODEL_NAMES.items() if stage in results]
     outcomes = "; the ".join(f"{model} {walk_text(summary['steps'], summary['outcome'])}" for model, summary in walks)
     judged = ("compare",) if "verdicts" in results.get("compare", {}) else ()

@@ -24,7 +24,7 @@ class PageBlock(Protocol):
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Running text; its tone marks it as a statement, or as a placeholder for a pending result."""
+    """Running text; its tone marks a statement or a placeholder for a pending result."""
 
     template: ClassVar[str] = "paragraph"
     text: str
@@ -55,7 +55,7 @@ class Statement:
 
 @dataclass(frozen=True)
 class Shares:
-    """Counts that make up a whole, as a bar with a key."""
+    """Counts that make up a whole, shown as a bar with a legend."""
 
     template: ClassVar[str] = "shares"
     title: str
@@ -115,7 +115,7 @@ class Code:
 
 
 Pad = tuple[float, float, int]
-"""Start and end of a pad along the slope (m), and the leg in whose lane it lies."""
+"""Start and end of a pad along the slope (m), and index of the leg in whose lane it lies."""
 
 
 @dataclass(frozen=True)
@@ -126,14 +126,14 @@ class Walker:
     style: str
     track: Track  # thinned motion
     strikes: tuple[float, ...]  # times of the heel strikes (s)
-    # postures, each a line through the joints (mm along and below the slope)
+    # postures, each a line through the joints: mm along the slope, and mm normal to it (down is positive)
     stills: tuple[tuple[tuple[int, int], ...], ...]
     ends: str = ""
     pushes: bool = False  # whether the trailing foot pushes off as the other foot lands
 
     @property
     def meta(self) -> dict[str, object]:
-        """Metadata with which the script decodes the samples."""
+        """Metadata that the script needs to decode the samples."""
         channels, samples = tuple(self.track.channels), int(self.track["t"].size)
         return {
             "name": self.name, "style": self.style, "channels": channels, "samples": samples, "strikes": self.strikes,
@@ -156,7 +156,7 @@ class Player:
     closeup_m: float  # height of the close-up of a foot
     view: tuple[int, int, int, int]  # left, top, width and height of the stills (mm, y down), after the slope is tilted
     torso_m: float = 0.0
-    ordinary_force: float = 1.0  # force (N) whose arrow has the usual length
+    ordinary_force: float = 1.0  # force (N) whose arrow has the standard length
     pads: tuple[Pad, ...] = ()
     ground: tuple[tuple[float, float], ...] = ()  # start along the slope and height of each ground level (m)
 
@@ -166,7 +166,7 @@ class Player:
 
     @property
     def shows_forces(self) -> bool:
-        """Whether a walker has ground forces; a player that is filled later may."""
+        """Whether any walker has ground forces; also true without walkers, for a player that is filled later."""
         return not self.walkers or any("n0" in walker.track.channels for walker in self.walkers)
 
     @property
@@ -189,7 +189,7 @@ class GaitMark:
 
 @dataclass(frozen=True)
 class Diagram:
-    """Branches of gaits over a parameter; a mark is a gait that is loaded into the page's player."""
+    """Branches of gaits over a parameter; selecting a mark loads its gait into the page's player."""
 
     template: ClassVar[str] = "diagram"
     WIDTH: ClassVar[int] = 720
@@ -201,7 +201,7 @@ class Diagram:
     title: str
     caption: str
     titles: tuple[str, str]
-    # points of each line, and whether its gaits are stable
+    # points of each line, and whether the gaits on it are stable
     curves: tuple[tuple[tuple[tuple[float, float], ...], bool], ...]
     # position and text of the ticks of both axes
     ticks: tuple[tuple[tuple[float, str], ...], tuple[tuple[float, str], ...]]
@@ -215,13 +215,13 @@ class Section:
     anchor: str  # id, unique on the page
     title: str
     blocks: tuple[PageBlock, ...] = ()
-    finding: str = ""  # one-sentence result; a section with one is folded to it
+    finding: str = ""  # one-sentence result; a section that has one is folded, with only this sentence visible
     page: str = MAIN  # file of the page
 
     @classmethod
     def of(
         cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
     ) -> Section | None:
-        """Create a section of the non-empty blocks; None if all are empty."""
+        """Create a section of the blocks that are not empty; None if all are empty."""
         filled = tuple(block for block in blocks if block)
         return cls(anchor, title, filled, finding, page) if filled else None

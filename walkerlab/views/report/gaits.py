@@ -1,4 +1,4 @@
-"""Table of a gait's fixed point, multipliers and step quantities, for page and terminal."""
+"""Table of a gait's fixed point, multipliers and step quantities, for pages and the terminal."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,13 +11,13 @@ from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
 COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
-"""Coordinates of a compass; results of other walkers name theirs."""
+"""Coordinates of a compass; results of other walkers store the names of their coordinates."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """Sets of equations: stored name and display name."""
 
 
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
-    """Tabulate fixed points (coordinates `names`) and multipliers, the sets of equations side by side."""
+    """Tabulate fixed points (coordinates `names`) and multipliers, with a column for each set of equations."""
     six = partial(fixed, decimals=6)
     multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
     lines = [
@@ -44,7 +44,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         Column("residual of the step map", "residual", partial(power_of_ten, digits=2)),
     ]
     both = len(sets) > 1
-    # the corrected set is labelled only beside the printed one
+    # the corrected set needs a label only next to the printed one
     gaits = {"value" if list(sets) == ["corrected"] else SETS[name]: gait for name, gait in sets.items()}
     caption = f"Fixed point of the step map and its multipliers{', under both sets of equations' if both else ''}"
     return side_by_side(caption, lines, gaits, note=note)
@@ -55,11 +55,11 @@ WORK_SOURCES = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hi
 
 
 WORK_ROUNDING = 1e-12
-"""Works below this fraction of the largest are rounding errors."""
+"""Fraction of the largest contribution to the work below which a contribution is a rounding error."""
 
 
 def works(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield a column for each source of work, skipping rounding errors."""
+    """Yield a column for each source of work; values at rounding level are omitted."""
     for name, source in WORK_SOURCES.items():
 
         def source_work(record: Mapping[str, Any], name: str = name) -> float | None:
@@ -88,7 +88,7 @@ def symbol(name: str) -> str:
 
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
-    """Format one multiplier of a gait; a dash if it has fewer."""
+    """Format one multiplier of a gait; a dash if the gait has fewer multipliers."""
     multipliers = gait["multipliers"]
     return complex_number(*multipliers[place]) if place < len(multipliers) else NONE
 

@@ -10,7 +10,7 @@ NONE = "–"
 SPACE = "\u00a0"
 """No-break space between a number and its unit."""
 MIN_LENGTH_M = 1e-9
-"""Lengths below this are zero: walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
+"""Lengths below this count as zero: walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
 PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
 """Range of magnitudes written without a power of ten."""
 MAX_DECIMALS, DEFAULT_DECIMALS = 6, 4
@@ -18,7 +18,7 @@ MAX_DECIMALS, DEFAULT_DECIMALS = 6, 4
 
 
 def number(value: float | None, digits: int = 5) -> str:
-    """Format with `digits` significant digits, without trailing zeros; a dash for None."""
+    """Format a number with `digits` significant digits, without trailing zeros; a dash for None."""
     if value is None or not math.isfinite(value):
         return NONE
     if value != 0 and not PLAIN_FROM <= abs(value) < PLAIN_BELOW:
@@ -28,7 +28,7 @@ def number(value: float | None, digits: int = 5) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Format with a fixed number of decimals, for columns; a dash for None."""
+    """Format a number with a fixed number of decimals, for columns; a dash for None."""
     if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{decimals}f}"
@@ -36,14 +36,14 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def decimals_left(error: float | None) -> int:
-    """Return how many decimals an error leaves: at most half a unit of the last one."""
+    """Return the largest number of decimals for which the error is at most half a unit of the last one."""
     if error is None:
         return DEFAULT_DECIMALS
     return max(0, min(MAX_DECIMALS, math.floor(-math.log10(2.0 * error)))) if error else MAX_DECIMALS
 
 
 def power_of_ten(value: float, digits: int = 3) -> str:
-    """Format as in 1.2 × 10⁻⁹ or 10⁻⁹."""
+    """Format a number as in 1.2 × 10⁻⁹ or 10⁻⁹."""
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
     ten = f"10{str(int(exponent)).translate(SUPERSCRIPTS)}"
@@ -51,13 +51,13 @@ def power_of_ten(value: float, digits: int = 3) -> str:
 
 
 def quantity(value: float | None, unit: str, digits: int = 5) -> str:
-    """Format with a unit, as in 0.70365 s, without a line break."""
+    """Format a value with its unit, as in 0.70365 s, without a line break."""
     text = number(value, digits)
     return text if text == NONE or unit in ("", "1") else f"{text}{SPACE}{unit}"
 
 
 def drop_rounding(value_m: float) -> float:
-    """Return a length (m), or zero if it is below rounding and solver tolerance."""
+    """Return a length (m), or zero if it is at the level of rounding and solver tolerance."""
     return value_m if abs(value_m) >= MIN_LENGTH_M else 0.0
 
 
@@ -80,7 +80,7 @@ def whole(value: int | None) -> str:
 
 
 def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
-    """Format a range as 'minimum to maximum' with its unit; equal values as one."""
+    """Format a range as 'minimum to maximum' with its unit; equal ends as one value."""
     ordered = sorted(values)
     if not ordered:
         return NONE

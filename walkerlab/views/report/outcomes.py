@@ -10,7 +10,7 @@ from walkerlab.views.report.tables import Tone
 
 RIGID_STAGE, CONTACT_STAGE = "simulate", "contact-sim"
 MODEL_NAMES = {RIGID_STAGE: "Rigid model", CONTACT_STAGE: "Contact model"}
-"""Stages that simulate a walk, and the model each simulates."""
+"""Stages that simulate a walk, with the name of the model."""
 
 WALKED_LABEL = Outcome.WALKED.label
 
@@ -22,7 +22,7 @@ def ends(outcome: str) -> str:
 
 
 def walks(steps: int, outcome: str) -> str:
-    """Describe how far a walker gets, to follow its name in a sentence."""
+    """Describe how far a walker gets, as the predicate of a sentence about it."""
     if outcome == WALKED_LABEL:
         return f"walks all {count(steps, 'step')}"
     return f"walks {count(steps, 'step')} and then {ends(outcome)}" if steps else f"{ends(outcome)} in its first step"
@@ -33,7 +33,7 @@ def tone(outcome: str) -> Tone:
 
 
 DEFAULT_CHECK = "a hundred times tighter tolerances"
-"""Default settings of the second walk that measures the error."""
+"""Default tolerances of the second walk that measures the error."""
 ERRORS = {
     "step_period_s": ("in period", "s"),
     "step_length_m": ("in step length", "m"),
@@ -43,7 +43,7 @@ ERRORS = {
     "end_time_s": ("in end time", "s"),
     "cost_of_transport": ("in cost of transport", "1"),
 }
-"""Quantities with a numerical error: text and unit."""
+"""Text and unit of each quantity that has a numerical error."""
 
 
 def describe_error(error: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Renders sections to self-contained HTML pages that include style and script."""
+"""Renders sections as self-contained HTML pages that include style and script."""
 
 import base64
 import hashlib
@@ -23,36 +23,36 @@ CODE_SPAN = re.compile(r"`([^`]*)`")
 
 @dataclass(frozen=True)
 class Page:
-    """One file of the report; texts are plain."""
+    """One HTML file of the report; its texts are plain text."""
 
     title: str
     sections: tuple[Section, ...]
     lead: tuple[str, ...] = ()  # paragraphs under the title
     file: str = MAIN
     study: Source | None = None  # the study reproduced, or None
-    relation: str = "Redoes"  # how closely the scene matches it, in a word or two
+    relation: str = "Redoes"  # begins the line on the study: Redoes, or After if the scene differs
     pending: tuple[str, ...] = ()  # results still being computed
-    run: str = ""  # name of the run for advised commands; empty for the default run
+    run: str = ""  # name of the run for suggested commands; empty for the default run
 
 
 def render(page: Page) -> str:
-    """Render a page to HTML. Raises ValueError if two sections have one anchor."""
+    """Render a page as HTML; ValueError if two sections have the same anchor."""
     anchors = [section.anchor for section in page.sections]
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report have one anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
-    # The only texts that are markup already: files of this package.
+    # Markup only for the package's own files; all other texts are escaped.
     own = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
     return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, **own)
 
 
 def digest_of(script: str) -> str:
-    """Return the digest by which the page's header allows its script to run."""
+    """Return the hash by which the page's content security policy recognises its own script."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 
 def environment(run: str = "") -> Environment:
-    """Create the template environment: every text is escaped, and commands name the run."""
+    """Create the template environment, which escapes all texts and adds the run's options to suggested commands."""
     template_environment = Environment(
         loader=FileSystemLoader(TEMPLATE_FOLDER),
         autoescape=True,
@@ -66,7 +66,7 @@ def environment(run: str = "") -> Environment:
 
 
 def to_markup(text: str) -> Markup:
-    """Convert a text to markup: code between backticks, and powers of ten in one notation."""
+    """Convert a text to markup, with backticks as code elements and powers of ten in a single notation."""
     parts = CODE_SPAN.split(text)
     markup_parts = [
         Markup("<code>%s</code>") % part if index % 2 else escape(CARET.sub(to_superscript, POWER.sub(power, part)))
@@ -76,5 +76,5 @@ def to_markup(text: str) -> Markup:
 
 
 def source(name: str) -> str:
-    """Read a file to embed in the page, without comment lines."""
+    """Read a file to embed in the page, leaving out comment lines."""
     return COMMENT_LINE.sub("", (TEMPLATE_FOLDER / name).read_text(encoding="utf-8")).strip()

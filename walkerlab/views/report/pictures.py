@@ -1,4 +1,4 @@
-"""Embeds drawn figures in the page: shapes and texts, compact, in colours that the page chooses."""
+"""Embeds figures in the page, as compact SVG in colours that the page can change, or as PNG."""
 
 import base64
 import re
@@ -13,7 +13,7 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.views.report.blocks import CASES, COSTS, MAIN, Picture
 
 PAGES = {"accuracy": COSTS, "stability": CASES}
-"""Pages of figures by the beginning of their name; all others are on the report itself."""
+"""Page of each figure by the first part of its name; all other figures are on the main page."""
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
@@ -30,7 +30,7 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
     svg = folder / figure["svg"]
     with svg.open("rb") as file:
         box = VIEW_BOX.search(file.read(2000))
-    # in CSS pixels, to reserve space while loading; 0 if unknown
+    # size in CSS pixels, to reserve space while loading; 0 if unknown
     width, height = (round(float(box[1])), round(float(box[2]))) if box else (0, 0)
     number = f"Figure {figure['number']}. " if numbered and "number" in figure else ""
     title = f"{number}{figure['title']}."
@@ -54,11 +54,11 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
 
 
 MAX_BYTES = 1_400_000
-"""Limit for all images together; the largest drawings are embedded as pixels until they fit."""
+"""Maximum size of all images together; the largest drawings are embedded as PNG until all fit."""
 
 
 def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
-    """Choose SVG files, or PNG files if the SVG files exceed `most` bytes; FileNotFoundError if one is missing."""
+    """Choose SVG files, or PNG for the largest until all fit in `most` bytes; FileNotFoundError if one is missing."""
     chosen = [svg for svg, _ in drawings]
     sizes = [svg.stat().st_size for svg in chosen]
     for index in sorted(range(len(drawings)), key=lambda index: -sizes[index]):
@@ -75,7 +75,7 @@ SVG_ELEMENTS = frozenset(
     {"svg", "g", "path", "rect", "circle", "line", "polyline", "polygon", "text", "tspan", "use", "defs", "clipPath"}
     | {"pattern", "image"}
 )
-"""Elements and attributes that are copied; none of them runs or fetches anything."""
+"""Elements and attributes that are copied; none of them runs or loads anything."""
 ATTRIBUTES = frozenset(
     {"viewBox", "d", "x", "y", "x1", "y1", "x2", "y2", "cx", "cy", "r", "width", "height", "points", "transform"}
     | {"style", "id", "clip-path", "preserveAspectRatio", "patternUnits", "fill", "stroke"}
@@ -91,7 +91,7 @@ ROLES = {
     "#cc79a7": "--leg-2",
     "#d55e00": "--fig-red",
 }
-"""Colours in drawings that the page may replace (dark mode), with their CSS variables."""
+"""Colours in drawings that the page may replace (in dark mode), with their CSS variables."""
 COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 LONG_DECIMALS = re.compile(r"(-?\d+\.\d{2})\d+")
 WHITESPACE = re.compile(r"\s+")
@@ -99,7 +99,7 @@ EXTERNAL_REFERENCE = re.compile(r"url\((?!#)|@import|expression|javascript:", re
 
 
 def inline(file: Path, alt: str) -> Markup:
-    """Inline an SVG file, described by `alt`; FileNotFoundError without it, ParseError for malformed XML."""
+    """Inline an SVG file, described by `alt`; FileNotFoundError if it is missing, ParseError for malformed XML."""
     root = ET.fromstring(file.read_bytes())
     values = [value for element in root.iter() for value in element.attrib.values()]
     references = [reference for value in values for reference in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
@@ -110,7 +110,7 @@ def inline(file: Path, alt: str) -> Markup:
 
 
 def markup(element: ET.Element, used: set[str]) -> Markup:
-    """Copy an allowed element, with its children and the ids in `used`; return nothing for other elements."""
+    """Copy an allowed element with its children, keeping only ids in `used`; return nothing for other elements."""
     name = element.tag.removeprefix(SVG)
     if name not in SVG_ELEMENTS:
         return Markup("")
@@ -129,7 +129,7 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
 
 
 def text_content(text: str | None, name: str) -> Markup:
-    """Escape the text of a text element; empty for other elements."""
+    """Escape the text of a text element; return nothing for other elements."""
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 

@@ -1,7 +1,7 @@
-"""The sections of the report in order, including those that evidence registers.
+"""The sections of the report in order, including those that `walkerlab.evidence` registers.
 
 Each entry is a function that builds a `Section` from the results, or returns None if it has nothing to show. It reads
-`Results.summary(stage)` (empty if the stage did not run) and `Results.group(stage, path)` (then None).
+`Results.summary(stage)` (empty if the stage did not run) and `Results.group(stage, path)` (None in that case).
 """
 
 import math
@@ -62,7 +62,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
 
 
 def pages_of(results: Results, run: str) -> tuple[Page, ...]:
-    """Build the report and those further pages that have content; `run`: name of the run's folder."""
+    """Build the report and the further pages that have content; `run`: name of the run's folder."""
     sections = sections_of(results)
     main = [section for section in sections if section.page == MAIN]
     further = {file: tuple(section for section in sections if section.page == file) for file in closing.TITLES}

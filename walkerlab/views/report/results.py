@@ -14,7 +14,7 @@ from walkerlab.views.report.blocks import Picture, Section
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A run as the report sees it."""
+    """Results of a run and what is missing, as used by the report."""
 
     config: Config
     stored: Mapping[str, Content] = field(default_factory=dict)  # up-to-date results by stage
@@ -25,21 +25,21 @@ class Results:
 
     @property
     def departures(self) -> Sequence[str] | None:
-        """Differences between this scene and the paper's; empty without differences, None if not compared."""
+        """Differences between this scene and the paper's; empty if there are none, None if not compared."""
         departures: Sequence[str] | None = self.summary("compare").get("departures")
         return departures
 
     @property
     def claims(self) -> Sequence[Mapping[str, Any]]:
-        """Judged values that a study claims for this scene; empty for other scenes."""
+        """Values claimed by a study for this scene, with verdicts; empty for other scenes."""
         return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:
-        """Return the summary of a stage's result; empty without a result."""
+        """Return the summary of a stage's result; empty if there is no result."""
         return self.stored[stage].summary if stage in self.stored else {}
 
     def group(self, stage: str, path: str) -> Group | None:
-        """Return a group of a stage's result, or None."""
+        """Return a group of a stage's result, or None if it does not exist."""
         result = self.stored.get(stage)
         return None if result is None else result.groups.get(path)
 
@@ -48,7 +48,7 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """Turn a function of results and a stage's summary into a section; None without the summary's key `needed`."""
+    """Turn a function of results and summary into a section; None if the summary is empty or lacks the key `needed`."""
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:
         @wraps(make)

@@ -52,8 +52,8 @@ def write_pages(
     left_out: Sequence[LeftOut] = (),
     pending: Sequence[str] = (),
 ) -> tuple[tuple[Page, ...], Results]:
-    """Write pages of the available results, and remove pages without content; StorageError if that fails."""
-    # also called while other results are being computed, with the names of those in `pending`
+    """Write pages of the available results, and remove pages that have no content; StorageError if that fails."""
+    # also called while other stages are running, whose names are in `pending`
     waited = [entry for entry in left_out if entry.what not in pending]
     names = {entry.what for entry in waited}
     failed = frozenset(name for name in names if has_failed(config, name, names))
@@ -69,7 +69,7 @@ def write_pages(
 
 
 def has_failed(config: Config, name: str, left_out: set[str]) -> bool:
-    """Whether a stage was tried and failed itself, rather than lacking another stage's result."""
+    """Whether a stage ran and failed itself, rather than lacking another stage's result."""
     if name not in PIPELINE["report"].inputs(config) or PIPELINE[name].why_unsuited(config) is not None:
         return False
     return left_out.isdisjoint(PIPELINE[name].inputs(config))

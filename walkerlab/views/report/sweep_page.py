@@ -1,4 +1,4 @@
-"""Draw the figure and write the page of a sweep."""
+"""Plots a sweep and writes its page."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,19 +23,19 @@ from walkerlab.views.report.words import words
 
 PAGE = "sweep.html"
 MAX_ROWS = 200
-"""Points that the page lists."""
+"""Maximum number of points that the page lists."""
 
 
 @dataclass(frozen=True)
 class Files:
-    """Files of a drawn sweep."""
+    """Files written for a plotted sweep."""
 
     page: Path
     figures: tuple[Path, ...]
 
 
 def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> Files:
-    """Draw a sweep's quantities over its parameters, or over `against`, and write its page.
+    """Plot a sweep's quantities over its parameters, or over `against`, and write its page.
 
     Raises ConfigError for an unknown quantity, StorageError if the system refuses.
     """
@@ -64,7 +64,7 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
 
 
 def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], option: str = "--show") -> None:
-    """Raise ConfigError for an unknown quantity of the result."""
+    """Raise ConfigError if a name is not a quantity of the result."""
     for name in names:
         if not is_number(group, name, dims):
             listed = ", ".join(key for key in group.variables if is_number(group, key, dims) and "." not in key)
@@ -72,7 +72,7 @@ def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], 
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity, given by option; first results may lack nested quantities."""
+    """Raise ConfigError for an unknown quantity in `names` (by option); first results may lack nested quantities."""
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

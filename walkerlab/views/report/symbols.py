@@ -1,4 +1,4 @@
-"""Converts formulas in plain letters, as results hold them, to mathematical symbols."""
+"""Converts formulas in plain letters, as stored in results, to mathematical symbols."""
 
 import re
 

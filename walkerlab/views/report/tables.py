@@ -1,7 +1,4 @@
-"""Tables for page, terminal, CSV and TeX: one description of columns and records for all formats.
-
-`tex` writes it for LaTeX.
-"""
+"""Tables for pages, terminal, CSV and, in `tex`, LaTeX: one description of columns and records for all formats."""
 
 import re
 import unicodedata
@@ -17,7 +14,7 @@ from walkerlab.views.report.numbers import NONE, number
 Tone = Literal["plain", "good", "fair", "bad", "given"]
 PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
 LONGEST_CELL: Final = 100
-"""Characters; a column with longer cells is treated as text."""
+"""Number of characters of a cell above which its column is treated as text."""
 BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
 """A number without unit or words."""
 
@@ -27,7 +24,7 @@ class Cell:
     """A cell of a table."""
 
     text: str
-    tone: Tone | None = None  # sets the text as a badge
+    tone: Tone | None = None  # if set, the text is a badge of this tone
     value: Any = None  # value behind the text, or None
 
     @property
@@ -47,12 +44,12 @@ def format_plain(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """Describes how to show one value of each record: a column or, in `side_by_side`, a row."""
+    """Describes how to show one value of each record, as a column or, in `side_by_side`, as a row."""
 
-    title: str  # head, with the unit
+    title: str  # header, with the unit
     # key of a record's value (`a/b` for nested records), or a function of the record; None if records are rows of cells
     of: str | Callable[[Any], Any] | None = None
-    # formats a value as text or as a cell with a tone; values that are cells already are kept
+    # formats a value as text or as a cell with a tone; values that are already cells are kept
     written: Callable[[Any], str | Cell] = format_plain
     numeric: bool = False  # whether to align as numbers
     wide: bool = False  # whether cells hold sentences, which a terminal omits
@@ -76,7 +73,7 @@ class Column:
 def measured(
     words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
 ) -> Column:
-    """Column of numbers in a multiple of their unit, taken from the label of the key or from its suffix."""
+    """Return a column of numbers in a prefixed unit; the unit comes from `labels` or from the suffix of the key."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
     factor = PREFIXES[prefix]
 
@@ -89,15 +86,15 @@ def measured(
 
 @dataclass(frozen=True)
 class Table:
-    """A table; the first cell of a row is its head."""
+    """A table; the first cell of each row is its header."""
 
     template: ClassVar[str] = "table"
     caption: str
     columns: tuple[Column, ...]
-    groups: Mapping[str, Sequence[Sequence[Cell]]]  # rows by group title, which may be empty
+    groups: Mapping[str, Sequence[Sequence[Cell]]]  # rows by group title; the title may be empty
     wordy: bool = False  # whether cells hold sentences; on a narrow screen each row then becomes a card
     note: str = ""  # text below the table
-    by: str = ""  # head of the column of group titles
+    by: str = ""  # header of the column of group titles
 
     def __bool__(self) -> bool:
         return any(self.groups.values())
@@ -112,7 +109,7 @@ def table(
     note: str = "",
     by: str = "",
 ) -> Table:
-    """Build a table with a row for each record; a mapping gives groups. ValueError for rows of unequal length."""
+    """Build a table with a row per record; a mapping gives groups by title. ValueError for rows of unequal length."""
     groups = records if isinstance(records, Mapping) else {"": records}
     for record in chain.from_iterable(groups.values()):
         if isinstance(record, list | tuple) and len(record) != len(columns):
@@ -125,7 +122,7 @@ def table(
 
 
 def grouped(records: Iterable[Mapping[str, Any]], *keys: str) -> dict[str, list[Mapping[str, Any]]]:
-    """Group records by their values of some keys, in order of first appearance."""
+    """Group records that have the same values of some keys, in order of first appearance."""
     groups: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
         groups.setdefault(" ".join(str(record[key]) for key in keys), []).append(record)
@@ -141,7 +138,7 @@ def side_by_side(
     numeric: bool = True,
     note: str = "",
 ) -> Table:
-    """Build a table with a column for each record, and a row for each line that any record has a value for."""
+    """Build a table with a column per record and a row per line; lines without any value are left out."""
     rows = []
     for line in lines:
         cells = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
@@ -151,7 +148,7 @@ def side_by_side(
 
 
 def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
-    """Build a table of all keys of the records; cells of missing keys stay empty."""
+    """Build a table of all keys of the records; cells of missing keys are empty."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     present = [[row.get(name) is not None for name in names] for row in rows]
     cells = [
@@ -165,7 +162,7 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
 
 
 def flat(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
-    """Return heads and rows, with group titles as a column of their own; `wide` includes columns of sentences."""
+    """Return header and rows, with any group titles in a first column; `wide` includes columns of sentences."""
     places = [place for place, column in enumerate(content.columns) if wide or not column.wide]
     titled = any(content.groups)
     heads = [*([content.by] if titled else []), *(content.columns[place].title for place in places)]
@@ -192,7 +189,7 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def width(text: str) -> int:
-    """Width of a text on a terminal; combining characters take no room."""
+    """Return the width of a text on a terminal, where combining characters take no space."""
     return sum(not unicodedata.combining(letter) for letter in text)
 
 

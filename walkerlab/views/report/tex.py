@@ -1,4 +1,4 @@
-"""Tables for LaTeX: aligned decimals, equal digits per column, heads and captions with symbols."""
+"""Tables for LaTeX: aligned decimals, equal digits per column, headers and captions with symbols."""
 
 import math
 import re
@@ -9,17 +9,17 @@ from walkerlab.views.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPT
 from walkerlab.views.report.tables import Table, flat
 
 COLUMN_DIGITS: Final = 5
-"""Significant digits of a column's largest number or, if its numbers differ too much, of each one."""
+"""Significant digits of a column's largest number or, if its numbers differ too much, of each number."""
 MAX_PLAIN: Final = 1e6
-"""Numbers from here on are written with a power of ten."""
+"""Magnitude from which numbers are written with a power of ten."""
 EMPTY_CELL: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, siunitx}"
 DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
 """A number in a siunitx column: sign, digits before and after the point, sign and digits of the exponent."""
 ESCAPED_POWER = re.compile(r"\\\^\{\}(-?\d+)")
-"""A power in a text that is already escaped."""
+"""A power in escaped text."""
 SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
-"""A symbol in plain letters, already escaped."""
+"""A symbol in plain letters in escaped text."""
 IN_MATHS = {
     **{f"{sign}{DOT}": rf"$\dot{{\{name}}}$" for name, sign in LETTERS.items()},
     **{sign: rf"$\{name}$" for name, sign in LETTERS.items()},
@@ -29,12 +29,12 @@ IN_MATHS = {
     **{"√": r"$\sqrt{}$", "≈": r"$\approx$", "µ": r"$\mu$", "…": r"\ldots{}"},
 }
 SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
-"""Characters that LaTeX sets only in maths."""
+"""Characters that LaTeX can set only in maths."""
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
 def as_tex(content: Table) -> bytes:
-    """Format a table for booktabs and siunitx, as a float if it has a caption; without columns of sentences."""
+    """Format a table for booktabs and siunitx, as a float if it has a caption, without columns of sentences."""
     heads, rows = flat(content)
     columns = [in_column(head, [row[place].datum for row in rows]) for place, head in enumerate(heads)]
     head, *lines = [" & ".join(line) + r" \\" for line in zip(*(cells for _, cells in columns), strict=True)]
@@ -47,12 +47,12 @@ def as_tex(content: Table) -> bytes:
 
 
 def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
-    """Return layout and cells of a column; a numeric column is a siunitx column with aligned points."""
+    """Return layout and cells of a column; a numeric column is a siunitx column, aligned at the decimal point."""
     numbers = [value for value in data if is_number(value)]
     written = column_format(numbers)
     cells = [written(value) if is_number(value) else in_tex(value) for value in data]
     decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
-    # texts that read as numbers, such as printed ones, count where they are most of a column
+    # text that looks like numbers, such as printed values, makes the column numeric if it is most of the column
     if not numbers and 2 * len(decimals) <= len(cells) - cells.count(EMPTY_CELL):
         return "l", [in_tex(head), *cells]
     aligned = [cell if DECIMAL.fullmatch(cell) else f"{{{cell}}}" for cell in cells]
@@ -69,7 +69,7 @@ def column_format(numbers: Sequence[float]) -> Callable[[float], str]:
         return str
     sizes = [abs(value) for value in numbers if value != 0.0 and math.isfinite(value)] or [1.0]
     decimals = max(0, COLUMN_DIGITS - 1 - math.floor(math.log10(max(sizes))))
-    # the smallest one loses a digit at most
+    # equal decimals if the smallest number loses at most one digit
     if min(sizes) >= 10.0 ** (COLUMN_DIGITS - 2 - decimals) and max(sizes) < MAX_PLAIN:
         return lambda value: f"{value:z.{decimals}f}"
     return lambda value: "0" if value == 0.0 else with_digits(value)
@@ -81,7 +81,7 @@ def with_digits(value: float) -> str:
 
 
 def room_for(cells: Sequence[str]) -> str:
-    """Return siunitx's table-format: digits before and after the point, and of the exponent."""
+    """Return siunitx's table-format: digits before and after the decimal point, and of the exponent."""
     parts = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
     sign, before, behind, below, power = (max(len(groups[place]) for groups in parts) for place in range(5))
     return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")
@@ -96,7 +96,7 @@ def in_tex(value: Any) -> str:
 
 
 def symbol_in_tex(match: re.Match[str]) -> str:
-    """Set a symbol with its subscript, such as t_left or dtheta_1, in maths."""
+    """Typeset a symbol with its subscript, such as t_left or dtheta_1, in maths."""
     rate, letter, below = match.groups()
     letter = rf"\{letter}" if letter in LETTERS else letter
     below = below if len(below) == 1 else rf"\mathrm{{{below}}}"

@@ -8,13 +8,13 @@ from walkerlab.views.report.tables import in_lines, record_table
 
 INDENT = "  "
 PARAGRAPH_WIDTH = 100
-"""Line width of a paragraph, characters."""
+"""Line width of a paragraph (characters)."""
 LONGEST_ROW, ENDS = 12, 4
-"""Longest row shown in full, and values shown at each end of longer ones."""
+"""Length of the longest row shown in full, and number of values shown at each end of a longer row."""
 
 
 def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
-    """Yield a line per key, nested values below it, and objects as a table; `short` shortens long rows."""
+    """Yield a line per key, nested values below it, and a table for a list of objects; `short` shortens long rows."""
     widest = max((len(key) for key in summary), default=0)
     for key, value in summary.items():
         if isinstance(value, Mapping) and value:
@@ -28,7 +28,7 @@ def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bo
 
 
 def cut(value: Any) -> Any:
-    """Return a value, with the middle of a long row left out."""
+    """Leave out the middle of a long row; return other values unchanged."""
     if not isinstance(value, list) or len(value) <= LONGEST_ROW:
         return value
     ends = [in_words(item) for item in (*value[:ENDS], *value[-ENDS:])]
@@ -36,7 +36,7 @@ def cut(value: Any) -> Any:
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Tabulate objects with their keys as heads, and name the keys that are too wide."""
+    """Tabulate objects with their keys as headers, and name the keys whose columns are too wide."""
     cells = record_table(rows, in_words)
     long = [column.title for column in cells.columns if column.wide]
     return [*in_lines(cells), f"with --json also: {', '.join(long)}"] if long else in_lines(cells)

@@ -23,7 +23,7 @@ LEG_CHANNELS = {
     "angle": "a", "velocity": "v", "shank_angle": "b",
     "normal_force_N": "n", "friction_force_N": "d", "penetration_m": "p",
 }  # fmt: skip
-"""Channel names by stored variable."""
+"""Name of the channel for each stored variable."""
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -33,10 +33,10 @@ Channels = dict[str, Array]
 class Track:
     """The motion of one walker, an array for each channel."""
 
-    # by name, all equally long; 't' is time (s), 'h' the hip, 'f' the feet's lowest points, 'k' the knees, each with x
-    # along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s), 'b' of the
-    # shanks; 'n', 'd' normal force and friction (N), 'p' penetration and 'q' slip since the touch (m); 'ke', 'pe', 'me'
-    # energies (J); a last digit is the leg
+    # channels by name, of equal length: 't' time (s); 'h' hip, 'f' lowest points of the feet and 'k' knees, each with x
+    # along and y above the slope (m); 'a', 'v' angle and velocity of the legs or thighs (rad, rad/s); 'b' angle of the
+    # shanks, 'u' of the torso; 's' stance leg; 'n', 'd' normal force and friction (N); 'p' penetration and 'q' slip
+    # since touchdown (m); 'ke', 'pe', 'me' energies (J); a final digit is the leg
     channels: Channels
 
     def __getitem__(self, name: str) -> Array:
@@ -52,7 +52,7 @@ class Track:
         return Track({name: values[inside] for name, values in self.channels.items()})
 
     def thinned(self, gap: float) -> Track:
-        """Keep a few samples per interval (s): the first, that of the largest force, and both sides of a jump."""
+        """Keep in each interval of `gap` s the first sample, that of the largest force, and both sides of a jump."""
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)
         first = np.flatnonzero(np.diff(bins, prepend=-1))
@@ -98,5 +98,5 @@ def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) 
 
 
 def sampling_gap(config: RigidConfig) -> float:
-    """Return the time between samples (s), scaled with the leg's pendulum time."""
+    """Return the time between samples (s), in proportion to the leg's pendulum time."""
     return math.sqrt(9.81 / config.gravity_m_s2 * config.walker.leg_length_m) / SAMPLES_A_SECOND

@@ -1,4 +1,4 @@
-"""Sentences of the report, from a file of templates for each section."""
+"""Sentences of the report, from a template file for each section."""
 
 from pathlib import Path
 

@@ -55,7 +55,7 @@ def costs(summary: Row) -> Table:
 
 
 def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
-    """Yield the methods of a scene, each with its shortest run per error level and its smallest error."""
+    """Yield the methods of a scene, each with its shortest run for each error level and its smallest error."""
     # errors below the uncertainty of the reference are shown as upper bounds
     best, bound = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
     for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():
@@ -91,7 +91,7 @@ def failure_text(run: Row) -> str:
 
 
 def nearest_library(summary: Row, scene: str) -> Row | None:
-    """Return the library run that ends closest to the reference, or None."""
+    """Return the run of a library that ends closest to the reference; None if no library reached the end."""
     runs = [row for row in summary["rows"] if row["scene"] == scene and row["error"] is not None]
     library_runs = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
     return min(library_runs, key=lambda row: float(row["error"]), default=None)
@@ -122,7 +122,7 @@ NOT_RUN_COLUMNS = (
 
 
 def not_run(summary: Row) -> Table:
-    """Tabulate the omitted tolerances, a row per reason."""
+    """Tabulate the tolerances that were not run, a row per reason."""
     groups = grouped(summary.get("not_run", []), "scene", "method", "why").values()
     rows = [{**entries[0], "tolerances": [float(entry["tolerance"]) for entry in entries]} for entries in groups]
     return table("Not run", NOT_RUN_COLUMNS, rows, wordy=True)

@@ -34,7 +34,7 @@ ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit
 
 
 def limit(results: Results) -> Section | None:
-    """Show how the contact model converges to the rigid one; None if not computed."""
+    """Show how the contact model converges to the rigid one; None if that was not computed."""
     summary = results.summary("tune")
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
     pushes = results.config.push_off.impulse_N_s != 0.0
@@ -72,17 +72,17 @@ LOSS_HEADS = {
     "knee_strikes": ("in the knee's strike", "in the strike"),
     "knee_stop": ("in the knees' stops", "none"),
 }
-"""Energy losses per step: stored name, label, and the rigid model's counterpart."""
+"""Energy losses per step: stored name, label, and text for the rigid model."""
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
-    """Return the energy (J) that a gait loses in a channel; None for knees that lose nothing."""
+    """Return the energy (J) that a gait loses in a channel; None if knees lose nothing."""
     energy = gait["lost_J"].get(channel)
     return energy if energy or channel in ("damping", "friction") else None
 
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
-    """Format multipliers, largest first; a complex one stands for its conjugate pair."""
+    """Format multipliers, with ± for a conjugate pair."""
     return join_words(
         fixed(real, 4) + (f" ± {fixed(imag, 4)}i" if imag > 1e-9 else "") for real, imag in multipliers if imag >= 0.0
     )

@@ -20,7 +20,7 @@ TITLES = {
 
 
 def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
-    """Link to the further pages, each with its sections' findings, and announce pending results."""
+    """Link to the further pages, with the findings of their sections, and announce pending results."""
     items = []
     for file, sections in pages.items():
         findings = (section.finding for section in sections if file != PAPER_PAGE or results.claims)
@@ -48,7 +48,7 @@ def left_out(results: Results) -> Section | None:
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
     """Yield one row per reason: what is missing, then what depends on it."""
     reasons = {absent.why for absent in missing}
-    # the innermost reason: of 'it needs simulate: it needs fixedpoint: no gait' the last part
+    # the innermost reason is the last part: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for why in dict.fromkeys(causes.values()):
         alike = [absent for absent in missing if absent.why == why]

@@ -52,9 +52,9 @@ def parameter(summary: Mapping[str, Any]) -> str:
 
 DIAGRAM_MODEL = "rigid"
 MIN_MARK_DISTANCE = 16.0
-"""Minimum distance between two marks in diagram units: 1.5 times their width, for touch screens."""
+"""Minimum distance between two marks (diagram units): 1.5 times their width, for touch screens."""
 SAMPLING_MARGIN = 3.0
-"""Sampling interval relative to that of the walk: these gaits are only looked at."""
+"""Sampling interval relative to that of the walks; coarser, since these gaits are only viewed."""
 
 
 class DiagramAxis:
@@ -69,7 +69,7 @@ class DiagramAxis:
         return round(self.start + (value - self.least) / (self.most - self.least) * (self.end - self.start), 1)
 
     def ticks(self) -> tuple[tuple[float, str], ...]:
-        """Return round tick values: position and text."""
+        """Return position and text of the ticks, at round values."""
         rough = (self.most - self.least) / 5.0
         ten = 10.0 ** math.floor(math.log10(rough))
         step = ten * next(digit for digit in (5, 2, 1) if digit * ten <= rough)
@@ -78,7 +78,7 @@ class DiagramAxis:
 
 
 def gait_diagram(results: Results) -> Diagram | None:
-    """Plot step periods over the parameter, with marks for gaits whose motion is stored; None without any."""
+    """Plot step periods over the parameter, with marks for gaits whose motion is stored; None if there are none."""
     summary = results.summary("continuation")
     branches: list[Group] = []
     while (branch := results.group("continuation", f"{DIAGRAM_MODEL}/branch_{len(branches)}")) is not None:
@@ -119,7 +119,7 @@ def gait_diagram(results: Results) -> Diagram | None:
 
 
 def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
-    """Select marks that do not cover one another, stable gaits first."""
+    """Select marks that do not overlap, preferring stable gaits."""
     chosen: list[int] = []
     for place in sorted(range(len(marks)), key=lambda place: not marks[place].stable):
         x, y = marks[place].x, marks[place].y
@@ -131,7 +131,7 @@ def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
 def curves(
     branch: Group, across: DiagramAxis, up: DiagramAxis
 ) -> Iterator[tuple[tuple[tuple[float, float], ...], bool]]:
-    """Yield a line for each step of a branch's gaits and each stretch of equal stability."""
+    """Yield lines (points, stable): one for each step of the gaits and each stretch of equal stability."""
     stable = branch["stable"].astype(bool)
     bounds = [0, *(int(place) + 1 for place in np.flatnonzero(np.diff(stable))), stable.size]
     for begin, end in pairwise(bounds):

@@ -13,8 +13,8 @@ from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
 NO_EFFECT = 1e-6
-"""Share of the largest singular value, below which no walk depends on a combination."""
-CONTRADICTION = 3.0  # standard errors between a prior and the walk, from which they contradict each other
+"""Fraction of the largest singular value below which a combination has no effect on any walk."""
+CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 GAIT_WORDS = {
     "step_length_m": "steps of {}",
@@ -47,7 +47,7 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
-    """Sentences of the answer: estimates, undetermined combinations, fit, gait and the other model."""
+    """Return the answer in sentences: estimates, undetermined combinations, fit, gait and the other model."""
     verdict = next(row for row in summary["models"] if row["model"] == summary["model"])
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
@@ -95,18 +95,18 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
 
 
 def rounded(value: float, error: float | None) -> str:
-    """Format a value with the decimals that its standard error leaves."""
+    """Format a value with the decimals that its standard error allows."""
     return number(value, 6) if not error else fixed(value, decimals_of(error))
 
 
 def decimals_of(error: float) -> int:
-    """Return the decimals that show one digit of an error, two if the first is 1."""
+    """Return the number of decimals that shows one digit of an error, or two if its first digit is 1."""
     mantissa, _, exponent = f"{error:.1e}".partition("e")
     return max(0, -int(exponent) + (mantissa < "2"))
 
 
 def with_error(value: float, error: float | None, unit: str) -> str:
-    """Format as in 9.8 ± 0.2 kg."""
+    """Format a value with its standard error, as in 9.8 ± 0.2 kg."""
     ending = UNITS_IN_WORDS.get(unit, f" {unit}")
     if not error:
         return f"{number(value, 6)}{ending}"
@@ -116,7 +116,7 @@ def with_error(value: float, error: float | None, unit: str) -> str:
 
 
 def mass_in_words(key: str, text: str) -> str:
-    """Say a mass as a builder does, as in 'the hip weighs 9.8 ± 0.2 kg'."""
+    """Describe a mass in a builder's words, as in 'the hip weighs 9.8 ± 0.2 kg'."""
     body = axis_label(key).removesuffix(" mass")
     return f"the legs weigh {text} kg each" if body == "leg" else f"the {body} weighs {text} kg"
 
@@ -136,7 +136,7 @@ def with_labels(combination: str, keys: Sequence[str]) -> str:
 
 
 def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
-    """Name and value of each prior that the walk contradicts, and by how many standard errors."""
+    """Return label and value of each prior that the walk contradicts, and the distance in standard errors."""
     return [
         (axis_label(row["key"]), with_error(row["value"], row["standard_deviation"], row["unit"]), row["distance"])
         for row in priors
@@ -163,7 +163,7 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def noise_in_words(summary: Mapping[str, Any]) -> str:
-    """Describe the noise: the floor's, then the measurement's."""
+    """Describe the noise of the floor, then that of the measurement."""
     floor = summary["noise"]["process"]["roughness_m"]
     parts = [f"floor {number(1e3 * floor, 2)} mm rough" if floor else "an even floor"]
     parts += [

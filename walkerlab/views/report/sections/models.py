@@ -17,7 +17,7 @@ RELEASE_TEXTS = {
     "compression": "when the leading foot stops sinking in, both knees rigid in the impact",
     "touch": "at the leading foot's first touch, free in the impact",
 }
-"""Instants at which the trailing knee may be released."""
+"""Texts for the instants at which the trailing knee may be released."""
 RELEASE_COLUMNS = (
     Column("trailing knee released", "released"),
     Column("steps", lambda walk: f"{walk['steps']} of {walk['of']}, {walk['outcome']}" if "steps" in walk else None),
@@ -30,7 +30,7 @@ RELEASE_COLUMNS = (
 
 
 def section(results: Results) -> Section | None:
-    """Tabulate the largest differences of angles and velocities, and the distance between the orbits."""
+    """Tabulate the largest differences of the legs' motions and, with knees, the effect of the release instant."""
     summary = results.summary("compare")
     angle, velocity = summary.get("max_angle_error_rad"), summary.get("max_velocity_error_rad_s")
     if not angle or not velocity:

@@ -1,4 +1,4 @@
-"""Animated walks with a close-up of a foot and three synchronised plots; and the figures."""
+"""Animated walks with a close-up of a foot and three synchronised plots, and the section of figures."""
 
 import math
 from typing import Any
@@ -18,7 +18,7 @@ OVERLAY_STYLES = {"identified": "rigid", "measured": "contact"}
 CLOSEUP_DEPTHS = 5.0
 """Height of the close-up relative to the largest penetration outside impacts."""
 STILL_VIEW_OF_RIGID = 4e-3
-"""Height of the close-up for a foot that does not sink in, leg lengths."""
+"""Height of the close-up of a foot that does not sink in (leg lengths)."""
 
 
 def section(results: Results) -> Section | None:
@@ -26,9 +26,9 @@ def section(results: Results) -> Section | None:
 
 
 def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
-    """Show the first steps of both models' walks; None if no motion was stored."""
+    """Animate the first steps of both models' walks; None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODEL_NAMES]
-    # of the slower model
+    # end when the slower model has taken `most` steps
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
     by_stage = {stage: track_in(results.group(stage, "trajectory")) for stage in MODEL_NAMES}
     tracks = {stage: track.until(end) for stage, track in by_stage.items() if track is not None}
@@ -55,7 +55,7 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
 
 
 def overlay(results: Results) -> Player | None:
-    """Show the measured walk over the identified one; None if no angles were measured."""
+    """Animate the measured walk over the identified one; None if no angles were measured."""
     motions = {style: results.group("identify", f"{name}_motion") for name, style in OVERLAY_STYLES.items()}
     tracks = {style: track for style, motion in motions.items() if (track := track_in(motion)) is not None}
     about = motions["rigid"]
@@ -115,7 +115,7 @@ def weight(tracks: dict[str, Track]) -> float:
 
 
 def closeup(track: Track | None, length: float) -> float:
-    """Return the height of the close-up (m): a few penetrations of a standing foot of the contact model."""
+    """Return the height of the close-up (m), a few times the penetration of a standing foot of the contact model."""
     if track is None or "p0" not in track.channels:
         return STILL_VIEW_OF_RIGID * length
     depths = np.concatenate((track["p0"], track["p1"]))
@@ -145,7 +145,7 @@ def ground(results: Results) -> tuple[tuple[float, float], ...]:
 
 
 def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, int, int, int]:
-    """Return left, top, width and height (mm, y down) of the area that the walkers cross on the tilted slope."""
+    """Return left, top, width and height (mm, y down) of the region that the walkers cross, with the slope tilted."""
     along: Array = np.concatenate([track[name] for track in tracks for name in ("fx0", "hx", "fx1")])
     above: Array = np.concatenate([track[name] for track in tracks for name in ("fy0", "hy", "fy1")])
     right = along * math.cos(slope) + above * math.sin(slope)

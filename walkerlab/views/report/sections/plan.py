@@ -1,4 +1,4 @@
-"""The measurements that would determine parameters."""
+"""Measurements that would determine parameters."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,12 +19,12 @@ def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
-    """Sentences of the answer: the simplest measurement, the steps for each wanted error, the assumptions."""
+    """Return the answer in sentences: the simplest measurement, the steps for each target error, the assumptions."""
     return words.parts("plan.findings", summary, [goal for goal in goals(summary) if goal])
 
 
 def goals(summary: Mapping[str, Any]) -> list[str]:
-    """Sentences on the fewest steps for each wanted error."""
+    """Return a sentence for each target error that gives the fewest steps to reach it."""
     rows = summary["measurements"]
     return [
         goal(rows, place, summary["max_steps"]) for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry

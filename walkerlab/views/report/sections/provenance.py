@@ -11,7 +11,7 @@ from walkerlab.views.report.words import words
 
 
 def section(results: Results) -> Section | None:
-    stored = [result for result in results.stored.values() if isinstance(result, Stored)]  # read from files
+    stored = [result for result in results.stored.values() if isinstance(result, Stored)]  # these have a provenance
     note = "A key covers config, inputs and code; equal keys give equal digests. Neither includes timings."
     blocks = (
         Code("The config of this run, defaults included", to_yaml(results.config).strip()),
@@ -41,7 +41,7 @@ DIGEST_COLUMNS = (
 
 
 def software_table(stored: Sequence[Stored]) -> Table:
-    """Tabulate software versions and platform; one column unless results differ."""
+    """Tabulate software versions and platform, in one column unless the results differ."""
     used: dict[tuple[tuple[str, str], ...], list[str]] = {}
     for result in stored:
         origin = result.provenance

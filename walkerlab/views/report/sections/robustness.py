@@ -1,4 +1,4 @@
-"""The disturbances that a gait survives, and the parameters that matter most."""
+"""Disturbances that a gait survives, and the parameters that matter most."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,11 +10,11 @@ from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
 MAX_DERIVATIVES = 12
-"""Derivatives per table."""
+"""Maximum number of derivatives per table."""
 BUILDER_KEYS = ("walker.", "push_off.")
 """Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
-"""Quantity used to rank parameters; scaled, since a norm in s/m falls with leg length by its dimension alone."""
+"""Quantity that ranks the parameters; it is scaled, since a norm in s/m depends on leg length by its unit alone."""
 MODEL_COLUMN = Column("model", "model")
 NORM_COLUMNS = (
     MODEL_COLUMN,
@@ -80,13 +80,13 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
 
 
 def ranks(row: Mapping[str, Any]) -> bool:
-    """Whether a derivative has a relative effect that can be ranked."""
+    """Whether a derivative can be ranked by its relative effect."""
     return row.get("relative") is not None and not row.get("why")
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     rows = summary["sensitivity"]
-    ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # of both models
+    ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # both models together
     built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
     environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]

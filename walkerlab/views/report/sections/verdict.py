@@ -32,7 +32,7 @@ def section(results: Results) -> Section | None:
 
 
 def failures(results: Results) -> list[str]:
-    """List failed stages with what depends on them, then stored results that report a failure."""
+    """List failed stages with the results that depend on them, then stored results that report a failure."""
     failed = [absent for absent in results.absent if absent.what in results.failed]
     dependent = [absent for absent in results.absent if absent.what not in results.failed]
     sentences = [
@@ -61,7 +61,7 @@ def outcome_statements(results: Results) -> Iterator[Statement]:
 
 
 def walk_end(results: Results, stage: str) -> tuple[float | None, float | None]:
-    """Return when a walk ended (s) and the hip's height then (m); None where not stored."""
+    """Return when a walk ended (s) and how high the hip then was (m); None for values not stored."""
     summary, trajectory = results.summary(stage), results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:
         return summary.get("end_time_s"), None

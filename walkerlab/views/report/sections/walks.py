@@ -1,4 +1,4 @@
-"""The walks: quantities of the contact walk, assumptions of the rigid one, and the steps of both."""
+"""The walks: quantities of the contact walk, assumptions of the rigid walk, and the steps of both."""
 
 from collections.abc import Mapping
 from itertools import zip_longest
@@ -63,7 +63,7 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
 
 
 def joules(value: float, digits: int = 4) -> str:
-    """Format an energy that may be of the order of rounding."""
+    """Format an energy (J) that may be at the level of rounding."""
     return f"{number(value, digits) if abs(value) >= 1e-3 or value == 0 else power_of_ten(value, 2)} J"
 
 
@@ -109,7 +109,7 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
 
 
 HEAD_STEPS, TAIL_STEPS = 20, 4
-"""Steps listed from the beginning and the end of a longer walk."""
+"""Number of steps listed from the beginning and from the end of a longer walk."""
 SERIES = {
     (RIGID_STAGE, "step_periods_s"): "rigid T (s)",
     (CONTACT_STAGE, "step_periods_s"): "contact T (s)",
@@ -117,7 +117,7 @@ SERIES = {
     (CONTACT_STAGE, "step_lengths_m"): "contact S (m)",
     (CONTACT_STAGE, "slips_m"): "slip of the stance foot (mm)",
 }
-"""Columns of the step table: stage, key and title."""
+"""Columns of the step table: title by stage and key."""
 
 
 def steps(results: Results) -> Section | None:
@@ -143,7 +143,7 @@ def steps(results: Results) -> Section | None:
 
 
 def format_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:
-    """Format a quantity of a step with the decimals that its numerical error leaves; a slip in mm."""
+    """Format a quantity of a step with the decimals that its numerical error allows; slips in mm."""
     factor = 1e3 if key == "slips_m" else 1.0
     error = (summary.get("numerical_error") or {}).get(ERROR_OF_EACH_STEP[key])
     return fixed(value and factor * value, decimals_left(error and factor * error))
