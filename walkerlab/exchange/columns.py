@@ -18,14 +18,19 @@ from walkerlab.exchange.recording import TIME, Recording
 Array = NDArray[np.float64]
 
 DEG_RAD: Final = math.pi / 180.0
+ANGLES: Final = {
+    "rad": 1.0, "radian": 1.0, "radians": 1.0, "deg": DEG_RAD, "degree": DEG_RAD, "degrees": DEG_RAD, "°": DEG_RAD,
+}  # fmt: skip
+LENGTHS: Final = {
+    "m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 1e-3, "millimeter": 1e-3, "cm": 1e-2, "centimeter": 1e-2, "km": 1e3,
+    "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "foot": 0.3048,
+}  # fmt: skip
 UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
     "time": {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "min": 60.0},
-    "angle": {"rad": 1.0, "radian": 1.0, "radians": 1.0, "deg": DEG_RAD, "degree": DEG_RAD}
-    | {"°": DEG_RAD},
-    "rate": {"rad/s": 1.0, "rad/sec": 1.0, "deg/s": DEG_RAD, "deg/sec": DEG_RAD, "°/s": DEG_RAD},
-    "length": {"m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 1e-3, "millimeter": 1e-3, "cm": 1e-2, "centimeter": 1e-2}
-    | {"km": 1e3, "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "foot": 0.3048},
-    "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2},
+    "angle": ANGLES,
+    "rate": {f"{unit}/{second}": value for unit, value in ANGLES.items() for second in ("s", "sec")},
+    "length": LENGTHS,
+    "speed": {f"{unit}/{second}": value for unit, value in LENGTHS.items() for second in ("s", "sec")},
     "force": {"n": 1.0, "newton": 1.0, "kn": 1e3},
     "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
 }  # fmt: skip

@@ -65,7 +65,10 @@ def first_end(trial: Trial) -> End:
     Raises WalkEndsError if the walk does not reach its end.
     """
     if isinstance(trial, RigidTrial) and (compass := compass_of(trial)) is not None:
-        return End(taylor_reference.TAYLOR_METHOD, taylor_reference.walk_by_taylor(compass, trial.start, trial.steps))
+        state = taylor_reference.walk_by_taylor(compass, trial.start, trial.steps)
+        if state is None:
+            raise WalkEndsError("the walk ends early (no heel strike), without an end state to compare")
+        return End(taylor_reference.TAYLOR_METHOD, state)
     return tightest_end(trial, "dop853")
 
 

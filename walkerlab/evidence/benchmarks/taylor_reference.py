@@ -19,8 +19,8 @@ def is_installed() -> bool:
     return importlib.util.find_spec("heyoka") is not None
 
 
-def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats:
-    """Return the state after `steps` heel strikes; raise ValueError if one does not occur."""
+def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats | None:
+    """Return the state after `steps` heel strikes; None if one does not occur."""
     limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
     passing, striking = integrators(walker)
     state = np.array(start)
@@ -31,7 +31,7 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
             integrator.reset_cooldowns()
             outcome = integrator.propagate_until(limit)[0]
             if outcome.value >= 0 or abs(integrator.time) >= limit:
-                raise ValueError("no heel strike")
+                return None
             state = np.array(integrator.state)
         state = np.array(impact(walker, *state.tolist()))
     return state

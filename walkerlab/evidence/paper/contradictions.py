@@ -5,7 +5,6 @@ from functools import cache
 from itertools import product
 from math import sin
 from types import MappingProxyType
-from typing import Final
 
 from walkerlab.evidence.paper.printed import (
     LARGEST_ERROR,
@@ -20,8 +19,6 @@ from walkerlab.evidence.paper.printed import (
     StartRow,
 )
 
-APPROXIMATE_FACTOR: Final = 2.0
-"""Largest ratio of a value to 1e-4 that still counts as 'around 1e-4'."""
 Interval = tuple[float, float]
 
 

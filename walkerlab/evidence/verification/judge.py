@@ -120,16 +120,16 @@ def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case
     return [Measure(f"difference in time from {what}, in pendulum times", finite(difference), limit)]
 
 
-def other_methods(case_tolerances: str) -> tuple[Method, ...]:
+def other_methods(configured: str) -> tuple[Method, ...]:
     """Return the methods to try instead of the configured one: ours first, then the libraries'."""
     ours = [name for name, method in METHODS.items() if method.compiled]
-    return tuple(method_named(name) for name in dict.fromkeys((*ours, *LIBRARY_METHODS)) if name != case_tolerances)
+    return tuple(method_named(name) for name in dict.fromkeys((*ours, *LIBRARY_METHODS)) if name != configured)
 
 
-def second_walk(case_tolerances: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
+def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
     """Walk with other methods until one has an answer; `budget` limits right-hand sides (libraries may get fewer)."""
     tried: list[str] = []
-    for method in other_methods(case_tolerances):
+    for method in other_methods(configured):
         result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))
         if result.outcome.answered:
             return Second(method.name, result, ", ".join(tried))
