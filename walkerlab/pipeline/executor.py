@@ -342,7 +342,7 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
 
 
 def short_reason(why: str) -> str:
-    """Remove a quoted reason of another stage, or a quoted error, from a reason; it is shown on a line of its own."""
+    """Cut a reason where it quotes another stage's reason or an error; the quoted text has a line of its own."""
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 

@@ -26,7 +26,7 @@ Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
 
 def without_block(name: str) -> str:
-    """Say that the config lacks a block."""
+    """Return the message that the config lacks a block."""
     return f"the config has no {name} block"
 
 
@@ -57,7 +57,7 @@ def walks_and(*names: str) -> Inputs:
 
 
 def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """Require the known problems and, if the walker is not a study's, the inputs for a start of its own scene."""
+    """Require the known problems and, for a walker that belongs to no study, the inputs for a start in its scene."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 
@@ -68,7 +68,7 @@ class Option:
     flag: str  # as typed, such as --steps
     key: str  # dotted config key
     # placeholder in the help, which also sets the syntax: "KEY" is a config key; a form with "=" may be repeated and
-    # takes a name with two numbers ("...=A:B"), with optional numbers ("[=A:B]") or with another name ("...=...,...")
+    # takes a name with two numbers ("...=A:B"), with optional numbers ("[=A:B]") or with a value ("...=...,...")
     metavar: str
     help: str
     type: type = str  # type of its value; list for an option that may be repeated
@@ -98,10 +98,10 @@ class Stage:
     precompile: str = ""
     # the only command that runs it (its own or `STAGE --full`); other results stay current without its result
     only_by: str = ""
-    early_with: tuple[str, ...] = ()  # results that suffice for a first drawing while other stages still run
+    early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
     does_without: Lacks = nothing  # returns what its scene lacks under a config: name, reason and saving of each part
     takes_of_scene: type | None = None  # replaces `takes` for a walker that belongs to no study
-    takes_of_paper: type | None = None  # slice of the built-in paper config that the stage's own cases are based on
+    takes_of_paper: type | None = None  # type of the slice of the built-in paper config that its own cases use
     # returns the versions of other programs that its result depends on, by name
     programs: Callable[[], Mapping[str, str]] | None = None
     # returns the digests of files that its result depends on, by config key

@@ -51,7 +51,7 @@ class StageReport:
 
 @dataclass(frozen=True)
 class Options:
-    """Options of running a stage."""
+    """Options for running a stage."""
 
     force: bool = False  # run the stage and all that it needs, even if their results are current
     wait: bool = True  # wait for another process that works in the folder, then reuse its results

@@ -255,7 +255,7 @@ def tell(value: Any) -> None:
 
 
 _lines: list[Connection] = []
-"""In a worker: the connection to its parent."""
+"""Connection to the parent process in a worker; empty in any other process."""
 
 
 def serve(number: int, modules: Sequence[str]) -> None:

@@ -1,4 +1,4 @@
-"""Basins of attraction: which starts walk, and which attractor each reaches in how many steps."""
+"""Basins of attraction: the starts that lead to walking, the attractors that they reach, and the steps needed."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
 
 
 def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]:
-    """Return the period and further data of each attractor: a state (SI), or the contact model's step."""
+    """Describe each attractor by its period and either one of its states (SI) or the contact model's step."""
     if isinstance(question, ContactQuestion):
         own = question.starts.gait
         return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
@@ -236,7 +236,7 @@ def gaussian(window: Window) -> Floats:
 
 def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
     """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell; empty if there is none."""
-    # accurate to the size of a cell
+    # the distance is accurate to the size of a cell
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
         return {}

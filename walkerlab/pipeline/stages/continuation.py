@@ -284,7 +284,7 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 def sample_again(family: Family) -> dict[str, Any] | None:
     """Return the changes of an even sample of gaits at tighter tolerances; None if there are no gaits."""
-    # they are solved for again, so that the residual of Newton's method counts as well
+    # the gaits are solved for again, so that the residual of Newton's method counts as well
     step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
         return None

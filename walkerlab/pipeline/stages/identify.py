@@ -94,7 +94,7 @@ def refuse(config: IdentifyConfig) -> None:
 def identify_divided(
     config: IdentifyConfig, block: Identify, ask: Callable[[Measured], Identification]
 ) -> tuple[Identification, Measured]:
-    """Identify from the first division into steps that fits; if none does, from the first that gives a result."""
+    """Try divisions of the walk into steps; return the first with a good fit, or else the first that can be fitted."""
     first: tuple[Identification, Measured] | None = None
     problem: NoAnswer | None = None
     for measured in read_divisions(block, config):
@@ -118,7 +118,7 @@ def divide_again(
     ask: Callable[[Measured], Identification],
     before: tuple[Identification, Measured],
 ) -> tuple[Identification, Measured]:
-    """Repeat a fit if the identified slope and sensors move the heel strikes; keep `before` if the new fit is bad."""
+    """Repeat a fit if the identified slope and sensors move heel strikes; keep the old fit if the new one is bad."""
     result, measured = before
     if not isinstance(measured, MeasuredAngles):
         return before
@@ -248,7 +248,7 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
 
 
 def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAngles) -> dict[str, Group]:
-    """Build the identified and the measured motion of the first steps; empty for knees, whose shank angles are unknown.
+    """Build the identified and measured motions of the first steps; empty for kneed walkers (no shank angles).
 
     Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
 

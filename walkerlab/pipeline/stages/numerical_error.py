@@ -64,5 +64,5 @@ def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
 
 
 def evenly_spread(count: int, wanted: int) -> list[int]:
-    """Return at most `wanted` evenly spaced indices below `count`, both ends included."""
+    """Return at most `wanted` evenly spaced indices from 0 to `count` - 1, both included."""
     return sorted({round(place) for place in np.linspace(0, count - 1, min(count, wanted)).tolist()})

@@ -212,7 +212,7 @@ def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUn
 
 
 def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """Find the largest disturbance of this sign that the gait survives; for the rigid model's push, append `GIVEN`."""
+    """Return the largest disturbance of one sign that the gait survives, and the rigid model's reactions to a push."""
     size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
     if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
         return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]

@@ -165,7 +165,7 @@ def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Varia
 
 
 def legs() -> dict[str, Variable]:
-    """Build the coordinate of the legs, numbered 1 and 2 whatever their role."""
+    """Build the coordinate of the legs, which are numbered 1 and 2 in any role."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
@@ -184,7 +184,7 @@ def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[st
 
 
 def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build the columns of a walk's steps: those that both models have, and the given ones."""
+    """Build the columns of a walk's steps: those common to both models, and those in `values`."""
     common = {
         "period_s": walk.periods_s,
         "length_m": walk.lengths_m,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from walkerlab.pipeline.store.content import Attribute, Group, Variable
 
-# With this text and its length, netCDF readers recognise a dimension without a coordinate.
+# Text by which netCDF readers recognise a dimension without a coordinate; the length follows it.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 CONVENTIONS = "CF-1.11"
 """Metadata conventions of the files, for netCDF readers."""

@@ -83,7 +83,7 @@ class RunFolder:
             return None
 
     def write_record(self, record: Record) -> None:
-        """Write the run record; raises StorageError if the system refuses."""
+        """Write the run record; raises StorageError if that fails."""
         write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
     @contextlib.contextmanager

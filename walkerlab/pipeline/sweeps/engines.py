@@ -192,7 +192,7 @@ def engine_named(text: str) -> tuple[SweepEngine, str]:
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
-    # multiprocessing itself tests like this for a process that it started, which first runs the calling script
+    # multiprocessing's own test for a process that it started; such a process first runs the calling script
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
             "--engine dask: the processes that Dask starts run the calling script, which would sweep once more.", GUARD

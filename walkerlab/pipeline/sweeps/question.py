@@ -49,7 +49,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class SweptStage:
-    """Stage to compute at values of parameters.
+    """Stage with the parameter values at which a sweep computes it.
 
     names   names of the parameters in results: the last part of each key, or more parts if last parts coincide
     """
@@ -156,7 +156,7 @@ def refuse_too_many(what: str, count: int) -> None:
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
-    """Parse one `--over KEY=VALUES` into key, values and origin; raises ConfigError if it has another form."""
+    """Parse one `--over KEY=VALUES` into key, values and origin; raises ConfigError for any other form."""
     key, equals, values = text.partition("=")
     source = f"--over {text}"
     key = key.strip()

@@ -39,7 +39,7 @@ PIPELINE_AT = "walkerlab.pipeline.graph:PIPELINE"
 
 @dataclass(frozen=True)
 class SweepWork:
-    """Options of computing a sweep."""
+    """Options for computing a sweep."""
 
     engine: SweepEngine = ENGINES["local"]  # engine that computes the points
     order: Order = field(default_factory=Order)  # options of the engine
