@@ -1,1 +1,1 @@
-"""The pipeline: its stages, their order, the keys of their results, and how they are run."""
+"""Pipeline of stages: their order, the keys of their results, and the code that runs them."""

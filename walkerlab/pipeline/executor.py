@@ -25,7 +25,7 @@ from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
 
 @dataclass(frozen=True)
 class StageDone:
-    """Outcome of a step: `action` as in `Step`, `wall_s` the run time."""
+    """Outcome of a stage: the action taken (as in `Step`), its reason and the run time (s)."""
 
     stage: str
     action: str
@@ -46,10 +46,10 @@ class Begun:
 class Executor:
     """Brings the results of some stages under one config up to date.
 
-    stages    in an order in which they can run
+    stages    stages to bring up to date, each after the stages that it needs
     force     run every stage that is not left out, even if its result is current
-    jobs      processes for independent stages, and for independent cells of a stage
-    again     repeat walks at tighter tolerances for their numerical error
+    jobs      maximum number of processes, for independent stages and for independent work units of a stage
+    again     whether to repeat walks at tighter tolerances for their numerical error
     answers   results so far, by stage
     left_out  reason for each stage that is left out
     done      outcomes so far
@@ -66,7 +66,7 @@ class Executor:
         again: bool = True,
         reporter: Reporter | None = None,
     ) -> None:
-        """Store the arguments; nothing is read or run."""
+        """Store the arguments without reading or running anything."""
         self.config, self.results, self.stages, self.graph = config, results, tuple(stages), results.keys.graph
         self.force, self.jobs, self.again, self.reporter = force, jobs, again, reporter or Silent()
         self.answers: dict[str, Content] = {}
@@ -81,17 +81,17 @@ class Executor:
         self._total = 0
 
     def plan(self) -> tuple[Step, ...]:
-        """Decide on all stages, assuming that each step succeeds; changes no file."""
+        """Decide on all stages on the assumption that each step succeeds; changes no file."""
         steps = []
         for stage in self.stages:
             step = self._decide(stage)
-            if not (stage.only_by and step.action == "run"):  # an optional result counts once it exists
+            if not (stage.only_by and step.action == "run"):  # an optional result counts only if it exists
                 self._expect(step)
             steps.append(step)
         return tuple(steps)
 
     def carry_out(self, likely: Sequence[Stage] = ()) -> None:
-        """Decide on each stage and carry that out; `likely` are the stages that the plan would run."""
+        """Reuse, run or leave out each stage; `likely` holds the stages that the plan expects to run."""
         self._waiting, self._left, self._total = list(self.stages), [stage.name for stage in likely], len(likely)
         side_by_side = self.jobs > 1 and any_side_by_side(likely, self.config)
         try:
@@ -114,19 +114,19 @@ class Executor:
         self.reporter.note(outcome_line(done))
 
     def inputs(self, stage: Stage) -> dict[str, Content]:
-        """Return the results that a stage gets: those it needs, and optional ones that are current."""
+        """Return the results that a stage gets: those that it needs, and optional ones that are current."""
         available = self.answers.keys() - self.left_out.keys()
         return {name: self.answers[name] for name in stage.results(self.config) if name in available}
 
     def missing_inputs(self, stage: Stage) -> tuple[LeftOut, ...]:
-        """Return the results that a stage has to do without, with the reasons."""
+        """Return the results that a stage lacks, with the reasons."""
         missing = (name for name in stage.results(self.config) if name not in self._keys)
         return tuple(omission_of(name, self._why_absent(name)) for name in missing)
 
     def _decide(self, stage: Stage) -> Step:
-        """Decide on a stage after its inputs.
+        """Decide whether to reuse, run or leave out a stage, after the decisions on its inputs.
 
-        Optional inputs outside this plan are looked up here; a damaged one is reported as left out.
+        Optional inputs outside this plan are looked up first; a damaged one is recorded as left out.
         """
         for name in stage.if_current:
             if self.graph[name] not in self.stages:
@@ -153,7 +153,7 @@ class Executor:
         return self.results.keys.identity(stage, self.config, keys, self.again)
 
     def _expect(self, step: Step) -> None:
-        """Assume that a step succeeds: a stage that is to run will have a result."""
+        """Assume that a step succeeds, so that a stage that is to run will have a result."""
         if step.identity is None:
             self.left_out[step.stage.name] = step.reason
         elif step.action == "reuse" and step.found is not None:
@@ -162,7 +162,7 @@ class Executor:
             self._keys[step.stage.name] = step.identity.key
 
     def _settle(self, step: Step, answer: Content) -> None:
-        """Record a stage's result, which may be that there is no answer."""
+        """Record a stage's result, or the reason why it found no answer."""
         self.answers[step.stage.name] = answer
         if answer.no_answer is not None:
             self.left_out[step.stage.name] = answer.no_answer.message
@@ -209,7 +209,7 @@ class Executor:
                 self._watch(future)
 
     def _run_here(self, step: Step, precompiler: Precompiler) -> None:
-        """Run a stage in this process; on a new machine a worker compiles for a later stage meanwhile."""
+        """Run a stage in this process; if no kernels exist yet, a worker compiles those of a later stage meanwhile."""
         importlib.import_module(step.stage.module)
         slow = [stage for stage in self._waiting if stage.precompile]
         if slow and nothing_compiled_yet():
@@ -226,12 +226,12 @@ class Executor:
         future.add_done_callback(lambda ended: self._events.put(partial(self._ended, ended)))
 
     def _hear(self, reporter: StageReporter, message: tuple[str, Any]) -> None:
-        """Queue a worker's message for this thread; messages arrive in another one."""
+        """Queue a worker's message, which arrives in another thread, for this thread."""
         call, *arguments = message
         self._events.put(lambda: bool(getattr(reporter, call)(*arguments)))
 
     def _ended(self, future: Future[Any]) -> bool:
-        """Keep a stage's result; return True, since a process is free now."""
+        """Handle a finished future; return True, because a process has become free."""
         self._working.remove(future)
         if future in self._running:
             self._finish(future, future.result())
@@ -261,7 +261,7 @@ class Executor:
         return Begun(step, task, reporter, time.perf_counter())
 
     def _finish(self, future: Future[Any] | None, answer: Content) -> None:
-        """Keep a stage's result, which is partial if there is no answer."""
+        """Store a stage's result, which is partial if the stage found no answer, and report the end of the stage."""
         running_stage = self._running[future]
         step, name = running_stage.step, running_stage.task.name
         awaited = any(name in stage.results(self.config) for stage in self._waiting)
@@ -277,7 +277,7 @@ class Executor:
         running_stage.reporter.end("; ".join([outcome_line(done), *answered, *rest]))
 
     def _draw_early(self) -> None:
-        """Draw a partial page once its main results exist, while others are being computed."""
+        """Draw a partial page as soon as its main results exist, while other stages still run."""
         unsettled = self._unsettled()
         folder = self.results.folder
         if folder is None:
@@ -300,7 +300,7 @@ class Executor:
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
-    """Return the state of each stage in a run's own folder and the step that would update it; changes no file."""
+    """Return the step that would bring each stage of a run folder up to date; changes no file."""
     return Executor(config, FolderResults(folder, graph, elsewhere=False), graph.stages).plan()
 
 
@@ -312,11 +312,11 @@ def answer_in_memory(
     again: bool = True,
     reporter: Reporter | None = None,
 ) -> Content:
-    """Compute a stage's result without files, reusing inputs that the memory holds.
+    """Compute a stage's result without files, reusing inputs from memory.
 
-    again  repeat walks at tighter tolerances for their numerical error
+    again  whether to repeat walks at tighter tolerances for their numerical error
 
-    Raises ConfigError as `Graph.needed_in_memory`.
+    Raises ConfigError as `Graph.needed_in_memory` does.
     """
     stages = memory.keys.graph.needed_in_memory(target, config)
     run = Executor(config, memory, stages, again=again, reporter=reporter)
@@ -328,12 +328,12 @@ def answer_in_memory(
 
 
 def omission_of(stage: str, why: str) -> LeftOut:
-    """Describe a stage that does not run."""
+    """Describe a stage that is left out, with the reason and what that saves."""
     return LeftOut(stage, why, "loading and compiling contact code" if why == without_block("contact") else "")
 
 
 def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
-    """Whether two of the stages need nothing of each other."""
+    """Whether at least two of the stages are independent and can run in parallel."""
     needed: dict[str, set[str]] = {}
     for stage in stages:
         own = {name for name in stage.results(config) if name in needed}
@@ -342,7 +342,7 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
 
 
 def short_reason(why: str) -> str:
-    """Shorten a reason that quotes another stage's reason or an error; those have lines of their own."""
+    """Cut a reason where it quotes another stage's reason or an error; the quoted text has a line of its own."""
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 

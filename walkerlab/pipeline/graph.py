@@ -1,6 +1,6 @@
 """The pipeline on one page: every stage with its part of the config, its options and its inputs.
 
-The command line's help is made from this page, so it imports no stage, no config and no arrays.
+The command line builds its help from this file, so the file imports no stage, no config schema and no NumPy.
 """
 
 from __future__ import annotations
@@ -26,54 +26,54 @@ Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 
 
 def without_block(name: str) -> str:
-    """Say that the config lacks a block."""
+    """Return the message that the config lacks a block."""
     return f"the config has no {name} block"
 
 
 def nothing(_config: object) -> tuple[Any, ...]:
-    """Return an empty tuple: no inputs, or nothing left out."""
+    """Return an empty tuple, for stages without inputs or omitted parts."""
     return ()
 
 
 def results_of(*names: str) -> Inputs:
-    """Return a function that gives these names for every config."""
+    """Return a function that returns these stage names for every config."""
     return lambda _config: names
 
 
 def gait_unless_start_is_given(config: StartConfig) -> tuple[str, ...]:
-    """Need the fixed point unless the config gives a start state; so slopes without a gait can be walked as well."""
+    """Require the fixed point unless the config gives a start state, which also works on slopes without a gait."""
     return ("fixedpoint",) if config.start == "fixed-point" else ()
 
 
 def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
-    """Need the fixed point if it gives the start state or the pads' pitch."""
+    """Require the fixed point if the start state or the pad pitch comes from it."""
     pitch_of_gait = config.contact is not None and config.contact.pad_pitch == "rigid"
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 
 def walks_and(*names: str) -> Inputs:
-    """Return a function that gives the walks, a recorded one if the config names it, and these names."""
+    """Return a function that returns the walking stages, `recorded-walk` if there is a recording, and `names`."""
     return lambda config: (*WALKED, *(() if config.recording is None else ("recorded-walk",)), *names)
 
 
 def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """Need the known problems; for walkers of no study also the start of their own scene."""
+    """Require the known problems and, for a walker that belongs to no study, the inputs for a start in its scene."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 
 @dataclass(frozen=True)
 class Option:
-    """Option of a stage's command that sets a key of the config."""
+    """Option of a stage's command; sets a key of the config."""
 
-    flag: str  # as typed
-    key: str  # dotted
-    # "KEY" for the name of a key; with "=", pairs, which may be repeated: "...=A:B" two numbers by name, "[=A:B]" where
-    # they may be missing, "...=...,..." names by name
+    flag: str  # as typed, such as --steps
+    key: str  # dotted config key
+    # placeholder in the help, which also sets the syntax: "KEY" is a config key; a form with "=" may be repeated and
+    # takes a name with two numbers ("...=A:B"), with optional numbers ("[=A:B]") or with a value ("...=...,...")
     metavar: str
     help: str
-    type: type = str  # of its value; list for names, which may be repeated
-    needs: tuple[str, ...] = ()  # flags without which it means nothing
-    runs: str = ""  # the stage that the command runs instead of its own; sets no key
+    type: type = str  # type of its value; list for an option that may be repeated
+    needs: tuple[str, ...] = ()  # flags that must be given with it
+    runs: str = ""  # stage that the command then runs instead of its own; such an option sets no key
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", int)
@@ -83,59 +83,60 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 class Stage:
     """One stage of the pipeline."""
 
-    name: str  # of its command and its artifact
-    module: str  # of its `run`; imported only when the stage runs
+    name: str  # name of the stage, its command and its artifact
+    module: str  # module of its `run` function; imported only when the stage runs
     purpose: str  # one line for the user
-    # type of the config that `run` takes, whose keys its result depends on; None for the whole config
+    # type of the config slice that `run` takes and its result depends on; None for the whole config
     takes: type | None
-    inputs: Inputs = nothing  # stages whose results it needs under a config, earlier in the table
-    if_current: tuple[str, ...] = ()  # stages whose results it takes if they are current
-    options: tuple[Option, ...] = ()  # of its command, besides those of all stages
-    requires: tuple[str, ...] = ()  # blocks without which it is left out
-    # "times" runs alone; "draws" writes files besides its artifact, from whatever results there are
+    inputs: Inputs = nothing  # returns the stages, earlier in the table, whose results it needs under a config
+    if_current: tuple[str, ...] = ()  # stages whose results it uses only if they are current
+    options: tuple[Option, ...] = ()  # options of its command in addition to those of all stages
+    requires: tuple[str, ...] = ()  # config blocks that it needs; it is left out if one is missing
+    # "times" runs alone; "draws" writes files in addition to its artifact, from the results that exist
     work: Literal["computes", "times", "draws"] = "computes"
-    # function of its module that compiles its kernels, where that pays while an earlier stage runs
+    # function of its module that compiles its kernels while an earlier stage runs; empty if that does not pay
     precompile: str = ""
-    only_by: str = ""  # the one command that runs it, its own or `STAGE --full`; nothing is stale without its result
-    early_with: tuple[str, ...] = ()  # the results with which it is worth drawing while others are still being computed
-    does_without: Lacks = nothing  # parts that its scene lacks under a config: name, reason and saving
-    takes_of_scene: type | None = None  # the same for a walker of no study, where that is another type
-    takes_of_paper: type | None = None  # keys of the built-in paper config that its own cases are based on
-    # versions of other programs that its result depends on, by name
+    # the only command that runs it (its own or `STAGE --full`); other results stay current without its result
+    only_by: str = ""
+    early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
+    does_without: Lacks = nothing  # returns what its scene lacks under a config: name, reason and saving of each part
+    takes_of_scene: type | None = None  # replaces `takes` for a walker that belongs to no study
+    takes_of_paper: type | None = None  # type of the slice of the built-in paper config that its own cases use
+    # returns the versions of other programs that its result depends on, by name
     programs: Callable[[], Mapping[str, str]] | None = None
-    # digests of files that its result depends on, by key of the config
+    # returns the digests of files that its result depends on, by config key
     files: Callable[[Config], Mapping[str, str]] | None = None
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """Return the keys of the config that its result depends on, dotted."""
+        """Return the dotted config keys that its result depends on."""
         if self.takes is not None:
             return tuple(reads.dotted_keys(self.takes))
-        from walkerlab.config.schema import Config  # not for the help of the command line
+        from walkerlab.config.schema import Config  # imported here: the command line's help does not need it
 
         return tuple(Config.model_fields)
 
     def takes_under(self, config: RigidConfig) -> type | None:
-        """Return the type of the part of a config that its result depends on."""
+        """Return the type of the config slice that its result depends on."""
         return self.takes if self.takes_of_scene is None or is_studied(config) else self.takes_of_scene
 
     def results(self, config: Config) -> tuple[str, ...]:
-        """Return the stages whose results it takes: required ones, then optional ones."""
+        """Return the stages whose results it uses: required ones, then optional ones."""
         return (*self.inputs(config), *self.if_current)
 
     def why_unsuited(self, config: Config) -> str | None:
-        """Return why it cannot run under a config; None if it can."""
+        """Return the reason why it cannot run under a config; None if it can."""
         missing = (block for block in self.requires if getattr(config, block) is None)
         return next(map(without_block, missing), None)
 
     def refuse_unsuited(self, target: str, config: Config) -> None:
-        """Raise ConfigError if it cannot run under a config, although `target` needs it."""
+        """Raise ConfigError if this stage, which `target` needs, cannot run under a config."""
         if "recording" in self.requires and config.recording is None:
             raise ConfigError(
                 f"{target} needs a recorded walk, and {without_block('recording')}.",
                 "Name its file: walkerlab compare --with FILE.",
             )
-        # Imported here: the help of the command line needs neither.
+        # Imported here: the command line's help needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
 
         if self.why_unsuited(config) is not None:
@@ -145,14 +146,14 @@ class Stage:
             raise contact_required_error(target, config.walker, advice)
 
     def refuse_question(self, config: Config) -> None:
-        """Raise ConfigError for a question that `refuse` of its module rejects; only for stages on demand."""
+        """Raise ConfigError if the `refuse` function of an on-demand stage's module rejects the config."""
         refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
         if refuse is not None:
             refuse(reads.only(config, self.takes_under(config)))
 
     @property
     def draws(self) -> bool:
-        """Whether it writes files besides its artifact."""
+        """Whether it writes files in addition to its artifact."""
         return self.work == "draws"
 
     @property
@@ -166,10 +167,10 @@ class Stage:
 
 
 class Graph:
-    """Stages in an order in which they can run."""
+    """Stages of a pipeline, each after the stages that it needs."""
 
     def __init__(self, *stages: Stage) -> None:
-        """Store the stages; ValueError if two share a name."""
+        """Store the stages; raises ValueError if two have the same name."""
         self.stages = stages
         self._by_name = {stage.name: stage for stage in stages}
         if len(self._by_name) != len(stages):
@@ -179,7 +180,7 @@ class Graph:
         return self._by_name[name]
 
     def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """Return the target and all it needs under a config, in running order."""
+        """Return the target and all stages that it needs under a config, in running order."""
         needed = {target}
         for stage in reversed(self.stages):
             if stage.name in needed:
@@ -187,7 +188,7 @@ class Graph:
         return tuple(stage for stage in self.stages if stage.name in needed)
 
     def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """Return the stages needed without files; ConfigError without a required block or for drawing stages."""
+        """Return the stages as `needed_for` does; raises ConfigError if one lacks a config block or draws files."""
         stages = self.needed_for(target, config)
         for stage in stages:
             if stage.draws:
@@ -196,7 +197,7 @@ class Graph:
         return stages
 
     def campaigns_of(self, target: str) -> tuple[Stage, ...]:
-        """Return the stages that `--full` adds."""
+        """Return the stages that `target --full` runs in addition."""
         return tuple(stage for stage in self.stages if stage.only_by == f"{target} --full")
 
 
@@ -349,4 +350,4 @@ PIPELINE = Graph(
 )  # fmt: skip
 STAGES = PIPELINE.stages
 check_cases = later("walkerlab.evidence.verification.catalogue", "all_cases")
-"""Check a config's own stability cases; raises ConfigError for one that is not usable."""
+"""Check the stability cases that a config defines; raises ConfigError for an unusable one."""

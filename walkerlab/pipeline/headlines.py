@@ -44,7 +44,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "plot": (),
     "report": (),
 }  # fmt: skip
-"""By stage; a name that ends in a point covers all quantities below it."""
+"""Headline quantities of each stage; a name that ends in a dot covers all quantities below it."""
 MOST: Final = 13
 OF_WALKS: Final = (
     "work_per_step_J.", "numerical_error.", "end_time_s", "rhs_evaluations", "accepted_steps", "rejected_steps",
@@ -60,15 +60,15 @@ QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
         *HEADLINES["contact-sim"], *OF_WALKS, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
     ),
 }  # fmt: skip
-"""By stage, all numeric quantities of a sweep's point; written as `HEADLINES`."""
+"""All numeric quantities that each of these stages may have at a point of a sweep, in the notation of `HEADLINES`."""
 LAST_OF: Final[Mapping[str, str]] = {"last_step_period_s": "step_periods_s", "last_step_length_m": "step_lengths_m"}
-"""Headlines that are the last entry of a list, with the list's name."""
+"""Headlines that are the last entry of a list, each with the name of its list."""
 
 
 def headlines(stage: str, names: Iterable[str]) -> list[str]:
-    """Return the names of a stage's headline quantities in order; for an unlisted stage its first quantities.
+    """Return the names of a stage's headline quantities in order; for an unlisted stage, its first quantities.
 
-    names  of all quantities, dotted
+    names  dotted names of all its quantities
     """
     unique = list(dict.fromkeys(names))
     if stage not in HEADLINES:
@@ -88,9 +88,9 @@ def has_quantity(stage: str, name: str) -> bool:
 
 
 def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return the study's published values with their verdicts; none if the scene departs from the study's.
+    """Return the study's published values with their verdicts; empty if the scene departs from the study's.
 
-    compared  summary of `compare`; empty without a result
+    compared  summary of `compare`; empty if it has no result
     """
     judged: Sequence[Mapping[str, Any]] = compared.get("paper_numbers", ())
     return () if compared.get("departures") else judged

@@ -1,4 +1,4 @@
-"""Identities of results: the config slice, inputs and code that determine a stored, swept or in-memory result."""
+"""Identities of stored, swept and in-memory results: the config slice, inputs and code that determine a result."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -14,22 +14,22 @@ from walkerlab.pipeline.store.key import Identity
 
 
 def takes_again(stage: Stage) -> bool:
-    """Whether a stage's `run` can leave out the second walk, which gives the numerical error."""
+    """Whether a stage's `run` can skip the second walk, which gives the numerical error."""
     return "again" in signature(import_module(stage.module).run).parameters
 
 
 class Keys:
-    """Identities of results; parts that no config changes are computed once per stage."""
+    """Builds identities of results; parts that do not depend on the config are computed once per stage."""
 
     def __init__(self, graph: Graph = PIPELINE) -> None:
-        """Start with no code read."""
+        """Start without digests, which are computed on first use."""
         self.graph = graph
         self._sources = Sources()
         self._digests: dict[str, str] = {}
         self._fixed: dict[str, dict[str, Any]] = {}
 
     def of(self, config: Config, target: str) -> dict[str, str]:
-        """Return the keys of a stage and of all it needs, by name; raises as `Graph.needed_in_memory`."""
+        """Return the keys of a stage and of all it needs, by name; raises what `Graph.needed_in_memory` raises."""
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
             input_keys = {name: keys[name] for name in stage.inputs(config)}
@@ -40,7 +40,7 @@ class Keys:
         """Return the identity of a stage's result under a config.
 
         input_keys  keys of its inputs, by stage
-        again       whether walks are repeated for their numerical error, as in every stored result
+        again       whether walks are repeated for their numerical error, as they are for every stored result
         """
         if stage.name not in self._fixed:
             fixed = self._fixed[stage.name] = {}
@@ -54,7 +54,7 @@ class Keys:
         return Identity(stage.name, own, input_keys, self.code_digest(stage.name))
 
     def code_digest(self, target: str) -> str:
-        """Return the digest of a stage's code, as of the first call."""
+        """Return the digest of a stage's code, computed at the first call."""
         if target not in self._digests:
             self._digests[target] = self._sources.code_digest(self.graph[target].module)
         return self._digests[target]

@@ -1,4 +1,4 @@
-"""Signals that stop a command: they raise an error in the main thread, except inside LLVM callbacks, which drop it."""
+"""Signals that stop a command: they raise an error in the main thread, but not inside LLVM callbacks, which lose it."""
 
 import _thread
 import os
@@ -9,14 +9,14 @@ from types import FrameType
 
 SOON_S = 0.02
 CALLED_BACK = "_raw_object_cache"
-"""Prefix of the functions that LLVM calls after compiling or loading; errors raised there are lost."""
+"""Prefix of the names of functions that LLVM calls after compiling or loading; errors raised in them are lost."""
 
 PATIENCE_S = 1.0
-"""Time for a command to store finished results after its parent has ended."""
+"""Time that a command has to store finished results after its parent has ended."""
 
 
 def raise_on(number: int, error: type[BaseException]) -> None:
-    """Make a signal raise an error; inside an LLVM callback the signal is sent again shortly after."""
+    """Make a signal raise an error; inside an LLVM callback, send the signal again shortly afterwards."""
     again: list[threading.Timer] = []
 
     def arrived(number: int, frame: FrameType | None) -> None:
@@ -40,9 +40,9 @@ def is_called_back(frame: FrameType | None) -> bool:
 
 
 def end_with_parent() -> None:
-    """End this process and all it has started as soon as its parent is gone.
+    """End this process and everything it has started as soon as its parent is gone.
 
-    This process leads its session; the parent holds the other end of standard input and never writes to it.
+    This process must lead its session; the parent must hold the other end of standard input and never write to it.
     """
 
     def watch() -> None:

@@ -13,10 +13,10 @@ class Progress(Protocol):
     """Progress of a running stage."""
 
     def start(self, label: str, total: int | None = None) -> None:
-        """Begin a phase of `total` parts (None if unknown); ends the previous phase."""
+        """Begin a phase of `total` parts (None if unknown) and end the previous phase."""
 
     def advance(self, n: int = 1) -> None:
-        """Count `n` more parts."""
+        """Count `n` more parts as done."""
 
     def note(self, text: str) -> None:
         """Show one line about the work."""
@@ -37,17 +37,17 @@ class StageReporter(Progress, Protocol):
         """Show the name of the kernel being compiled; '' once it is compiled."""
 
     def end(self, said: str) -> None:
-        """End the stage with one line; '' if it failed, which is reported elsewhere."""
+        """End the stage with a closing line; '' if the stage failed, since its error is reported elsewhere."""
 
 
 class Reporter(Protocol):
     """Receives the runner's messages."""
 
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> StageReporter:
-        """Begin a stage; others may be running.
+        """Begin a stage, possibly while others run.
 
-        place       its number among the stages to run and why it runs again; '' for a single new one
-        expected_s  its last run time, if known
+        place       its number among the stages to run and the reason for a rerun; '' for a single new stage
+        expected_s  its last run time (s), if known
         """
 
     def announce_page(self, summary: Mapping[str, Any], folder: Path) -> None:
@@ -61,7 +61,7 @@ class Reporter(Protocol):
 
 
 class Silent:
-    """A reporter that shows nothing."""
+    """Reporter that shows nothing."""
 
     def begin(self, stage: str, place: str, expected_s: float | None = None) -> Silent:  # noqa: ARG002
         return self

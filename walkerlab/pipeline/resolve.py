@@ -35,13 +35,13 @@ def resolve(
 ) -> ResolvedRun:
     """Resolve `--config`: a file, a built-in config, or a run by its name, its folder or one of its artifacts.
 
-    text     searched in that order; None is the built-in paper config
+    text     tried as each of these in that order; None for the built-in paper config
     sets     `--set` options, KEY=VALUE, in order
-    strides  `--strides`, over everything else
-    runs     the folder of all runs; a run given by its path stays in its own
-    name     of the run's folder; None names it after the settings
+    strides  value of `--strides`, which overrides everything else
+    runs     folder of all runs; a run given by its path stays in its own folder of runs
+    name     name of the run's folder; None to derive it from the settings
 
-    Raises ConfigError if nothing has that name, and for an invalid config.
+    Raises ConfigError if `text` matches nothing or the config is invalid.
     """
     path, run = None if text is None else Path(text), None
     if path is not None and text not in builtin_names() and not (path.is_file() and path.suffix != SUFFIX):
@@ -59,11 +59,11 @@ def resolve(
 
 
 def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
-    """Raise ConfigError, with its position, if the parts listed in a config do not form a walker."""
+    """Raise ConfigError, with a position in the file, if the parts listed in a config do not form a walker."""
     config = read.config
     if not isinstance(config.walker, PartsWalker):
         return
-    # Imported here: mechanics take long to import, and walkers of other types are right by construction.
+    # Imported here: mechanics take long to import, and walkers of other types are valid by construction.
     from walkerlab.scene.rigid import level_walker
 
     try:
@@ -88,7 +88,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
-    """Return the run of a name or folder and its config; None without one."""
+    """Return the run with this name or folder, and its config; None if there is no such run."""
     folder = find_run(text, runs)
     if folder is None:
         return None
@@ -104,7 +104,7 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
 def source_of(path: Path | None, runs: Path) -> str:
     """Return the source of a config: a built-in name, or a path relative to the folder of all runs.
 
-    Relative, so that a project can be moved with its runs.
+    The path is relative so that a project can be moved together with its runs.
     """
     file = (builtin_config(DEFAULT) if path is None else find_config(path)).path.resolve()
     if file.parent == BUILTIN_FOLDER.resolve():

@@ -23,37 +23,37 @@ Action = Literal["reuse", "run", "leave out"]
 
 UP_TO_DATE = "up to date"
 REMEMBERED = 256
-"""Number of remembered results: neighbouring points of a sweep often share inputs."""
+"""Number of results kept in memory; neighbouring points of a sweep often share inputs."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """Planned step for one stage."""
+    """Planned action for one stage."""
 
     stage: Stage
     action: Action
-    reason: str  # for the action
-    identity: Identity | None = None  # of its result; None if the stage is left out
-    found: Content | None = None  # the stored result, if intact: the one to reuse, or an outdated one
-    damaged: Path | None = None  # its file, if that cannot be trusted
-    origin: Path | None = None  # its file, if that is in another run's folder
+    reason: str  # reason for the action
+    identity: Identity | None = None  # identity of the stage's result; None if the stage is left out
+    found: Content | None = None  # the intact stored result: the one to reuse, or an outdated one
+    damaged: Path | None = None  # file of the stored result, if it is damaged
+    origin: Path | None = None  # file of the result to reuse, if it is in another run's folder
 
 
 class FolderResults:
     """Results in a run's folder.
 
-    elsewhere  whether equal results in other run folders are reused
-    keys       identities of results
-    folder     of the run
+    elsewhere  whether to reuse equal results from other run folders
+    keys       builds the identities of results
+    folder     path of the run's folder
     """
 
     def __init__(self, folder: RunFolder, graph: Graph = PIPELINE, elsewhere: bool = True) -> None:
-        """Read nothing yet."""
+        """Store the arguments without reading a file."""
         self.run, self.folder, self.elsewhere, self.keys = folder, folder.path, elsewhere, Keys(graph)
         self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:
-        """Return a step that reuses a stage's result, or runs the stage, as always with `force`."""
+        """Return a step that reuses a stage's result or runs the stage; with `force` it always runs the stage."""
         path = self.run.artifact(stage.name)
         verdict = artifact.check(path, identity.key, stage.name)
         stored, damaged = verdict.artifact, path if verdict.damaged else None
@@ -61,7 +61,7 @@ class FolderResults:
         if not why and stored is not None:
             reason = UP_TO_DATE if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
             return Step(stage, "reuse", reason, identity, stored)
-        # drawings are files next to their artifact, so each folder has its own
+        # a drawing consists of files next to its artifact, so each folder needs its own
         looks = self.elsewhere and not force and not stage.draws
         match = find_elsewhere(self.run, stage.name, identity.key) if looks else None
         if match is not None and not recomputed_input(stage, match[1], inputs):
@@ -70,14 +70,14 @@ class FolderResults:
         return Step(stage, "run", why, identity, stored, damaged)
 
     def take_over(self, step: Step) -> None:
-        """Copy a result from another run's folder into this one."""
+        """Take a result over from another run's folder, if the step reuses one."""
         if step.origin is not None:
             take_over(step.origin, self.run.artifact(step.stage.name))
 
     def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:
-        """Prepare to keep a result; return the optional arguments of the stage, see `StageTask`.
+        """Prepare to store a result; return the optional arguments of the stage, see `StageTask`.
 
-        `force` drops the checkpoint of an interrupted run.
+        With `force`, the checkpoint of an interrupted run is dropped.
         """
         stage, identity = step.stage, step.identity
         assert identity is not None, "a stage that is left out does not run"
@@ -89,7 +89,7 @@ class FolderResults:
         return {"checkpoint": checkpoint, "folder": self.folder}
 
     def keep(self, step: Step, answer: Content, awaited: bool) -> Stored:  # noqa: ARG002
-        """Store a result and remove its checkpoint; raises StorageError if the system refuses."""
+        """Store a result and remove its checkpoint; raises StorageError if that fails."""
         origin, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
         path = self.run.artifact(step.stage.name)
@@ -98,7 +98,7 @@ class FolderResults:
         return stored
 
     def _why_outdated(self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, Content]) -> str:
-        """Return why a stage has to run; empty if its result is current."""
+        """Return the reason why a stage has to run; empty if its result is current."""
         stored = verdict.artifact
         if not verdict.accepted or stored is None:
             changes = changed_parts(stored.identity, identity) if stored is not None else []
@@ -107,7 +107,7 @@ class FolderResults:
 
 
 def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]) -> str:
-    """Name an input whose content differs from that used for a result; empty if all agree."""
+    """Name an input whose content has changed since the result was computed; empty if none has."""
     for name, result in inputs.items():
         if stored.provenance.input_digests.get(name) != input_digest(stage, result):
             return f"input {name} was recomputed"
@@ -115,19 +115,19 @@ def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]
 
 
 def input_digest(stage: Stage, result: Content) -> str:
-    """Return the digest of an input that a result records; drawings also show timings, so theirs covers the file."""
+    """Return the digest that a result records of an input; drawings also show timings, so theirs covers the file."""
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 
 class LoadedCodeKeys(Keys):
-    """Identities within this process, whose code does not change; no digest is needed."""
+    """Builds identities for use within this process, whose code does not change, so they need no code digest."""
 
     def code_digest(self, target: str) -> str:  # noqa: ARG002
         return ""
 
 
 class MemoryResults:
-    """Results in memory: the latest inputs of other stages are remembered."""
+    """Results in memory: the latest results that other stages need."""
 
     folder = None
 
@@ -136,7 +136,7 @@ class MemoryResults:
         self._kept: OrderedDict[str, Content] = OrderedDict()
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:  # noqa: ARG002
-        """Return a step that reuses a remembered result, or runs the stage."""
+        """Return a step that reuses a result in memory, or runs the stage."""
         if identity.key not in self._kept:
             return Step(stage, "run", artifact.NOT_THERE, identity)
         self._kept.move_to_end(identity.key)
@@ -146,11 +146,11 @@ class MemoryResults:
         """Do nothing: there is no other folder."""
 
     def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:  # noqa: ARG002
-        """Keep checkpoints in memory alone."""
+        """Return a checkpoint that is kept only in memory."""
         return {"checkpoint": Checkpoint(None, "")}
 
     def keep(self, step: Step, answer: Content, awaited: bool) -> Content:
-        """Remember a result if another stage awaits it."""
+        """Keep a result if another stage waits for it."""
         if awaited and step.identity is not None:
             self._kept[step.identity.key] = answer
             if len(self._kept) > self.size:

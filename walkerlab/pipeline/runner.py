@@ -1,4 +1,4 @@
-"""Bring a stage in a run's folder up to date under the folder's lock, and report how that went."""
+"""Bring a stage in a run's folder up to date under the folder's lock, and report the outcome."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -27,11 +27,11 @@ class StageReport:
     reused: bool  # whether the result existed already
     wall_s: float  # total time, inputs included
     left_out: tuple[LeftOut, ...]  # results that were not computed, with the reasons
-    summary: dict[str, Any]  # of the result; empty without one
+    summary: dict[str, Any]  # summary of the result; empty if there is no result
     steps: tuple[StageDone, ...]  # outcome of each stage
-    # message and advice if the computation, or an input of the drawing, has no answer
+    # error of the stage, or else of the first other stage, that has no answer; None if all have one
     no_answer: NoAnswer | None = None
-    # summaries of all stages involved that have a result
+    # summaries of all stages with a complete result, by stage
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
@@ -51,13 +51,13 @@ class StageReport:
 
 @dataclass(frozen=True)
 class Options:
-    """Options of running a stage."""
+    """Options for running a stage."""
 
-    force: bool = False  # run the stage and all it needs even if current
+    force: bool = False  # run the stage and all that it needs, even if their results are current
     wait: bool = True  # wait for another process that works in the folder, then reuse its results
-    jobs: int = 1  # processes for independent stages, and for independent cells of a stage
+    jobs: int = 1  # maximum number of processes, for independent stages and for independent work units of a stage
     full: bool = False  # also run the stage's long campaigns
-    dry: bool = False  # only report the plan; changes no file
+    dry: bool = False  # only report the plan, without changing a file
 
 
 USUAL = Options()
@@ -74,8 +74,8 @@ def execute(
     """Bring a stage's result up to date, running whatever it needs.
 
     Raises ConfigError if the config lacks a block that the target requires or the folder holds results of another
-    config, LockedError (only without `options.wait`) and StorageError. A missing answer is not raised; see
-    `StageReport.no_answer`.
+    config, LockedError if another process works in the folder and `options.wait` is false, and StorageError. A stage
+    without an answer raises nothing; see `StageReport.no_answer`.
     """
     started = time.perf_counter()
     graph[target].refuse_unsuited(target, config)
@@ -97,7 +97,7 @@ def execute(
         reused = "" if options.force else ", and its results will be reused"
         with folder.locked(options.wait, lambda message: run.reporter.note(message + reused)):
             claim(folder, config)
-            # decide again: another process may have worked here until now
+            # decide again: another process may have worked in the folder until now
             run = executor()
             run.carry_out([step.stage for step in steps if step.action == "run"])
     else:
@@ -107,9 +107,9 @@ def execute(
 
 
 def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
-    """Raise ConfigError, before anything is compiled, for an incomplete friction law of the user."""
+    """Raise ConfigError for an incomplete user-defined friction law before anything is compiled."""
     if config.contact is not None and any("contact" in step.stage.requires for step in steps if step.action == "run"):
-        # Imported here: it loads the compiler, as what runs will.
+        # Imported here: it loads the compiler, which the stages load anyway.
         from walkerlab.scene.contact import friction_law
 
         friction_law(config.contact)
@@ -136,9 +136,9 @@ def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) ->
 
 
 def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
-    """Return stages that were left out, results that a drawing lacks, and parts that scenes lack.
+    """List the stages that were left out, the results missing in a drawing, and the parts that scenes do without.
 
-    An optional result that nobody requested does not count.
+    Optional results that nobody requested are not listed.
     """
     missing = run.missing_inputs(target) if target.draws else ()
     absent = [entry for entry in missing if not run.graph[entry.what].only_by]
@@ -152,9 +152,9 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
 
 
 def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | None:
-    """Return the error of the target or of the first stage without an answer; None if all have one.
+    """Return the error of the target, or else of the first stage, that has no answer; None if all have one.
 
-    message  the target's own message and advice
+    message  message and advice of the target's error; None if it has an answer
     """
     if message is not None:
         return NoAnswer(message["message"], message["advice"])

@@ -1,4 +1,4 @@
-"""Run folders: listing them, reading their configs and results, and comparing two of them."""
+"""Run folders: list them, read their configs and results, and compare two of them."""
 
 import contextlib
 import datetime
@@ -32,20 +32,20 @@ SHOWN_CHANGES = 3
 
 @dataclass(frozen=True)
 class RunSummary:
-    """One run folder."""
+    """Summary of one run folder."""
 
     name: str
     run_dir: Path
-    changes: tuple[str, ...]  # KEY=VALUE of each key in which its config differs from its file
+    changes: tuple[str, ...]  # KEY=VALUE of each key in which its config differs from the config file
     stages: tuple[str, ...]  # names of stages with a stored result
-    current: tuple[str, ...] | None  # those that are up to date; None if the run's config is unknown
-    sweeps: tuple[str, ...]  # sweep files
+    current: tuple[str, ...] | None  # names of stages that are up to date; None if the run's config is unknown
+    sweeps: tuple[str, ...]  # names of sweep files
     bytes: int  # total size of its files
     changed_utc: str  # time of the last change, UTC, ISO 8601
 
 
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
-    """Iterate over the runs in a folder by name, without folders that hold no result."""
+    """Iterate over the runs in a folder in order of their names, skipping folders without results."""
     for path in sorted(runs_dir.glob("*/")):
         folder = RunFolder.at(path)
         stages = tuple(stage.name for stage in graph.stages if folder.artifact(stage.name).is_file())
@@ -62,7 +62,7 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
 
 
 def config_text(folder: RunFolder) -> str | None:
-    """Return the resolved config of a run as YAML; None if nothing in its folder states it."""
+    """Return the resolved config of a run as YAML; None if neither its record nor a readable result contains it."""
     record = folder.record()
     if record is not None:
         return record.config
@@ -89,7 +89,7 @@ def config_of(folder: RunFolder) -> Config | None:
 
 
 def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored], dict[str, str]]:
-    """Return the readable results of these stages, and the faults of the unreadable ones."""
+    """Return the readable results of these stages, and a message for each unreadable one, by stage."""
     intact: dict[str, Stored] = {}
     bad: dict[str, str] = {}
     for stage in stages:
@@ -103,7 +103,7 @@ def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored
 
 
 def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE) -> dict[str, Stored]:
-    """Return the existing results of these stages; raises StaleError that names all unreadable ones."""
+    """Return the existing results of these stages; raises StaleError naming all that are unreadable."""
     intact, bad = read_all(folder, stages)
     if bad:
         commands = join_words(command(folder, graph[stage]) for stage in bad)
@@ -130,7 +130,7 @@ def results_to_show(
 ) -> Iterator[dict[str, Stored]]:
     """Give a `with` block the existing results of these stages; warn of outdated ones.
 
-    Raises StaleError as `results_in`, and where an outdated result lacks something that the block reads.
+    Raises StaleError as `results_in` does, and if the block reads something that an outdated result lacks.
     """
     results = results_in(folder, stages, graph)
     outdated = why_outdated(folder, results, graph)
@@ -141,7 +141,7 @@ def results_to_show(
 
 
 def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPELINE) -> dict[str, str]:
-    """Return, for each stage whose result is outdated, the reason."""
+    """Return the reasons why results are outdated, by stage; current results are not listed."""
     config = config_of(folder)
     if config is None:
         return dict.fromkeys(stages, "this version cannot read the config of its run")
@@ -151,7 +151,7 @@ def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPE
 
 @contextlib.contextmanager
 def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = PIPELINE) -> Iterator[None]:
-    """Turn a KeyError of a `with` block into StaleError if results are outdated."""
+    """Convert a KeyError raised in a `with` block to StaleError if any results are outdated."""
     try:
         yield
     except KeyError as missing:
@@ -191,7 +191,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
 def claim(folder: RunFolder, config: Config) -> None:
     """Record in a folder which config its results belong to; call it under the lock, before any result is written.
 
-    Raises ConfigError as `refuse_another_config`.
+    Raises ConfigError as `refuse_another_config` does.
     """
     refuse_another_config(folder, config)
     record = folder.record()
@@ -203,13 +203,13 @@ def claim(folder: RunFolder, config: Config) -> None:
 def refuse_another_config(folder: RunFolder, config: Config) -> None:
     """Raise ConfigError if a folder has results of another config, unless that is an earlier state of the same file.
 
-    The name and the `sweep` block do not count: no number depends on them.
+    The name and the `sweep` block are not compared, since no result depends on them.
     """
     record = folder.record()
     if (record is not None and comes_from(record, folder)) or not any(folder.path.glob("*.h5")):
         return
     recorded = config_of(folder)
-    if recorded is None and record is None:  # nothing there can be read
+    if recorded is None and record is None:  # nothing in the folder can be read
         return
     changes = ["it is no longer a config"]
     if recorded is not None:
@@ -234,13 +234,13 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
 
 
 def comes_from(record: Record, folder: RunFolder) -> bool:
-    """Whether a folder's results were made under its name from the same file, perhaps before that was edited."""
+    """Whether a folder's results come from the same config file and run name, even if the file was edited since."""
     return (record.run, record.source) == (folder.name, folder.source)
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A quantity of two runs; `change` is relative to the first, None where that is not a number or zero."""
+    """Values of a quantity in two runs, and the change relative to the first; None if that is undefined."""
 
     name: str
     first: Any
@@ -250,11 +250,11 @@ class Pair:
 
 @dataclass(frozen=True)
 class RunDifference:
-    """Differences of two runs."""
+    """Differences between two runs."""
 
-    config: tuple[tuple[str, Any, Any], ...]  # keys with both values, as JSON
-    numbers: Mapping[str, tuple[Pair, ...]]  # by stage of both, all values of the two summaries
-    headlines: Mapping[str, tuple[Pair, ...]]  # by stage, the headline quantities
+    config: tuple[tuple[str, Any, Any], ...]  # config keys that differ, with both values as JSON
+    numbers: Mapping[str, tuple[Pair, ...]]  # all values of both summaries, for each stage that both runs have
+    headlines: Mapping[str, tuple[Pair, ...]]  # headline quantities, for the same stages
     # only_first, only_second: stages with a result in one run only
     only_first: tuple[str, ...]
     only_second: tuple[str, ...]
@@ -295,6 +295,6 @@ def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def change(first: Any, second: Any) -> float | None:
-    """Return the relative change of a number; None where it has none."""
+    """Return the relative change from `first` to `second`; None unless both are numbers and `first` is not 0."""
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (first, second))
     return float(second / first - 1.0) if numbers and first else None

@@ -1,4 +1,4 @@
-"""Tasks: a stage with its arguments, to run in this or another process, and kernels compiled ahead of it."""
+"""Tasks: stages with their arguments, run in this or another process, and kernels compiled ahead of them."""
 
 import contextlib
 import importlib
@@ -27,16 +27,19 @@ class StageTask:
 
     name: str
     module: str
-    config: Any  # the part of the config that it takes
-    inputs: Mapping[str, Content]  # results of other stages
-    # arguments that its `run` may have, by name: jobs processes for independent cells checkpoint units of the result
-    # that an interrupted run has computed again whether walks are repeated for their numerical error folder of its run,
-    # which it draws into left_out results that are missing in a drawing
+    config: Any  # the config slice that it takes
+    inputs: Mapping[str, Content]  # results of other stages, by name
+    # optional arguments of its `run`, by name:
+    #   jobs        maximum number of processes for independent work units
+    #   checkpoint  work units that an interrupted run has computed
+    #   again       whether to repeat walks for their numerical error
+    #   folder      run folder that the stage draws into
+    #   left_out    results that are missing in a drawing, with the reasons
     offered: Mapping[str, Any]
 
     def run(self, progress: Progress) -> Content:
         """Call the stage's `run` with the arguments that it declares."""
-        # imported only now: a stage loads its libraries and compiled code
+        # imported only now, because a stage loads libraries and compiled code
         run = importlib.import_module(self.module).run
         arguments = {name: self.offered[name] for name in self.offered.keys() & signature(run).parameters.keys()}
         folder = arguments.get("folder")
@@ -58,10 +61,10 @@ def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offer
 
 
 class PipeReporter:
-    """Progress of a stage in a worker: passes each call to the parent process."""
+    """Reporter of a stage in a worker; sends each call to the parent process."""
 
     def __getattr__(self, call: str) -> Callable[..., None]:
-        """Return a function that sends its name and arguments."""
+        """Return a function that sends the name of the call and its arguments."""
         return lambda *arguments: tell((call, *arguments))
 
 
@@ -74,12 +77,12 @@ def run_in_worker(task: StageTask) -> Content:
 
 
 def nothing_compiled_yet() -> bool:
-    """Whether kernels are imported and none was compiled on this machine yet."""
+    """Whether the kernels are imported and none has been compiled on this machine yet."""
     return "walkerlab.physics.kernels" in sys.modules and kernel_cache.nothing_compiled_yet()
 
 
 def compile_kernels(module: str, function: str, config: Config, only_first: bool) -> None:
-    """Compile the kernels of a stage; with `only_first`, only where nothing is compiled yet."""
+    """Compile the kernels of a stage; with `only_first`, only if none has been compiled yet."""
     stage = importlib.import_module(module)
     if not only_first or nothing_compiled_yet():
         getattr(stage, function)(config)
@@ -93,14 +96,14 @@ class Precompiler:
     """
 
     def __init__(self, pool: WorkerPool, config: Config) -> None:
-        """Start with nothing compiled ahead."""
+        """Start without any compilation."""
         self._pool, self._config = pool, config
         self._begun: dict[str, Future[None]] = {}
 
     def begin(self, stage: Stage, only_first: bool) -> Future[None] | None:
-        """Compile a stage's kernels if it declares `precompile` and they were not begun; None if nothing is begun.
+        """Start to compile a stage's kernels; return None if it has no `precompile` function or was started before.
 
-        only_first  only where nothing is compiled yet, which the worker checks
+        only_first  compile only if the worker finds that no kernel has been compiled yet
         """
         if not stage.precompile or stage.name in self._begun:
             return None
@@ -109,14 +112,14 @@ class Precompiler:
         return future
 
     def wait_for(self, stage: Stage) -> None:
-        """Wait until a stage's kernels are compiled, or have failed to."""
+        """Wait until the compilation of a stage's kernels ends, even if it fails."""
         if stage.name in self._begun:
             self._begun[stage.name].exception()
 
     def raise_bugs(self, ran: Collection[str]) -> None:
-        """Raise a bug that stopped a compilation; errors that a user can act on are reported by the stage itself.
+        """Re-raise a bug that stopped a compilation; the stage itself reports errors that a user can act on.
 
-        ran  names of the stages that ran; compilation for other stages is not waited for
+        ran  names of the stages that ran; compilations for other stages are not waited for
         """
         for name, future in self._begun.items():
             ended = (name in ran or future.done()) and not future.cancelled()

@@ -15,27 +15,27 @@ from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
 from walkerlab.pipeline.workers import WorkerDiedError, WorkerPool
 
 SCOUTS: Final = 2
-"""Size of the first batch, which runs alone: it compiles the kernels once and measures the time of a unit."""
+"""Size of the first batch, which runs alone; it compiles the kernels once and measures the run time of a unit."""
 MIN_BATCH_S: Final = 0.5
 MAX_BATCH: Final = 1000
 SHARES: Final = 3
-"""A batch is at most this fraction (1/3) of a worker's share of the remaining work, so that workers end together."""
+"""A batch is at most 1/SHARES of a worker's share of the remaining work, so that all workers end together."""
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
-"""Errors that indicate a bug, which a retry would repeat."""
+"""Errors that indicate a bug; a retry would only repeat them."""
 MAX_DEATHS: Final = 12
-"""Worker deaths before any result arrives, after which the machine is to blame, not the work."""
+"""Maximum number of worker deaths before the first result; beyond it the machine is the cause, not the work."""
 
 
 class WorkUnit(NamedTuple):
-    """Piece of work that is computed at once and stored under its name."""
+    """Piece of work that is computed as a whole and stored under its name."""
 
     name: str
-    size: int  # in units of the progress count
-    run: Callable[[], Any]  # computes the result in any process
+    size: int  # number of parts that it adds to the progress
+    run: Callable[[], Any]  # function that computes the result; any process can call it
 
 
 Batch = tuple[WorkUnit, ...]
-"""Units sent to a process together."""
+"""Units that are sent to a process together."""
 Timed = tuple[Any, float]
 """Result of a unit and its run time (s)."""
 
@@ -44,7 +44,7 @@ class InPlace(Executor):
     """Executor that runs each call at once in this process."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run a call; its errors are raised."""
+        """Run a call; any error is raised at once."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
@@ -60,14 +60,14 @@ def compute(units: Batch) -> list[Timed]:
 
 @dataclass
 class Spread:
-    """Spreads units over an executor; the work of a worker that dies is tried again."""
+    """Distributes work units over an executor and retries those of a worker that died."""
 
-    todo: Iterator[WorkUnit]  # units, of which `left` are not handed out yet
-    left: int
+    todo: Iterator[WorkUnit]  # units that are not handed out yet
+    left: int  # number of these units
     keep: Callable[[Batch, Sequence[Timed]], None]  # called with units and their results as they arrive
-    give_up: Callable[[WorkUnit, BaseException], None]  # called with a unit whose attempts failed, and the last error
+    give_up: Callable[[WorkUnit, BaseException], None]  # called with a unit that failed repeatedly, and its last error
     batch_s: float  # target duration of a batch, s; 0: one unit at a time
-    unit_s: float | None = None  # run time of a unit, s; None before the first batch is back, which then runs alone
+    unit_s: float | None = None  # run time of a unit, s; None until the first batch, which runs alone, has returned
     _again: deque[tuple[Batch, int]] = field(default_factory=deque)
     _running: dict[Future[Any], tuple[Batch, int]] = field(default_factory=dict)
     _deaths: int = 0
@@ -76,10 +76,10 @@ class Spread:
     def run(self, executor: Executor, workers: int) -> None:
         """Compute all units; `workers` is 0 if the executor works in this process.
 
-        Raises NoAnswer if no worker lives long enough to compute anything; bugs are raised at once.
+        Raises NoAnswer if workers keep dying before they compute anything; re-raises bugs at once.
         """
         while self.left or self._again or self._running:
-            # one batch more than workers, so that none waits
+            # one batch more than there are workers, so that no worker waits
             most = 1 if self.unit_s is None else workers + 1
             while len(self._running) < most and (self._again or self.left):
                 batch, failures = self._again.popleft() if self._again else (self._next_batch(workers), 0)
@@ -110,13 +110,13 @@ class Spread:
     def _arrived(self, batch: Batch, results: Sequence[Timed]) -> None:
         self._alive = True
         walls = [wall_s for _, wall_s in results]
-        # the first units also load compiled code, so the last one predicts the next better
+        # the first units also load compiled code, so the last one is the better estimate
         latest = max(1e-6, walls[-1] if self.unit_s is None else sum(walls) / len(walls))
         self.unit_s = latest if self.unit_s is None else 0.5 * (self.unit_s + latest)
         self.keep(batch, results)
 
     def _failed(self, batch: Batch, failures: int, error: BaseException) -> None:
-        """Retry a batch, then split it, then give up its unit; raise a bug."""
+        """Retry a batch, then split it, then give up its unit; re-raise an error that is a bug."""
         if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not isinstance(error, WorkerDiedError)):
             raise error
         self._deaths += 1
@@ -147,9 +147,9 @@ def complete(
     """Compute the units that the checkpoint lacks, and store each in it.
 
     checkpoint   units of an earlier run
-    jobs         processes
-    shared_from  total size above which starting processes pays
-    compiled     whether all kernels are compiled; otherwise the first unit runs alone, so that one process compiles
+    jobs         maximum number of processes
+    shared_from  total size from which starting processes pays
+    compiled     whether all kernels are compiled; if not, the first unit runs alone and compiles them once
 
     Returns the numbers of each unit, and the total size of the units computed now.
     """

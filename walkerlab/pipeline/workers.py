@@ -1,8 +1,8 @@
 """Worker processes: `in_order` for a list of calls, `WorkerPool` for calls that arrive one by one.
 
 A worker is a separate interpreter that receives calls and returns their results. It never runs the caller's script, so
-scripts without a guard, code from standard input and notebooks can use workers. Workers end with their parent, however
-that ends; the parent handles keyboard interrupts.
+scripts without a guard, code from standard input and notebooks can use workers. Workers end when their parent ends,
+for whatever reason; the parent handles keyboard interrupts.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ from walkerlab.physics.kernel_cache import cache_root
 from walkerlab.pipeline.interrupts import raise_on
 
 PATIENCE_S = 5.0
-"""Time for a worker to end before it is killed."""
+"""Time that a worker has to end before it is killed."""
 START = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -43,12 +43,12 @@ Hear = Callable[[Any], None]
 
 
 class WorkerDiedError(WalkerlabError):
-    """A worker crashed or was killed before it answered."""
+    """Error for a worker that crashed or was killed before it answered."""
 
     exit_code = 4
 
     def __init__(self, exit_code: int) -> None:
-        """Describe the end of a worker; `exit_code`: of the process, negative for a signal."""
+        """Describe the end of a worker; the exit code is negative if a signal ended it."""
         how = signal.Signals(-exit_code).name if exit_code < 0 else f"exit code {exit_code}"
         super().__init__(
             f"a worker process ended before it had answered ({how}).",
@@ -61,12 +61,12 @@ class WorkerDiedError(WalkerlabError):
 
 
 class WorkerTimeoutError(Exception):
-    """A worker did not answer in time."""
+    """Error for a worker that did not answer in time."""
 
 
 @dataclass(frozen=True)
 class Told:
-    """Message of a running call."""
+    """Message that a running call sends."""
 
     value: Any
 
@@ -80,7 +80,7 @@ class Answer:
 
 
 class Worker:
-    """A process that runs one call after the other."""
+    """Process that runs one call after the other."""
 
     def __init__(
         self,
@@ -91,13 +91,14 @@ class Worker:
     ) -> None:
         """Start the process.
 
-        modules      to import at once, before the first call
-        environment  variables that differ from this process's
-        folder       working folder; default: this process's
-        quiet        discard its output
+        modules      names of modules to import before the first call
+        environment  environment variables that differ from those of this process
+        folder       working folder; None for that of this process
+        quiet        whether to discard its output
         """
         self._line, theirs = Pipe()
-        path = [os.path.abspath(entry) for entry in sys.path]  # noqa: PTH100 (entries are texts, '' the folder here)
+        # entries of sys.path are strings; '' is the current folder
+        path = [os.path.abspath(entry) for entry in sys.path]  # noqa: PTH100
         code = START.format(path=path, line=theirs.fileno(), modules=tuple(modules))
         output = subprocess.DEVNULL if quiet else None
         self.process = subprocess.Popen(
@@ -107,21 +108,21 @@ class Worker:
             stdout=output,
             stderr=output,
             cwd=folder,
-            # all processes share one folder of compiled code
+            # all processes share one cache of compiled code
             env={**os.environ, "WALKERLAB_CACHE": str(cache_root()), **(environment or {})},
         )
         theirs.close()
 
     def do(self, call: Callable[[], R], hear: Hear | None = None, timeout_s: float | None = None) -> R:
-        """Run a call in the worker; returns its value or raises its error.
+        """Run a call in the worker; return its value or raise its error.
 
-        hear       receives the call's messages
+        hear       function that receives the call's messages
         timeout_s  maximum time between two messages, s
 
         Raises WorkerDiedError and WorkerTimeoutError.
         """
         work = pickle.dumps(call)
-        with contextlib.suppress(OSError):  # a dead worker shows in the missing answer
+        with contextlib.suppress(OSError):  # a dead worker is noticed because its answer is missing
             self._line.send_bytes(work)
         while isinstance(message := self._received(timeout_s), Told):
             if hear is not None:
@@ -149,7 +150,7 @@ class Worker:
         self.process.terminate()
 
     def ended(self) -> int:
-        """Wait for its end, kill it if it does not end in time, and return its exit code."""
+        """Wait until the process ends, kill it if that takes too long, and return its exit code."""
         try:
             return self.process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
@@ -163,20 +164,20 @@ class Worker:
 
 
 class WorkerPool(Executor):
-    """Executor whose workers start as needed, replace dead ones, and end with the pool."""
+    """Executor that starts workers as needed, replaces dead ones and ends all of them when it is shut down."""
 
     def __init__(self, size: int, modules: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> None:
         """Set up at most `size` workers without starting one; `modules` and `environment` as in `Worker`."""
         self.size = size
         self._new_worker = partial(Worker, modules, environment)
-        self._threads = ThreadPoolExecutor(size)  # each waits for one worker
+        self._threads = ThreadPoolExecutor(size)  # each thread waits for one worker
         self._lock = threading.Lock()
         self._idle: list[Worker] = []
         self._busy: list[Worker] = []
         self._closed = False
 
     def start_all(self) -> None:
-        """Start all workers now, so that they import their modules meanwhile."""
+        """Start all workers now, so that they import their modules in the meantime."""
         with self._lock:
             self._idle += [self._new_worker() for _ in range(self.size - len(self._idle) - len(self._busy))]
 
@@ -203,7 +204,7 @@ class WorkerPool(Executor):
                 self._idle.append(worker)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the workers; with `wait`, after they have finished their calls."""
+        """End the workers; with `wait`, only after they have finished their calls."""
         self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
         with self._lock:
             self._closed = True
@@ -212,7 +213,7 @@ class WorkerPool(Executor):
             worker.leave()
         for worker in workers:
             worker.ended()
-        self._threads.shutdown()  # no thread listens any more
+        self._threads.shutdown()  # wait until no thread listens to a worker
         for worker in workers:
             worker.close()
 
@@ -225,9 +226,9 @@ def in_order(
 ) -> Iterator[R]:
     """Iterate over the results of independent calls, in order.
 
-    jobs   processes
-    first  indices of calls to run in this process beforehand, so that kernels are compiled once
-    rank   of an index; calls of lowest rank start first, so that no long call runs alone at the end
+    jobs   maximum number of processes
+    first  indices of calls to run first and in this process, so that kernels are compiled once
+    rank   rank of an index; calls of low rank start early, so that no long call runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:
@@ -240,11 +241,11 @@ def in_order(
             yield ready[place] if place in ready else futures[place].result()
 
 
-# The rest runs in the worker.
+# The rest of this file runs in the worker.
 
 
 class LeaveError(BaseException):
-    """Signal to end this process and drop its call."""
+    """Error that a signal raises to end this process and drop its call."""
 
 
 def tell(value: Any) -> None:
@@ -254,24 +255,24 @@ def tell(value: Any) -> None:
 
 
 _lines: list[Connection] = []
-"""In a worker: the connection to its parent."""
+"""Connection to the parent process in a worker; empty in any other process."""
 
 
 def serve(number: int, modules: Sequence[str]) -> None:
-    """Run calls until a signal ends this process; `number`: descriptor of the connection to the parent."""
+    """Run calls until a signal ends this process; `number` is the file descriptor of the connection to the parent."""
     os.set_inheritable(number, False)
     line = Connection(number)
     _lines.append(line)
     calls: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=receive, args=(line, calls), daemon=True).start()
-    # before the first call, a signal just ends the process
+    # until the handler below is set, a signal simply ends the process
     for module in modules:
         importlib.import_module(module)
     with contextlib.suppress(LeaveError):
         raise_on(signal.SIGTERM, LeaveError)
         while True:
             line.send_bytes(answer(calls.get()))
-    # the call is dropped; a second signal, as from terminal and parent, just ends the process
+    # the call was dropped; a second signal (terminal and parent may each send one) simply ends the process
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
@@ -284,7 +285,7 @@ def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
 
 
 def answer(work: bytes) -> bytes:
-    """Run a pickled call; return its pickled answer, with a description of errors that cannot be pickled."""
+    """Run a pickled call and return its pickled answer; a description replaces an error that cannot be pickled."""
     try:
         return pickle.dumps(Answer(pickle.loads(work)()))
     except Exception as error:
@@ -293,6 +294,6 @@ def answer(work: bytes) -> bytes:
         try:
             failed = pickle.dumps(Answer(error=error))
             pickle.loads(failed)
-        except Exception:  # an exception may be made of anything
+        except Exception:  # an exception may hold objects that cannot be pickled or restored
             return pickle.dumps(Answer(error=RuntimeError(description)))
         return failed

@@ -1,4 +1,4 @@
-"""Basins of attraction: which starts walk, and which attractor each reaches in how many steps."""
+"""Basins of attraction: the starts that lead to walking, the attractors that they reach, and the steps needed."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ from walkerlab.scene.contact import (
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
-HALF_WIDTH = (0.15, 0.25, 0.25)  # of the default window, rad and sqrt(g/L)
-REPEATED_CELLS = 100  # cells whose walks are repeated
-SEARCHED_STARTS = 4_000  # starts of the search for attractors
-SIGMAS = 3.0  # of the Gaussian window, from its middle to the box's sides
-FAILED = UNREACHED - 1  # class of a cell that does not walk
+HALF_WIDTH = (0.15, 0.25, 0.25)  # half width of the default window, rad and sqrt(g/L)
+REPEATED_CELLS = 100  # number of cells whose walks are repeated for the numerical error
+SEARCHED_STARTS = 4_000  # number of starts in the search for attractors
+SIGMAS = 3.0  # distance from the centre of the window to its sides, in standard deviations of the Gaussian weights
+FAILED = UNREACHED - 1  # class of a cell whose walk fails
 UNITS = ("rad", "rad/s", "rad/s")
 TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angular velocity of the stance leg")
 
@@ -67,11 +67,11 @@ def run(
 ) -> Content:
     """Walk from every cell that the checkpoint lacks, then from subcells of cells at the basin's edge.
 
-    checkpoint  cells of an earlier run
-    jobs        processes
+    checkpoint  cells that an earlier run completed
+    jobs        maximum number of processes
 
-    Raises ConfigError for the contact model without a contact block, NoAnswer if its pads are to fit a gait that
-    there is not.
+    Raises ConfigError if the contact model has no contact block, NoAnswer if its pads should fit a gait that does
+    not exist.
     """
     gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config)
     if len(rigid.section_indices) != len(COORDINATES):
@@ -115,7 +115,7 @@ def run(
 
 
 def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str, int]:
-    """Count cells of an even sample whose walk ends differently at tighter tolerances."""
+    """Count the cells of an even sample whose walks end differently at tighter tolerances."""
     cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
     again = question.tightened().walk_to_ends(window.starts(cells))
     otherwise = (again.outcome != ends.outcome[cells]) | (again.attractor != ends.attractor[cells])
@@ -136,7 +136,7 @@ def window_of(config: BasinConfig, z: list[float]) -> Window:
 
 
 def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Window, rigid: RigidModel) -> Question:
-    """Build the model whose walks are classified, with its attractors."""
+    """Build the model whose walks are classified, and find its attractors."""
     if config.basin.model == "contact":
         return contact_question(config, inputs, rigid)
     unit, units = unit_walker(rigid)
@@ -152,7 +152,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
 
 
 def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> ContactQuestion:
-    """Build the question for the contact model, at the tolerances of `tune`'s map."""
+    """Build the contact model whose walks are classified, at the tolerances of the map that `tune` computes."""
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
@@ -189,7 +189,7 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
 
 
 def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]:
-    """Return period and a state (SI) of each attractor."""
+    """Describe each attractor by its period and either one of its states (SI) or the contact model's step."""
     if isinstance(question, ContactQuestion):
         own = question.starts.gait
         return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
@@ -228,15 +228,15 @@ def summary(
 
 
 def gaussian(window: Window) -> Floats:
-    """Return weights of the cells with sum 1: a centred normal distribution, SIGMAS from the middle to the sides."""
+    """Return weights of the cells that sum to 1, from a normal distribution around the window's centre."""
     off = ((np.arange(cells) + 0.5 - 0.5 * cells) / (0.5 * cells / SIGMAS) for cells in window.cells)
     weights = reduce(np.multiply.outer, (np.exp(-0.5 * sigmas**2) for sigmas in off))
     return np.asarray(weights / weights.sum())
 
 
 def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest cell that fails; empty without one."""
-    # accurate to the size of a cell
+    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell; empty if there is none."""
+    # the distance is accurate to the size of a cell
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
         return {}
@@ -247,10 +247,10 @@ def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping
 
 @dataclass(frozen=True, eq=False)
 class RigidQuestion:
-    """Starts of the rigid model."""
+    """Rigid model whose walks are classified by their ends."""
 
     walker: Walker  # the unit walker
-    scale: tuple[float, float, float]  # (3) factors from SI to the unit walker's section coordinates
+    scale: tuple[float, float, float]  # factors from section coordinates in SI to those of the unit walker
     attractors: Attractors
     steps: int
     cells_at_once: int = 10_000
@@ -259,19 +259,19 @@ class RigidQuestion:
     tolerances: tuple[float, float] = (RTOL, ATOL)
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
-        """Walk from section coordinates z (n, 3), SI."""
+        """Walk from section coordinates z (n, 3), SI, until each walk ends or reaches an attractor."""
         scaled = z * np.array(self.scale)
         return walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
     def tightened(self) -> RigidQuestion:
-        """The same at a hundred times tighter tolerances."""
+        """Return the same model with tolerances a hundred times tighter."""
         rtol, atol = self.tolerances
         return replace(self, tolerances=(rtol / 100.0, atol / 100.0))
 
 
 @dataclass(frozen=True, eq=False)
 class ContactQuestion:
-    """Starts of the contact model: rigid states with the stance foot just touching, rolling without slip."""
+    """Contact model whose walks are classified; at the start the stance foot just touches and rolls without slip."""
 
     scene: ContactScene
     rigid: RigidModel
@@ -286,14 +286,14 @@ class ContactQuestion:
         return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
-        """Return outcome, attractor and steps of one walk."""
+        """Walk from section coordinates z (3), SI; return outcome, attractor and number of steps."""
         state = state_on_section(self.rigid, z)
         walk = self.starts.walk_from(start_state(self.scene, state))
         settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
         return (walk.outcome, UNREACHED, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
 
     def tightened(self) -> ContactQuestion:
-        """The same at a hundred times tighter tolerances."""
+        """Return the same model with the tighter tolerances of `numerical_error.tightened`."""
         return replace(self, starts=replace(self.starts, tolerances=tightened(self.starts.tolerances)[0]))
 
 
@@ -303,19 +303,19 @@ Question = RigidQuestion | ContactQuestion
 def units_of(
     name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
 ) -> list[WorkUnit]:
-    """Divide cells into units of `at_once`, each named by its first cell; a cell takes `walks` walks."""
+    """Divide cells into work units of `at_once` cells, named by their first cells; each cell takes `walks` walks."""
     groups = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
     return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]
 
 
 def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
-    """Return outcomes, attractors and steps of cells, walked from their middles, as one flat list."""
+    """Walk from the centres of cells; return their outcomes, attractors and step counts as one flat list."""
     ends = question.walk_to_ends(window.starts(np.array(cells)))
     return [float(number) for number in (*ends.outcome, *ends.attractor, *ends.steps)]
 
 
 def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
-    """Return the walking share of each cell, from the middles of its subcells."""
+    """Return the fraction of each cell that walks, from walks that start at the centres of its subcells."""
     inside = subcell_centres(refine, len(window.axes))
     ends = question.walk_to_ends(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
     walking = (ends.outcome == Outcome.WALKED).reshape(len(cells), -1)

@@ -1,4 +1,4 @@
-"""The contact model: an assembled walker on compliant ground, walked from the rigid model's start state."""
+"""Walk of the contact model, an assembled walker on compliant ground, from the rigid model's start state."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -43,8 +43,8 @@ from walkerlab.scene.contact import (
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.omissions import contact_walk_omissions
 
-RESOLVED = 0.1  # maximum tolerance over stiction velocity that resolves slips
-HALF_ANGLE = 0.2  # rad, between the legs in the walk that compiles the kernels
+RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
+HALF_ANGLE = 0.2  # rad, half the angle between the legs in the walk that compiles the kernels
 SCUFFED = (
     "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
     "contact.terrain: after-mid-swing, or checkerboard."
@@ -54,7 +54,7 @@ SCUFFED = (
 def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Walk `config.strides` strides; raises NoAnswer if the solver fails.
 
-    again  whether to repeat the walk for its numerical error, which takes about twice as long
+    again  whether to repeat the walk for its numerical error, which takes about twice as long as the walk itself
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
     scene = scene_on_pads(config, rigid_step, rigid_state)
@@ -108,7 +108,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
         "rolling_m": walk.rolling_m.tolist(),
         "energy_balance_residual_J": walk.energy_balance_residual_J,
         "dissipated_J": by_channel(scene.walker, walk.dissipated_J),
-        # until 0.3 the older name of the knees' strikes, -1 where a knee did not lock
+        # old key of the knee strike times, kept until version 0.3; -1 where a knee did not lock
         **(
             {} if strikes is None or not strikes.size else {"knee_strikes_s": np.nan_to_num(strikes, nan=-1.0).tolist()}
         ),
@@ -120,7 +120,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
 
 
 def mean_of(values: Floats) -> float | None:
-    """Return the mean over steps; None without steps."""
+    """Return the mean over steps; None if there are none."""
     return float(np.mean(values)) if values.size else None
 
 
@@ -136,7 +136,7 @@ def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResul
 
 
 def pads_group(pitch: float, end: float) -> Group:
-    """Build the group of pads from behind the start to beyond the walk's end."""
+    """Build the group of pads, from behind the start of the walk to beyond its end."""
     numbers = np.arange(-2, int(np.ceil(end / pitch)) + 3)
     return Group(
         {
@@ -151,7 +151,7 @@ def pads_group(pitch: float, end: float) -> Group:
 def trajectory_group(
     config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult, samples: ContactSamples
 ) -> Group:
-    """Build the group of samples that `outputs` selects."""
+    """Build the group of the sampled quantities that the config's `outputs` select."""
     variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
     feet = sample_feet(scene.walker, samples)
     if "states" in config.outputs:
@@ -173,7 +173,7 @@ def trajectory_group(
 
 
 def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
-    """Return motion of legs, shanks and torso, and positions of hip and knees."""
+    """Return the motion of legs, shanks and torso, and the positions of hip and knees."""
     walker, layout = scene.walker, scene.walker.whole
     names = [body.name for body in scene.assembly.bodies]
     n = len(names)
@@ -201,9 +201,9 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
 
 
 def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Floats, up: Floats) -> dict[str, Variable]:
-    """Energies as the paper plots them, from the current foothold, and the energy balance from a fixed origin.
+    """Return energies relative to the current foothold, as in the paper, and the energy balance from a fixed origin.
 
-    foothold, up  (samples,) m, where along the slope the stance foot touched, and over it
+    foothold, up  (samples,) m, position of the stance foothold along the slope, and its height above the slope
     """
     kinetic, potential, total = sample_energies(scene.walker, samples).T
     driven = samples.driven_J.T

@@ -33,22 +33,22 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.walk_outcomes import ground_causes, without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
-"""Seeds, and the step map over the parameter of a config."""
-LOOKED_AT = 5  # values in the span, ends included, where the search looks for gaits
-TIGHTEST = Effort(1e-13)  # for the numerical error
-OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities with a numerical error
+"""Seeds, and a function that returns a config's step map over the parameter."""
+LOOKED_AT = 5  # number of values in the span, ends included, at which the search looks for gaits
+TIGHTEST = Effort(1e-13)  # effort of Newton's method for the numerical error
+OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities of a gait with a numerical error
 
 
 @dataclass(frozen=True)
 class FamilyQuestion:
-    """A parameter of a config and the span to follow gaits over."""
+    """Parameter of a config, and the span over which gaits are followed."""
 
     config: ContinuationConfig
     parameter: Parameter
     span: ValueSpan
 
     def start_values(self) -> list[float]:
-        """Return the values where the search looks for gaits: the config's own first."""
+        """Return the values at which the search looks for gaits, the config's own value first."""
         own = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
         return [*([own] if own in self.span else []), *(float(value) for value in spread)]
@@ -60,7 +60,7 @@ class FamilyQuestion:
 
     @property
     def second(self) -> FamilyQuestion | None:
-        """The same over the second key; None without one."""
+        """Second parameter and its span; None if the config has no second key."""
         block = self.config.continuation.second
         return None if block is None else question_over(block, self.config, "continuation", "second")
 
@@ -71,11 +71,11 @@ class FamilyQuestion:
                 raise self.parameter.refusal(self.config, value, (*block, name))
 
     def touches(self, model: str) -> bool:
-        """Whether a model changes over the span."""
+        """Whether the parameter affects a model over the span."""
         return model_differs(model, self.config, self.parameter, (self.span.least, self.span.most))
 
     def touched(self, key: str) -> tuple[str, ...]:
-        """Return the requested models that the parameter affects; raises ConfigError if it affects neither."""
+        """Return the requested models that the parameter affects; raises ConfigError if it affects none of them."""
         touched = tuple(model for model in self.models if self.touches(model))
         if not touched:
             raise unused_key_error(f"continuation.{key}", self.parameter.key, self.models)
@@ -90,9 +90,9 @@ def question_over(block: Span, config: ContinuationConfig, *path: str) -> Family
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Follow the requested families.
 
-    again  whether some gaits are solved for a second time, for the numerical error
+    again  whether to solve some gaits a second time for the numerical error
 
-    Raises ConfigError for a key that is not a parameter of the model, NoAnswer for a span without a gait.
+    Raises ConfigError for a key that is no parameter of a requested model, NoAnswer if the span holds no gait.
     """
     block, families, isolated = config.continuation, [], []
     question = question_over(block, config, "continuation")
@@ -116,12 +116,12 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
 
 def refuse(config: ContinuationConfig) -> None:
-    """Raise ConfigError for an invalid question."""
+    """Raise ConfigError for an invalid `continuation` block."""
     models_of(question_over(config.continuation, config, "continuation"))
 
 
 def models_of(question: FamilyQuestion) -> tuple[str, ...]:
-    """Return the models to follow.
+    """Return the models whose gaits are followed.
 
     Raises ConfigError if the config lacks a requested model, for keys that affect no model or whose spans have invalid
     ends, and for a second key that equals the first or whose range excludes the config's own value.
@@ -148,7 +148,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
 
 
 def search_of(model: str, question: FamilyQuestion, progress: Progress) -> FamilySearch | None:
-    """Search a model's families, over a plane if there is a second key; None without a first gait."""
+    """Set up the search for a model's families, over both parameters if there are two; None if no gait is found."""
     seeding, second, block = SEEDS[model](question, progress), question.second, question.config.continuation
     if seeding is None:
         return None
@@ -162,7 +162,7 @@ def search_of(model: str, question: FamilyQuestion, progress: Progress) -> Famil
 
 
 def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
-    """Find all one-step gaits of the rigid model at some values."""
+    """Find all one-step gaits of the rigid model at each start value."""
     walker_at, seeds = rigid_walkers(question.config, question.parameter), list[Seed]()
     progress.start("continuation: gaits of the rigid model")
     for value in question.start_values():
@@ -173,7 +173,7 @@ def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
 
 
 def contact_seeds(question: FamilyQuestion, progress: Progress) -> Begun | None:
-    """Find the first gait of the contact model at some values; None without one."""
+    """Find a gait of the contact model at the first start value that has one; None if none has."""
     from walkerlab.scene.contact import gait_off_pads
 
     progress.start("continuation: a gait of the contact model")
@@ -233,7 +233,7 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
 
 
 def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of a model's branches: their values, stable parts and ends."""
+    """Return rows of a model's branches: their ranges of values, stable ranges and ends."""
     for branch in family.branches:
         ranges = branch.stable_ranges
         widest = max(ranges, key=lambda pair: pair[1] - pair[0], default=None)
@@ -262,7 +262,7 @@ def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
-    """Return the first flip where a one-step gait loses stability; None without one."""
+    """Return the lowest flip at which a one-step gait loses stability; None if there is none."""
     flips = [
         flip.value
         for branch in branches
@@ -274,7 +274,7 @@ def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
 
 
 def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of crossings where a model's assumptions cease to hold."""
+    """Return rows of the points where a model's assumptions cease to hold."""
     for branch in family.branches:
         for crossing in branch.crossings:
             monitor = crossing.monitor
@@ -283,8 +283,8 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
-    """Return the change of some gaits at tighter tolerances, spread evenly over all branches; None without gaits."""
-    # they are solved for again, so that the residual of Newton's method counts as well
+    """Return the changes of an even sample of gaits at tighter tolerances; None if there are no gaits."""
+    # the gaits are solved for again, so that the residual of Newton's method counts as well
     step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
         return None
@@ -305,7 +305,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
 
 
 def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
-    """Describe how walks along the branches end, and the role of the ground."""
+    """Describe branch ends where walks fail and crossings where they trip over pads, with the role of the ground."""
     for branch in family.branches:
         gait = f"the {family.model} model's gait of {branch.period} {steps_word(branch.period)}"
         for end in branch.ends:
@@ -325,7 +325,7 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
 
 
 def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
-    """Return on which side of a crossing the monitored quantity exceeds its limit."""
+    """Return the side of a crossing on which the monitored quantity exceeds its limit."""
     assert step_map is not None, "a branch is followed with one"
     place, limit = list(step_map.monitors).index(crossing.monitor), crossing.monitor.limit
     nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
@@ -334,7 +334,7 @@ def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None
 
 
 def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of period-doubling cascades with the ratios of distances between flips."""
+    """Return rows of period-doubling cascades, with the ratios of the distances between flips."""
     for first in family.branches:
         if any(is_born_in(first, flip, parent) for parent in family.branches for flip in parent.bifurcations):
             continue
@@ -356,17 +356,17 @@ def chain(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[float]:
 
 
 def is_born_in(child: GaitBranch, flip: Bifurcation, parent: GaitBranch) -> bool:
-    """Whether either end of a branch is a flip of another branch."""
+    """Whether a branch begins or ends at a flip of another branch."""
     if flip.kind != "flip" or child.period != 2 * parent.period:
         return False
     return child.ends[0].value == flip.value or any(child.closes_on(flip))
 
 
 def attractor_summary(family: Family) -> dict[str, Any]:
-    """Describe the range of the attractor and its fate.
+    """Describe the range over which an attractor was followed, and how it was lost.
 
-    Just beyond a flip walks leave the gait slowly. A walk that has not repeated itself counts as aperiodic only if
-    neighbouring walks may diverge, no followed gait is stable and no cascade is still doubling.
+    Just beyond a flip, walks leave the gait slowly. A walk that has not repeated itself therefore counts as aperiodic
+    only if neighbouring walks may diverge, no followed gait is stable and no cascade is still doubling.
     """
     attractors, exponents = family.attractors, family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
@@ -389,7 +389,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
 
 
 def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of bifurcation curves over the plane: their ends and the reasons."""
+    """Return rows of bifurcation curves in the plane of both parameters: their ends and the reasons."""
     for curve in family.curves:
         points = list(zip(curve.first.tolist(), curve.second.tolist(), strict=True))
         yield {
@@ -403,7 +403,7 @@ def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def region_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return the share of the plane of each kind of attractor."""
+    """Return the fraction of the plane of both parameters that each period of attractor occupies."""
     if family.regions is not None:
         periods, counts = np.unique(family.regions.period, return_counts=True)
         for period, cells in zip(periods.tolist(), counts.tolist(), strict=True):
@@ -411,14 +411,14 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
-    """Report a gait that continues in neither direction, since the step map is discontinuous there."""
+    """Report a gait that continues in neither direction, because the step map is discontinuous there."""
     (gait,) = branch.points
     what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
     return {"what": what, "why": f"it goes on neither way: {branch.ends[1].reason}", "saves": ""}
 
 
 def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> list[dict[str, str]]:
-    """Report a family that was not followed, and why."""
+    """List the families that were not followed, with the reasons."""
     followed, entries, second = {family.model: family for family in families}, [], question.second
     for model in question.models:
         if model not in followed:

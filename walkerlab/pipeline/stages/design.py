@@ -39,7 +39,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
 
 SOLVED: Final = Effort(1e-10)
-MEETING: Final = 1e-3  # relative difference of multipliers that count as meeting
+MEETING: Final = 1e-3  # gap between the magnitudes of the two largest multipliers below which they count as meeting
 LABELS: Final = {
     "to": Label("", "parameter of the config"),
     "start": Label("SI", "start of the search"),
@@ -49,9 +49,9 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 
 
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
-    """Search for the optimum; raises ConfigError for an invalid question, NoAnswer if no walker keeps the bounds.
+    """Search for the optimum; raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
 
-    checkpoint  ends of the searches of an earlier run; new ones are added
+    checkpoint  results of the searches of an earlier run; new ones are added
     """
     refuse(config)
     design = config.design or Design()
@@ -92,7 +92,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     start = {} if own_gait is None else {"start_value": own_gait.numbers[quantity], "start": dict(own_gait.numbers)}
     optimum = {
         key: float(f"{value:.12g}") for key, value in zip(design.over, best.x, strict=True)
-    }  # 12 digits: bounds as typed
+    }  # 12 digits, so that a bound appears as typed
     answer = {
         "quantity": quantity,
         "sense": "least" if design.minimise else "largest",
@@ -124,7 +124,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
 
 
 def refuse(config: DesignConfig) -> None:
-    """Raise ConfigError for an invalid question."""
+    """Raise ConfigError for an invalid `design` block."""
     design = config.design or Design()
     if (design.minimise or design.maximise) is None or not design.over:
         raise ConfigError(
@@ -155,7 +155,7 @@ def on_bound(design: Design, x: Floats) -> list[str]:
 
 
 class Gaits:
-    """Gait and gradients as functions of the parameters; each search starts at the last gait."""
+    """Gait and gradients as functions of the parameters; each search for a gait starts at the last one found."""
 
     def __init__(
         self,
@@ -167,13 +167,13 @@ class Gaits:
     ) -> None:
         self.config, self.model, self.parameters, self.progress = config, design.model, parameters, progress
         self.wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
-        self.counts = np.zeros(2, int)  # evaluations, and those without a gait
+        self.counts = np.zeros(2, int)  # number of evaluations, and of those without a gait
         self.sections: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
         self.z = find_model_gait(design.model, config, gait, progress.note).z
 
     def gait_at(self, x: Floats) -> Point | None:
-        """Return the gait; None without one, or if the config rejects the values."""
+        """Return the gait at parameter values (parameters,); None if there is none or the config rejects the values."""
         self.counts[0] += 1
         self.progress.advance()
         changed = config_with(self.config, self.parameters, x.tolist())
@@ -185,11 +185,12 @@ class Gaits:
         return gait
 
     def gait_of(self, config: Config) -> Point | None:
-        """Find the gait of a config near the last one, or by a search."""
+        """Find the gait of a config near the last gait, or by a search from scratch."""
         subject = ModelUnderTest(self.model, config, self.z, self.length)
         standpoint = subject.at()
         match = self.near(standpoint, self.z)
-        if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):  # a long way, perhaps
+        # the parameters may be too far from those of the last gait for Newton's method, so search from scratch
+        if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait
             match = match if gait is None else self.near(standpoint, section_coordinates(walker, gait.state)) or match
@@ -209,7 +210,7 @@ class Gaits:
         )
 
     def near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
-        """Find the gait near z (d,) with its quantities; None if one is undefined."""
+        """Find the gait near z (d,) and its quantities; None if there is no gait or a quantity is undefined."""
         cycle = gait_near(standpoint_before.step_map, z, standpoint_before.p, SOLVED)
         if isinstance(cycle, NotConverged):
             return None

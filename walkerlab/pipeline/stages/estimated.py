@@ -1,4 +1,4 @@
-"""The question of the block `identify`: parameters to estimate, their priors, and the models."""
+"""Contents of the `identify` block and their checks: parameters to estimate, priors and models."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from walkerlab.scene.families import model_reads, unused_key_error
 from walkerlab.scene.identification import SCALE_OF_ZERO, Question
 from walkerlab.scene.parameter import parameter_of
 
-EXACT: Final = 1e-9  # standard deviation of a prior, in its value's size, below which the value counts as known exactly
+EXACT: Final = 1e-9  # a prior whose standard deviation is below this fraction of its value counts as exact
 
 
 def question_of(block: Identify) -> Question:
@@ -32,13 +32,13 @@ def models_of(block: Identify) -> tuple[str, ...]:
 
 
 def refuse_model(config: ContactConfig, block: Identify) -> None:
-    """Raise ConfigError for the contact model of a config without contact."""
+    """Raise ConfigError if the contact model is requested and the config has no contact block."""
     if "contact" in models_of(block) and config.contact is None:
         raise contact_required_error(f"identify.model: {block.model}", config.walker, "Add one.")
 
 
 def refuse_keys(config: ContactConfig, block: Identify) -> None:
-    """Raise ConfigError for a key that is not a parameter of the models, or a value that the schema refuses."""
+    """Raise ConfigError for a key that is not a parameter of the models, or a value or prior that cannot be used."""
     refuse_values(config, "fit", block.fit, models_of(block))
     refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, models_of(block))
     for key, (value, sigma) in block.prior.items():

@@ -1,4 +1,4 @@
-"""Groups of families of gaits: branches with bifurcations, attractors, curves and sampled walks."""
+"""Stored groups of gait families: branches with bifurcations, attractors, curves and sampled walks."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from walkerlab.pipeline.store.content import Attribute, Group, Variable
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 
-MOTIONS_OF_BRANCH, LONGEST = 12, 4  # walked gaits of a branch; maximum period of a walked gait
-STRIDE = 2  # steps until the legs have their first roles again
+MOTIONS_OF_BRANCH, LONGEST = 12, 4  # number of gaits per branch whose walks are stored; maximum period of such a gait
+STRIDE = 2  # number of steps after which the legs have their initial roles again
 TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
-EVERY = 3  # interval of stored samples between heel strikes
+EVERY = 3  # every third sample between heel strikes is stored
 
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
@@ -68,14 +68,14 @@ def groups(
 ) -> dict[str, Group]:  # fmt: skip
     """Build a group for each branch and curve, and for each model's bifurcations, exponents and attractor.
 
-    said    the summary, of which branches, bifurcations and curves are stored as tables too
-    second  key of the plane, if there is one
+    answer  summary, whose branches, bifurcations and curves are stored as tables too
+    second  second parameter, if gaits are followed over a plane
     """
     value = {"value": Label(parameter.unit, parameter.key)}
     stored: dict[str, Group] = {}
 
     def over(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
-        """Return coordinates of both parameters."""
+        """Return the coordinates of both parameters."""
         axes = zip(("value", "second"), (plane.first, plane.second), (parameter, second), dims, strict=True)
         return {
             name: labelled(values, Label(family.unit, family.key), dim) for name, values, family, dim in axes if family
@@ -115,17 +115,17 @@ def groups(
 
 
 class Mark(NamedTuple):
-    """A bifurcation on a branch: the index of the point before it, and the gait's steps."""
+    """Bifurcation on a branch: the index of the point before it, and the gait's steps."""
 
     after: int
     kind: str
     value: float
-    periods: Floats  # durations of the steps there (s)
-    angles: Floats  # of the stance leg just after each heel strike there (rad)
+    periods: Floats  # durations of the gait's steps (s)
+    angles: Floats  # angle of the stance leg just after each heel strike of the gait (rad)
 
 
 def marks_on(branch: GaitBranch) -> list[Mark]:
-    """Return the bifurcations of a branch in their order along it."""
+    """Return the bifurcations of a branch in order along the branch."""
     return [
         Mark(index, bifurcation.kind, bifurcation.value, bifurcation.gait.periods_s, bifurcation.gait.angles)
         for index, (before, after) in enumerate(pairwise(branch.points))
@@ -134,7 +134,7 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return the flip where a branch begins, with its parent's gait repeated twice."""
+    """Return the flip where a branch begins, with the steps of the parent's gait repeated twice."""
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:
@@ -170,7 +170,7 @@ def branch_group(
 
 
 def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
-    """Build groups of sampled walks of some gaits of each rigid branch: branch_0/motion_7."""
+    """Build the groups of sampled walks of some gaits of each rigid branch, such as branch_0/motion_7."""
     return {
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)
@@ -181,7 +181,7 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
 
 
 def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
-    """Walk a gait and yield its group as `simulate` stores it; nothing if the config rejects the value."""
+    """Walk a gait and yield its group as `simulate` stores it; yield nothing if the config rejects the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return

@@ -36,13 +36,13 @@ NUMBERS = {
     "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
     "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
-"""Quantities of a gait that are stored and printed, fields of `RigidGait`."""
+"""Labels of the fields of `RigidGait` that are stored and printed."""
 OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
 
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Find the gaits of both sets of equations; raises NoAnswer if the config's set has no physical one."""
+    """Find the gaits of each set of equations; raises NoAnswer if the config's own set has no physical gait."""
     sets = equation_sets(config)
     searches: dict[str, GaitSearch] = {
         equations: find_gaits(rigid_walker(config, equations), config.seed)
@@ -60,7 +60,7 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
 
 
 def advice(config: RigidConfig) -> str:
-    """Advise on a slope without a gait."""
+    """Return advice for a slope without a gait."""
     walk_anyway = (
         f"to walk there all the same, give a start state (start: [{', '.join(state_names(config))}]), and the "
         "contact model a pitch of its pads (contact.pad_pitch: a number)"
@@ -76,7 +76,7 @@ def advice(config: RigidConfig) -> str:
 
 
 def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str, Any]:
-    """Summarise the chosen gait of the config's equations, and both sets side by side."""
+    """Summarise the chosen gait of the config's equations, and the gaits of each set of equations."""
     sets = {}
     for equations, search in searches.items():
         gaits = [
@@ -100,12 +100,12 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
 
 
 def numbers_of(gait: RigidGait) -> dict[str, Label]:
-    """Return the labels of a gait's quantities, with or without knees."""
+    """Return the labels of a gait's quantities, including the knees' if it has any."""
     return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
 
 
 def gait_summary(gait: RigidGait) -> dict[str, Any]:
-    """Describe one gait in SI units."""
+    """Summarise one gait in SI units."""
     return {
         "state": list(gait.state),
         "multipliers": [[value.real, value.imag] for value in gait.multipliers],

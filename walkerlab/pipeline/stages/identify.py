@@ -41,14 +41,14 @@ LABELS: Final = {
     "standard_error": Label("SI", "standard error; absent where the walk leaves the parameter open"),
     "start": Label("SI", "value in the config"),
 }
-UNTOUCHED: Final = 1e-3  # relative reduction of a prior's variance, below which the walk says nothing on it
+UNTOUCHED: Final = 1e-3  # a walk that reduces a prior's variance by a smaller fraction adds no information to it
 SHOWN_STEPS, SHOWN_SAMPLES = 10, 800
-"""Number of steps, and about that of samples, whose motion the player shows."""
+"""Number of steps, and approximate number of samples, that the motion player shows."""
 FEWER: Final = "Fit fewer parameters, add what was weighed (--prior), or start nearer to the walk (--set)."
 
 
 def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Fit the measured walk; raises ConfigError for an invalid question or file, NoAnswer if no fit converges."""
+    """Fit the measured walk; raises ConfigError for an invalid config or file, NoAnswer if no fit converges."""
     refuse(config)
     block = config.identify
     assert block is not None, "refuse rejects a config without the block"
@@ -66,7 +66,7 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
 
 
 def refuse(config: IdentifyConfig) -> None:
-    """Raise ConfigError for an invalid question, or a file without a walk."""
+    """Raise ConfigError for an invalid `identify` block, or a file without a walk."""
     block = config.identify or Identify()
     if not block.data or not block.fit:
         raise ConfigError(
@@ -94,7 +94,7 @@ def refuse(config: IdentifyConfig) -> None:
 def identify_divided(
     config: IdentifyConfig, block: Identify, ask: Callable[[Measured], Identification]
 ) -> tuple[Identification, Measured]:
-    """Identify from the first division into steps that fits, or else from the first that a walk can be fitted to."""
+    """Try divisions of the walk into steps; return the first with a good fit, or else the first that can be fitted."""
     first: tuple[Identification, Measured] | None = None
     problem: NoAnswer | None = None
     for measured in read_divisions(block, config):
@@ -118,7 +118,7 @@ def divide_again(
     ask: Callable[[Measured], Identification],
     before: tuple[Identification, Measured],
 ) -> tuple[Identification, Measured]:
-    """Repeat a fit if identified slope and sensors put heel strikes elsewhere; `before` if the other does not fit."""
+    """Repeat a fit if the identified slope and sensors move heel strikes; keep the old fit if the new one is bad."""
     result, measured = before
     if not isinstance(measured, MeasuredAngles):
         return before
@@ -139,7 +139,7 @@ def verdict_of(result: Identification) -> ModelFit:
 
 
 def content_of(config: IdentifyConfig, result: Identification, measured: MeasuredSteps | MeasuredAngles) -> Content:
-    """Store estimates, steps and, of angles, residuals in phase."""
+    """Build the content: estimates, steps and, for measured angles, residuals over the phase of a step."""
     known, block = result.information, config.identify or Identify()
     estimates = [
         {**asdict(estimate), "value": float(f"{estimate.value:.12g}"), "start": float(f"{estimate.start:.12g}")}
@@ -184,7 +184,7 @@ def content_of(config: IdentifyConfig, result: Identification, measured: Measure
 
 
 def prior_row(estimate: Estimate, value: float, sigma: float) -> dict[str, Any]:
-    """Return a prior, and its distance from the walk's own estimate in standard errors of the difference."""
+    """Return a prior, with its distance from the walk's own estimate in standard errors of the difference."""
     error = estimate.standard_error
     free = 0.0 if error is None else sigma**2 - error**2
     distance = abs(estimate.value - value) / math.sqrt(free) if free > UNTOUCHED * sigma**2 else 0.0
@@ -198,7 +198,7 @@ def prior_row(estimate: Estimate, value: float, sigma: float) -> dict[str, Any]:
 
 
 def worst_moves(known: Information) -> Floats | None:
-    """Return changes (2, parameters) by a standard deviation along the two combinations that the walk separates worst.
+    """Return one-sigma changes (2, parameters) along the two parameter combinations that the walk determines worst.
 
     They are independent, in the keys' units, the worst first; None if fewer than two combinations are determined.
     """
@@ -211,7 +211,7 @@ def worst_moves(known: Information) -> Floats | None:
 
 
 def step_group(result: Identification) -> Group:
-    """Measured and predicted values of each step, and the standard deviation of their difference."""
+    """Build the group of measured and predicted step quantities, with the standard deviations of their differences."""
     columns = numbered(result.steps, "step", "step")
     for table in result.tables:
         parts = {"measured": table.measured, "predicted": table.predicted, "deviation": table.deviation}
@@ -222,13 +222,13 @@ def step_group(result: Identification) -> Group:
 
 
 def angle_residuals(result: Identification, measured: MeasuredAngles) -> Floats:
-    """Return measured minus predicted angles (samples, 2) over the most probable floor."""
+    """Return measured minus predicted angles (samples, 2), given the most probable floor."""
     about = result.fitted.data.residuals - result.fitted.data.G @ result.fitted.heights_m
     return about[-measured.angles_rad.size :].reshape(-1, 2)
 
 
 def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
-    """Residuals of the angles in phase; the swing leg's first."""
+    """Build the group of angle residuals over the phase of a step, those of the swing leg first."""
     swing_first = reorder_by_leg(angle_residuals(result, measured), 1 - measured.step % 2)
     return Group(
         {
@@ -247,11 +247,11 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
 
 
 def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAngles) -> dict[str, Group]:
-    """Build the identified and the measured motion of the first steps; empty for knees, whose shanks have no angles.
+    """Build the identified and measured motions of the first steps; empty for kneed walkers (no shank angles).
 
-    Both stand on the identified footholds at the same phase, and angles are free of the sensors' offset and gain.
+    Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
 
-    config  the identified walker's
+    config  config of the identified walker
     """
     walker, walk, sensors = rigid_walker(config), result.walk, result.sensors
     if walker.kneed:
@@ -281,7 +281,7 @@ def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAn
 
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
-    """Return the masses that estimated masses refer to: those of the config that were not fitted."""
+    """Return the masses in the config that were not fitted; the estimated masses are relative to them."""
     # empty for the contact model, whose stiffness sets the scale of mass
     if model != "rigid" or not any(key.endswith("mass_kg") for key in keys):
         return {}

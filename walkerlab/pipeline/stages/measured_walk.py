@@ -30,18 +30,18 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
-"""Kind of unit of each quantity of a table of steps."""
+"""Kind of unit of each quantity in a table of steps."""
 MIN_STEPS: Final = 2
-MOST_STEPS: Final = 500  # each has a floor height of its own: memory grows with their square, time with their cube
+MOST_STEPS: Final = 500  # each step adds an unknown floor height; memory grows as steps squared, time as steps cubed
 SLOPE_KEY: Final = "slope_deg"
-SAME_TOUCHES: Final = 0.002  # rad, difference of the angles' sums that leaves heel strikes about where they are
+SAME_TOUCHES: Final = 0.002  # rad, largest difference of sums of leg angles that hardly moves the heel strikes
 NO_DATA_FILE: Final = "there is no such file"
 
 Measured = MeasuredSteps | MeasuredAngles
 
 
 def digests(config: Config) -> Mapping[str, str]:
-    """Return the digest of the data's content, so that a changed file makes results stale."""
+    """Return the digest of the data file's content, so that a changed file makes results outdated."""
     if config.identify is None:
         return {}
     try:
@@ -51,15 +51,15 @@ def digests(config: Config) -> Mapping[str, str]:
 
 
 def read_measured(block: Identify, config: RigidConfig) -> Measured:
-    """Read the block's file at its level; raises ConfigError for a file without such a walk."""
+    """Read the block's file at the level that the block names; raises ConfigError if it holds no such walk."""
     return next(read_divisions(block, config))
 
 
 def read_divisions(block: Identify, config: RigidConfig) -> Iterator[Measured]:
     """Read the block's file, and yield the walk, then other divisions of its angles into steps.
 
-    There are others if the slope or the sensors' offset is estimated: heel strikes depend on both. Raises ConfigError
-    for a file without a walk.
+    Other divisions exist only if the slope or the sensors' offset is estimated, since heel strikes depend on both.
+    Raises ConfigError for a file without a walk.
     """
     path = Path(block.data)
     if not path.is_file():
@@ -97,7 +97,7 @@ def refuse_count(path: Path, measured: Measured) -> Measured:
 
 
 def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iterator[float]:
-    """Yield possible sums (rad) of the legs' angles from the slope's normal at heel strikes: 0, then others."""
+    """Yield possible sums (rad) of the leg angles at heel strike, measured from the slope's normal: 0, then others."""
     yield 0.0
     angles = walk.both_legs("angle")
     if angles is None or not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.nuisance):
@@ -108,26 +108,26 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
 
 
 def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredAngles:
-    """Divide the angles of the block's file at heel strikes with another sum of the legs' angles."""
+    """Divide the angles of the block's file at the heel strikes where the leg angles have this sum (rad)."""
     walk = as_walk(read_recording(Path(block.data)), block.columns, block.units)
     return divide_angles(walk, config, block.data, touch_sum_rad)
 
 
 def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float) -> MeasuredAngles:
-    """Divide angles over time at the heel strikes of the config's walker."""
+    """Divide angles over time at the heel strikes of the config's walker, where the leg angles have this sum (rad)."""
     steps = divide_into_steps(walk, rigid_walker(config), source, touch_sum_rad)
     if steps.touch_time_s.size < MIN_STEPS:
         raise ConfigError(f"{source} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
     angles = walk.both_legs("angle")
     assert angles is not None, "a walk in steps has angles"
-    # only what was measured: the steps' own samples at heel strikes are interpolated
+    # use only measured samples: the samples of `steps` at heel strikes are interpolated
     own = angles[:, ::-1] if steps.swapped else angles
     measured = split_into_steps(walk.time_s - steps.origin_s, own, np.append(0.0, steps.touch_time_s))
     return replace(measured, touch_sum_rad=touch_sum_rad)
 
 
 def read_steps(path: Path, block: Identify) -> MeasuredSteps:
-    """Read a table with a row per step: `period_s`, and `length_m` and `touch_angle_rad` if they were measured."""
+    """Read a table with one row per step: `period_s` and, if measured, `length_m` and `touch_angle_rad`."""
     table = read_delimited(path)
     for name in block.columns.keys() - STEP_KINDS.keys():
         raise ConfigError(
@@ -147,13 +147,13 @@ def read_steps(path: Path, block: Identify) -> MeasuredSteps:
 
 
 def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
-    """Return a quantity (steps,) in SI units, None without a column; raises ConfigError for gaps and bad values."""
+    """Return a quantity (steps,) in SI units, None if it has no column; raises ConfigError for gaps and bad values."""
     by_name = {plain(column): column for column in table.columns}
     stem = name.rpartition("_")[0]
     source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
     if source is None:
         return None
-    if source.lower() == "t" and TIME in table.columns:  # the reader of files calls a column t so
+    if source.lower() == "t" and TIME in table.columns:  # the file reader has renamed column t
         source = TIME
     if source not in table.columns:
         near = get_close_matches(source, table.columns, 1, 0.3)
@@ -175,7 +175,7 @@ def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
 
 
 def refuse_sizes(table: Recording, name: str, source: str, values: Floats) -> None:
-    """Raise ConfigError for values (steps,) in SI units that no step has."""
+    """Raise ConfigError if a value (steps,), in SI units, is impossible for a step."""
     angle = name == "touch_angle_rad"
     possible = [abs(value) <= math.pi if angle else is_plausible(value) for value in values.tolist()]
     if all(possible):

@@ -9,33 +9,33 @@ import numpy as np
 from walkerlab.labels import ERROR_OF_EACH_STEP
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 
-LEAST_RTOL: Final = 1e-14  # minimum in the schema
+LEAST_RTOL: Final = 1e-14  # minimum that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
 MORE_WORK: Final = 10  # factor on the evaluation budget at tighter tolerances
-SAMPLE: Final = 16  # number of many walks to repeat
+SAMPLE: Final = 16  # number of walks to repeat out of many
 USUAL: Final = TIGHTER[100.0]
-ROUNDING: Final = 1e-6  # relative, of a divided tolerance
+ROUNDING: Final = 1e-6  # relative rounding error that a divided tolerance may have
 
 Summary = Mapping[str, Any]
 
 
 def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tolerances], Summary]) -> dict[str, Any]:
-    """Repeat a walk at tighter tolerances and return how much its quantities change.
+    """Repeat a walk at tighter tolerances and return the changes of its quantities.
 
     first       summary of the walk: its `outcome`, `steps`, `end_time_s`, and lists with one value per step
-    tolerances  of the first walk
+    tolerances  tolerances of the first walk
     walk        repeats the walk with other tolerances and returns its summary
 
-    Returns the largest changes of the quantities of its steps, named as in `ERROR_OF_EACH_STEP`, of `end_time_s` (s),
-    and of `cost_of_transport` for a driven walk; `by` describes the change unless it is the usual one. Returns only
-    `reason` if the second walk ends otherwise.
+    Returns the largest change of each step quantity, named as in `ERROR_OF_EACH_STEP`, the change of `end_time_s` (s)
+    and, for a driven walk, that of `cost_of_transport`. `by` describes the tighter settings unless they are the usual
+    ones. If the two walks end differently, only `reason` is returned.
     """
     tighter, by = tightened(tolerances)
     return change(first, walk(tighter), by)
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Return tighter tolerances (at the tightest ones another method) with a larger budget, and a description."""
+    """Return tighter tolerances (or another method at the tightest ones) with a larger budget, and a description."""
     tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor
@@ -46,23 +46,23 @@ def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
 
 
 def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
-    """Return the largest changes between two summaries of a walk, as `numerical_error` does."""
+    """Return the largest changes between two summaries of a walk, in the form that `numerical_error` returns."""
     if (first["outcome"], first["steps"]) != (again["outcome"], again["steps"]):
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
         return {"reason": f"with {by} the walk ends otherwise: {again['outcome']} after {steps}"}
     changes = {}
     for key, name in ERROR_OF_EACH_STEP.items():
-        both = zip(first.get(key) or (), again.get(key) or (), strict=False)  # the last foot may still stand
+        both = zip(first.get(key) or (), again.get(key) or (), strict=False)  # the last foot may not have lifted
         apart = [abs(before - after) for before, after in both if before is not None and after is not None]
-        if apart and any(first[key]):  # point feet do not roll
+        if apart and any(first[key]):  # skip a list of zeros, such as the rolling of point feet
             changes[name] = max(apart)
     changes["end_time_s"] = abs(first["end_time_s"] - again["end_time_s"])
-    # a passive walk's cost is the slope's sine, however large the walk's error
+    # a passive walk's cost of transport is the sine of the slope, however large the walk's error
     if any(work for giver, work in first.get("work_per_step_J", {}).items() if giver != "gravity"):
         changes["cost_of_transport"] = abs(first["cost_of_transport"] - again["cost_of_transport"])
     return changes if by == USUAL else {**changes, "by": by}
 
 
 def evenly_spread(count: int, wanted: int) -> list[int]:
-    """Return at most `wanted` evenly spaced indices below `count`, both ends included."""
+    """Return at most `wanted` evenly spaced indices from 0 to `count` - 1, both included."""
     return sorted({round(place) for place in np.linspace(0, count - 1, min(count, wanted)).tolist()})

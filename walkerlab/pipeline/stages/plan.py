@@ -1,4 +1,4 @@
-"""Say which measurements would determine parameters of the walker, and with how many steps."""
+"""Find the measurements, and the numbers of steps, that would determine parameters of the walker."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ERROR_DIMENSIONS: Final = ("measurement", "steps", "parameter")
 
 
 def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Predict the errors of several ways to measure a walk; raises ConfigError for an invalid question."""
+    """Predict the errors of several ways to measure a walk; raises ConfigError for an invalid request."""
     refuse(config)
     block, plan = cast("Identify", config.identify), config.plan or Plan()
     progress.start("plan")
@@ -50,7 +50,7 @@ def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -
 
 
 def refuse(config: PlanConfig) -> None:
-    """Raise ConfigError for an invalid question."""
+    """Raise ConfigError for an invalid `plan` or `identify` block."""
     block, plan = config.identify or Identify(), config.plan or Plan()
     if not block.fit:
         raise ConfigError("a plan needs a parameter to estimate.", "For example --fit walker.hip_mass_kg.")
@@ -87,7 +87,7 @@ def row_of(option: WayToMeasure, units: Mapping[str, str], wanted: Mapping[str, 
 
 
 def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
-    """Store the errors by number of steps; gaps where the walk leaves a parameter open."""
+    """Build the group of errors by number of steps, with gaps where the walk does not determine a parameter."""
     counts = list(options[0].curve)
     errors = [[[option.curve[count][key] for key in keys] for count in counts] for option in options]
     return Group(

@@ -31,7 +31,7 @@ NO_FILE = "there is no such file"
 
 
 def digests(config: Config) -> Mapping[str, str]:
-    """Return the digest of the recording's content, so that a changed file makes results stale."""
+    """Return the digest of the recording's content, so that a changed file makes results outdated."""
     assert config.recording is not None, "the stage requires the block"
     try:
         return {"recording.file": hashlib.sha256(Path(config.recording.file).read_bytes()).hexdigest()}
@@ -51,7 +51,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
 
 
 def read_walk(block: RecordedFile) -> RecordedWalk:
-    """Read the quantities of a recorded walk in SI units; raises ConfigError."""
+    """Read the quantities of a recorded walk in SI units; raises ConfigError for a file that cannot be read."""
     if not block.file:
         raise ConfigError("recording.file: the recording has no file.", "Name one: --with FILE.", ("recording", "file"))
     path = Path(block.file)
@@ -60,7 +60,7 @@ def read_walk(block: RecordedFile) -> RecordedWalk:
 
 
 def read_artifact(path: Path) -> Recording:
-    """Read the trajectory of a walk that a run has stored."""
+    """Read the trajectory of a walk that a run has stored; raises ConfigError if there is none."""
     try:
         groups = artifact.read(path).groups
     except FileNotFoundError:
@@ -83,7 +83,7 @@ def read_artifact(path: Path) -> Recording:
 
 
 def content_of(block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps) -> Content:
-    """Store steps and samples under the names of computed walks; energies and forces where they were recorded."""
+    """Build the content with the names of computed walks; energies and forces only if they were recorded."""
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)
     columns = step_columns(steps.touch_time_s, period_s=periods, length_m=steps.length_m, touch_along_m=along)
@@ -116,7 +116,7 @@ def content_of(block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWa
 
 
 def recorded_besides(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:
-    """Interpolate the other recorded quantities (samples,) or (samples, 2) at the samples' times."""
+    """Interpolate the other recorded quantities, (samples,) or (samples, 2), at the times of the samples."""
     time, besides = walk.time_s - steps.origin_s, {}
     for name in OVER_TIME:
         if name in ("time", "angle", "velocity"):

@@ -1,4 +1,4 @@
-"""Groups of a rigid walk: its steps, and samples over time."""
+"""Stored groups of a rigid walk: its steps, and samples over time."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
 
 
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
-    """Build the group of samples that `outputs` selects, with both sides of each heel strike."""
+    """Build the group of the sampled quantities that `outputs` select, with both sides of each heel strike."""
     stance = stance_leg(samples)
     variables = {**over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
     if "states" in scene.outputs:
@@ -51,19 +51,19 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
 
 
 def stance_leg(samples: Samples) -> Any:
-    """Return the stance leg (samples,): leg 0 swings in even steps, leg 1 in odd ones."""
+    """Return the index of the stance leg (samples,): leg 0 swings in even steps, leg 1 in odd ones."""
     return 1 - samples.step % 2
 
 
 def leg_variables(samples: Samples) -> dict[str, Variable]:
-    """Return angles and velocities by leg; the legs change roles at every heel strike."""
+    """Return angles and velocities by leg; the legs change roles at each heel strike."""
     n, stance = samples.state.shape[1] // 2, stance_leg(samples)
     angle, velocity = samples.state[:, :2], samples.state[:, n : n + 2]
     return over_time(angle=reorder_by_leg(angle, stance), velocity=reorder_by_leg(velocity, stance))
 
 
 def reorder_by_leg(by_role: Any, stance: Any) -> Any:
-    """Reorder values (samples, 2) from swing and stance leg to leg 0 and leg 1."""
+    """Reorder values (samples, 2) of swing and stance leg to those of leg 0 and leg 1."""
     return np.take_along_axis(by_role, np.where(stance[:, None] == 1, [[0, 1]], [[1, 0]]), axis=1)
 
 
@@ -81,7 +81,7 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
 
 
 def place_variables(positions: Places, stance: Any) -> dict[str, Variable]:
-    """Return positions of hip, knees and feet along the slope from the first foothold, and above it."""
+    """Return positions of hip, knees and feet, along the slope from the first foothold and above the slope."""
     points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)} | (
         {} if positions.knees is None else {"knee": positions.knees}
     )

@@ -50,9 +50,9 @@ Rows = list[dict[str, Any]]
 WALKS_AT_ONCE: Final = 25
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
-"""Maximum number of steps on one rough ground, all walks together."""
+"""Maximum number of steps of all walks together on ground of one roughness, by model."""
 GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
-"""Ground reactions during and after a push, as `RigidMap.ground_after_push` returns them."""
+"""Names of the ground reactions during and after a push that `RigidMap.ground_after_push` returns, in its order."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "which model walks")}
@@ -94,7 +94,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "value": Label("SI", "derivative, in the units of both"),
     },
 }
-"""Labels of the rows of each part of the answer, besides the model."""
+"""Labels of the columns of each table in the answer, in addition to the model."""
 
 
 def run(
@@ -105,19 +105,19 @@ def run(
     checkpoint: Checkpoint,
     jobs: int = 1,
 ) -> Content:
-    """Study each model; raises NoAnswer with partial results for an unstable gait, which has no norm.
+    """Study each model; raises NoAnswer with partial results for an unstable gait, which has no sensitivity norm.
 
-    checkpoint  walks of an earlier run
-    jobs        processes
+    checkpoint  disturbances and walks that an earlier run computed
+    jobs        maximum number of processes
 
-    Raises ConfigError for an invalid question.
+    Raises ConfigError for an invalid request.
     """
     refuse(config)
     answer: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
     unstable, steps = [], {}
     for subject in subjects(config, inputs, progress):
         gait = subject.at()
-        # the rigid model's gradients and largest disturbances are faster than starting a process
+        # the rigid model's gradients and largest disturbances take less time than the start of a process
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
         numbers = gait_quantities(gait)
         assert numbers is not None, "a gait that was found walks"
@@ -129,7 +129,7 @@ def run(
         answer["gait_sensitivity_norm"] += norms(subject.model, gait)
         rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
         units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
-        # the gait's own quantities have compiled all kernels
+        # the computation of the gait's quantities has compiled all kernels
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
         model, target = {"model": subject.model}, {"steps": config.robustness.steps}
@@ -154,7 +154,7 @@ def run(
 
 
 def refuse(config: RobustnessConfig) -> None:
-    """Raise ConfigError for an invalid question."""
+    """Raise ConfigError for an invalid `robustness` block."""
     block = config.robustness
     if block.model in (CONTACT, "both") and config.contact is None:
         raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or ask for rigid.")
@@ -204,7 +204,7 @@ def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
 
 
 def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """Return the searches for the largest drop and push of either sign."""
+    """Return work units that search for the largest floor drop and hip push, each in both directions."""
     for disturbance in DISTURBANCES:
         for sign in (1.0, -1.0):
             run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
@@ -212,7 +212,7 @@ def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUn
 
 
 def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """Find the largest disturbance of a sign; after a push also the ground reactions, as `GIVEN` names them."""
+    """Return the largest disturbance of one sign that the gait survives, and the rigid model's reactions to a push."""
     size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
     if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
         return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
@@ -220,7 +220,7 @@ def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int
 
 
 def rough(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """Iterate over batches of walks on rough ground."""
+    """Return work units, each a batch of walks on rough ground."""
     block, most = config.robustness, cap(subject.model, config)
     for roughness in block.roughness_m:
         for first in range(0, block.walks, WALKS_AT_ONCE):
@@ -235,7 +235,7 @@ def cap(model: str, config: RobustnessConfig) -> int:
 
 
 def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
-    """Count steps of some walks; each has its own ground, independent of the process."""
+    """Count the steps of some walks; each has its own ground, which is the same in every process."""
     gait = subject.at(exact=False)
     return [float(steps_on_rough_ground(gait, roughness, (seed, walk), most)) for walk in walks]
 
@@ -265,7 +265,7 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
 
 
 def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
-    """Summarise the step counts (roughness, walk) on each rough ground."""
+    """Summarise the step counts (roughness, walk) for each roughness of the ground."""
     most, rows = cap(model, config), []
     for roughness, counts in zip(config.robustness.roughness_m, steps, strict=True):
         seen = asdict(rough_walks(counts, most))
@@ -277,7 +277,7 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
 def sensitivities(
     subject: ModelUnderTest, requested: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
 ) -> Rows:
-    """Return rows of derivatives by decreasing relative effect; parameters that are 0 come last."""
+    """Return rows of derivatives in order of decreasing relative effect; parameters of value 0 come last."""
     keys = numbers_read(subject, requested)
     label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
     results = in_order([partial(gradients_of, subject, key) for key in keys], jobs)
@@ -300,14 +300,14 @@ def sensitivities(
 
 
 def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
-    """Return derivatives by one key; a passive walker's cost of transport is the sine of the slope."""
+    """Return derivatives by one key, except that of a passive walker's cost of transport (the sine of the slope)."""
     omitted = () if drives_of(subject.config) else ("cost_of_transport",)
     names = [name for name in GAIT_QUANTITIES if name not in omitted]
     return subject.gradients(parameter_of(key, subject.config), names)
 
 
 def numbers_read(subject: ModelUnderTest, requested: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the requested parameters, or all, that the model reads, by dotted key."""
+    """Return the dotted keys of the parameters that the model reads, either the requested ones or all."""
     own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
     in_degrees = slope_in_degrees(subject.config.slope_rad) is not None
     written = {SLOPE_RAD: SLOPE_DEG} if in_degrees else {}

@@ -1,7 +1,7 @@
 """Common parts of stages that walk: the start, stored groups, the summary and the numerical error.
 
-Both models store a walk under the same names, in the same shapes, with the same meanings; quantities
-that a model lacks are absent. Long walks are thinned: all samples of the beginning and end, fewer of the steps between.
+Both models store a walk under the same names, in the same shapes, with the same meanings; quantities that a model
+lacks are absent. Long walks are thinned: all samples of the first and last steps are stored, fewer of the others.
 """
 
 import math
@@ -28,9 +28,9 @@ from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.footholds import UNEVEN
 
 FIRST_STEPS, LAST_STEPS = 200, 20
-"""Number of steps up to which every sample is stored."""
+"""Numbers of steps at the beginning and end of a walk of which every sample is stored."""
 MAX_BETWEEN = 50_000
-"""Maximum number of samples of the other steps, besides both sides of every heel strike."""
+"""Maximum number of samples of the steps between, in addition to both sides of every heel strike."""
 STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
 OF_STEPS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
@@ -44,7 +44,8 @@ OF_STEPS: Final = {
     "state_before": Label("rad, rad/s", "state just before that touch", (COORDINATE,)),
     "state_after": Label("rad, rad/s", "state just after it, roles changed", (COORDINATE,)),
 }
-WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")  # a knee may not lock, nor the last stance foot lift
+# a knee may not lock, and the last stance foot may not lift
+WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
 OVER_TIME: Final = {
     "time": Label("s", "time"),
     "step": Label("1", "step number"),
@@ -75,13 +76,13 @@ OUTCOMES: Final = ", ".join(f"{outcome.value} {outcome.label}" for outcome in Ou
 
 
 def count_outcomes(outcomes: NDArray[np.int64]) -> dict[str, int]:
-    """Count a map's walks by outcome."""
+    """Count the walks of a map by outcome."""
     numbers, counts = np.unique(outcomes, return_counts=True)
     return {Outcome(int(number)).label: int(count) for number, count in zip(numbers, counts, strict=True)}
 
 
 def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Content]) -> tuple[float, State]:
-    """Return the reference step length (m) and the rigid start state of the config or the gait."""
+    """Return the reference step length (m) and the rigid start state, from the config or the gait."""
     if "fixedpoint" in inputs:
         gait = inputs["fixedpoint"].summary
         state = gait["state"] if config.start == "fixed-point" else config.start
@@ -104,9 +105,9 @@ def content_of_walk(
     """Walk, store samples (thinned for long walks), and repeat the walk for the numerical error.
 
     walk     simulates with tolerances, optionally sampled, and returns a `WalkRecord` with `samples`
-    groups   returns the datasets of a walk
-    summary  returns its summary
-    again    whether to repeat the walk, which takes two to three times as long
+    groups   returns the groups of a walk to store
+    summary  returns the summary of a walk
+    again    whether to repeat the walk, which takes two to three times as long as the walk itself
 
     Raises NoAnswer with partial results if the integrator fails.
     """
@@ -123,7 +124,7 @@ def content_of_walk(
 
 
 def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
-    """Return the samples to store: all of an ordinary walk.
+    """Return the samples to store: all samples of an ordinary walk, fewer of a long one.
 
     samples  a NamedTuple of arrays whose first axis is time, `time_s` among them
     ends     (steps,) s, times at which steps ended
@@ -149,12 +150,12 @@ def only_at(samples: Any, mask: NDArray[Any]) -> Any:
 
 
 def over_time(**values: ArrayLike) -> dict[str, Variable]:
-    """Build variables over time, named as in `OVER_TIME`, from values (samples,) or (samples, 2) by leg."""
+    """Build variables over time from values (samples,), or (samples, 2) by leg; their names are keys of `OVER_TIME`."""
     return {name: labelled(column, OVER_TIME[name], *(TIME, LEG)[: np.ndim(column)]) for name, column in values.items()}
 
 
 def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
-    """Build angle and velocity of a torso (samples,) or of shanks (samples, 2)."""
+    """Build angle and velocity of a torso (samples,) or of the shanks (samples, 2)."""
     labels = Label("rad", f"angle of the {name} from the vertical"), Label("rad/s", f"angular velocity of the {name}")
     dims = (TIME, LEG)[: np.ndim(angle)]
     return {
@@ -164,12 +165,12 @@ def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Varia
 
 
 def legs() -> dict[str, Variable]:
-    """Build the coordinate of the legs, numbered 1 and 2 whatever their role."""
+    """Build the coordinate of the legs, which are numbered 1 and 2 in any role."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `OF_STEPS`; None, NaN and missing values of the last steps are gaps."""
+    """Build variables over steps, named as in `OF_STEPS`; NaN and missing values of the last steps become gaps."""
     count = np.size(touch_time_s)
     if count == 0:
         return {}
@@ -183,7 +184,7 @@ def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[st
 
 
 def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build columns of a walk's steps: those common to both models, and additional ones."""
+    """Build the columns of a walk's steps: those common to both models, and those in `values`."""
     common = {
         "period_s": walk.periods_s,
         "length_m": walk.lengths_m,
@@ -195,7 +196,7 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
 
 
 def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
-    """Return mean speed (m/s) from first foothold to last touch, and its Froude number; empty without a step."""
+    """Return the mean speed (m/s) up to the last touch, and its Froude number; empty if no step was completed."""
     if not walk.steps:
         return {}
     speed = float(walk.touch_along_m[-1] / walk.touch_time_s[-1])
@@ -212,7 +213,7 @@ def driven_by(walk: WalkRecord) -> dict[str, Any]:
 
 
 def numbers_of(walk: WalkRecord) -> dict[str, Any]:
-    """Summarise a walk of either model; knee quantities only for walkers with knees."""
+    """Summarise a walk of either model; knee strikes only for walkers with knees."""
     strikes = walk.knee_strike_time_s
     knee_strikes = (
         {} if strikes is None else {"knee_strike_times_s": [None if np.isnan(t) else t for t in strikes.tolist()]}
@@ -234,7 +235,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Return period (s), length (m) and knee strike time (s) of a walk's last step; None without a step."""
+    """Return period (s), length (m) and knee strike time (s) of a walk's last step; None for what did not happen."""
     periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
     step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
     if not strikes:

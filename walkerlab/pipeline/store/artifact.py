@@ -21,8 +21,8 @@ NOT_THERE = "not there yet"
 LIMIT_BYTES = 1 << 30
 """Maximum size of an artifact; larger files are not read."""
 
-# Appended after the HDF5 data: damaged files must be detected before the HDF5 library reads them, since it frees memory
-# twice on some.
+# The seal follows the HDF5 data. It reveals damaged files before the HDF5 library reads them, because some of them make
+# the library free memory twice.
 SEAL = re.compile(rb"\nwalkerlab sha256 ([0-9a-f]{64})\n")
 SEAL_BYTES = 83
 
@@ -32,15 +32,15 @@ NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
     "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
-"""Attributes of every artifact's root; a content with arrays at the root may add some."""
+"""Attributes at the root of every artifact; a content with arrays at the root may add others."""
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
-    """A file is not a trustworthy artifact; the message says why."""
+    """Error for a file that is not a trustworthy artifact; the message gives the reason."""
 
 
 class OtherLayout(Damaged):
-    """A file is an artifact of another version of this program; needs no warning."""
+    """Error for an artifact of another version of this program; it needs no warning."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,18 +54,18 @@ class Stored(Content):
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a file is the artifact of a key."""
+    """Verdict on whether a file is the artifact of a key."""
 
     accepted: bool
-    reason: str  # for rejecting it; empty if accepted
-    artifact: Stored | None = None  # as read, also if it has another key; None if missing or damaged
+    reason: str  # reason for rejecting it; empty if accepted
+    artifact: Stored | None = None  # the artifact as read, even if its key differs; None if missing or damaged
     damaged: bool = False  # whether the file exists but cannot be trusted
 
 
 def write(path: Path, content: Content, identity: Identity, provenance: Provenance) -> Stored:
     """Store a result at `path`, atomically replacing the old one.
 
-    Raises StorageError if the system refuses; the old file is then intact.
+    Raises StorageError if that fails; the old file is then intact.
     """
     root = root_attributes(content, identity, provenance, content.complete, content.digest())
     own = content.groups[""].attrs if "" in content.groups else {}
@@ -80,21 +80,21 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
 
 @dataclass(frozen=True)
 class InTurn:
-    """A content with one group whose variables are made one by one, to save memory."""
+    """Content with one group whose variables are built one by one, to save memory."""
 
     summary: Mapping[str, Any]
     attrs: Mapping[str, Attribute]
     coordinates: Mapping[str, Variable]  # variables that are coordinates of dimensions
-    variables: Iterable[tuple[str, Variable]]  # all of them, ordered by name
-    size: int  # approximate total, bytes
+    variables: Iterable[tuple[str, Variable]]  # all variables, ordered by name
+    size: int  # approximate size of all variables, bytes
 
 
 def write_in_turn(
     path: Path, content: InTurn, identity: Identity, provenance: Provenance, complete: bool = True
 ) -> None:
-    """Store as `write`, but one variable at a time.
+    """Store a content as `write` does, but one variable at a time.
 
-    Raises StorageError if the system refuses; the old file is then intact.
+    Raises StorageError if that fails; the old file is then intact.
     """
     labelled = Content({}, content.summary)
     digest = Digest(labelled.summary, labelled.timed)
@@ -123,7 +123,7 @@ def write_in_turn(
 def read(path: Path) -> Stored:
     """Read and verify the artifact at `path`.
 
-    Raises FileNotFoundError if it does not exist, and Damaged if it is truncated, altered or hostile.
+    Raises FileNotFoundError if it does not exist, and Damaged if it is truncated, altered or malicious.
     """
     try:
         data = read_bounded(path, LIMIT_BYTES)
@@ -140,7 +140,7 @@ def read(path: Path) -> Stored:
     except OSError as error:
         raise Damaged(f"it cannot be read: {error.strerror or error}") from error
     except Exception as error:
-        # any error of a library on untrusted bytes means that the file is damaged
+        # any error that a library raises on untrusted bytes means that the file is damaged
         raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
 
 
@@ -178,7 +178,7 @@ def root_attributes(
 
 
 def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
-    """Build an artifact from a file's parts; raises Damaged if digest or key do not match."""
+    """Build an artifact from a file's parts; raises Damaged if its digest or key does not match."""
     if root.get("schema_version") != SCHEMA_VERSION:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}

@@ -16,17 +16,17 @@ Numbers = list[float]
 
 
 class Checkpoint:
-    """Numbers of the completed units of one result, by name."""
+    """Numbers that the completed work units of one result computed, by name of the unit."""
 
     def __init__(self, path: Path | None, key: str) -> None:
         """Resume from the journal at `path` if its key matches; otherwise start over with the first unit.
 
-        path  of the journal; None keeps numbers in memory alone
+        path  path of the journal; None to keep the numbers only in memory
         """
         self.path, self.key = path, key
         self.kept: dict[str, Numbers] = {}
-        self._intact = 0  # valid bytes of the file
-        with contextlib.suppress(OSError, ValueError, TypeError):  # an incomplete last line
+        self._intact = 0  # number of valid bytes in the file
+        with contextlib.suppress(OSError, ValueError, TypeError):  # the last line may be incomplete
             lines = [] if path is None else path.read_bytes().splitlines(keepends=True)
             for text in lines if lines[:1] == [line([key])] else []:
                 entry = json.loads(text.partition(b" ")[2])
@@ -38,7 +38,7 @@ class Checkpoint:
                 self._intact += len(text)
 
     def keep(self, name: str, numbers: Numbers) -> None:
-        """Add the numbers of a unit; raises StorageError if the system refuses."""
+        """Add the numbers of a unit; raises StorageError if they cannot be stored."""
         self.kept[name] = numbers
         if self.path is None:
             return
@@ -53,7 +53,7 @@ class Checkpoint:
             self._intact = file.tell()
 
     def forget(self) -> None:
-        """Remove all units; raises StorageError if the system refuses."""
+        """Remove all units; raises StorageError if the journal cannot be removed."""
         self.kept, self._intact = {}, 0
         if self.path is not None:
             with storing(self.path):

@@ -10,7 +10,7 @@ from walkerlab.pipeline.store.index import indexed_files
 from walkerlab.pipeline.store.runfolder import LOCK, RECORD, RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
-"""Files that drawing stages write, in case their index is lost."""
+"""Patterns of the files that drawing stages write, needed if their index is lost."""
 CHUNKS, FIGURES = "sweep-chunks", "figures"
 SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
 STATE_ENDINGS = (".h5", ".parts")
@@ -18,7 +18,7 @@ COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
-    """Return existing files: artifacts of these stages, files that they list, and leftovers of killed writers."""
+    """Return existing files: artifacts of these stages, files listed in them, and leftovers of killed writers."""
     files = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
     inside = folder.path.resolve()
     for stage in stages:
@@ -30,7 +30,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
-    """Return the run whose result, listed file or record a file is; None for the user's own files."""
+    """Return the run that a file belongs to, as a result, listed file or record; None for the user's own files."""
     resolved = path.resolve()
     for place in (resolved.parent, resolved.parent.parent):
         folder = RunFolder.at(place)
@@ -45,7 +45,7 @@ def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
 def remove(folder: RunFolder, files: Iterable[Path]) -> None:
     """Remove files of a run folder, its record and its empty subfolders; call it under the lock.
 
-    Raises StorageError if the system refuses.
+    Raises StorageError if a file cannot be removed.
     """
     for path in (*files, folder.path / RECORD):
         with storing(path):

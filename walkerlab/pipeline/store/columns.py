@@ -1,4 +1,4 @@
-"""Rows of results as labelled arrays: names, units and meanings come from the labels of their fields."""
+"""Labelled arrays from rows of results; names, units and meanings come from the labels of their fields."""
 
 from collections.abc import Mapping, Sequence
 from operator import getitem
@@ -17,13 +17,13 @@ def labelled(values: ArrayLike, label: Label, *dims: str, gaps: bool = False) ->
 
 
 def columns(rows: Sequence[Any], labels: Mapping[str, Label], dim: str) -> dict[str, Variable]:
-    """Build a variable for each label from the field, property or key of that name in the rows."""
+    """Build one variable per label, from the attribute or key of the same name in each row."""
     of: Any = getitem if rows and isinstance(rows[0], Mapping) else getattr
     return {label.name or name: column([of(row, name) for row in rows], label, dim) for name, label in labels.items()}
 
 
 def values_by_column(row: Any, labels: Mapping[str, Label]) -> dict[str, Any]:
-    """Return the labelled fields of one row by column name."""
+    """Return the labelled fields of one row, by column name."""
     return {label.name or name: getattr(row, name) for name, label in labels.items()}
 
 

@@ -8,14 +8,14 @@ import subprocess
 from pathlib import Path
 
 FILE = "commit.txt"
-"""Name at the root of a source distribution and in the metadata of an installed package."""
+"""Name of the file with the commit, at a source distribution's root and in an installed package's metadata."""
 IN_METADATA = f"extra_metadata/{FILE}"
 SHIPPED = ("walkerlab", "configs")
 """Parts of a checkout that an installed package contains."""
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """Return the commit of a source tree, '-dirty' appended if its package files changed; None if it is no checkout."""
+    """Return the commit of a source tree, with '-dirty' if its package files changed; None outside a git checkout."""
     # only the package's own repository: an environment may lie inside another checkout
     if not (root / ".git").exists():
         return None

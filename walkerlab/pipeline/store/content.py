@@ -16,26 +16,26 @@ from walkerlab.errors import NoAnswer
 Attribute = str | int | float | bool
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.+-]*")
-"""Names of groups, variables, dimensions and attributes that HDF5, netCDF and xarray accept unquoted."""
+"""Pattern of names that HDF5, netCDF and xarray accept unquoted for groups, variables, dimensions and attributes."""
 
 
 STORED_AS: dict[str, type] = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}
-"""Stored types by NumPy kind."""
+"""Type in which an array is stored, by NumPy kind."""
 TIMING = re.compile(r"(.*_)?wall_s", re.DOTALL)
-"""Keys of summaries that name measured run times."""
+"""Pattern of the summary keys that name measured run times."""
 
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """A labelled array. Raises ValueError or TypeError for what cannot be stored faithfully."""
+    """Labelled array; raises ValueError or TypeError for values that cannot be stored faithfully."""
 
     values: NDArray[Any]  # float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
-    # one name for each axis; a variable named like its only dimension is that dimension's coordinate
+    # name of each axis; a variable with the name of its only dimension is the coordinate of that dimension
     dims: tuple[str, ...]
     units: str  # 'rad', 'N', ...; '1' for a pure number, '' for text
-    long_name: str  # meaning, for axes and tables
-    timing: bool = False  # measured run times, or what shows them: stored, but no part of the content's digest
-    missing: bool = False  # NaN is allowed, and marks a gap
+    long_name: str  # meaning, as shown on axes and in tables
+    timing: bool = False  # whether the values depend on run times; they are stored, but the digest omits them
+    missing: bool = False  # whether NaN is allowed, as the mark of a gap
 
     def __post_init__(self) -> None:
         """Convert the values to one of the four stored types and check the labels."""
@@ -91,15 +91,15 @@ class Group:
 class Content:
     """Result of a stage.
 
-    Raises ValueError or TypeError for a summary that is not JSON or not finite, and for clashing names.
+    Raises ValueError or TypeError for a summary that is not JSON or holds non-finite numbers, and for clashing names.
     """
 
-    # by path, such as 'corrected/gaits', '' for the file's root; missing parent groups are added
+    # groups by path, such as 'corrected/gaits' ('' for the file's root); missing parent groups are added
     groups: Mapping[str, Group] = field(default_factory=dict)
-    # what `--json` prints of it: JSON, SI units; 'wall_s' and keys that end in '_wall_s' count as timings
+    # values that `--json` prints, in SI units; 'wall_s' and keys that end in '_wall_s' count as timings
     summary: Mapping[str, Any] = field(default_factory=dict)
-    timed: tuple[str, ...] = ()  # further top-level keys of the summary that follow from timings, such as 'best'
-    # False for the partial results of a stage that found no answer; `no_answer` of the summary says why
+    timed: tuple[str, ...] = ()  # further top-level keys of the summary that depend on timings, such as 'best'
+    # False for the partial results of a stage that found no answer; the summary's `no_answer` gives the reason
     complete: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -123,13 +123,13 @@ class Content:
 
     @property
     def no_answer(self) -> NoAnswer | None:
-        """The reason why there is no answer, with advice; None if there is one."""
+        """Reason why the stage has no answer, with advice; None if it has one."""
         why = self.summary.get("no_answer", {})
         return None if self.complete else NoAnswer(why.get("message", "no answer"), why.get("advice", ""))
 
     @property
     def findings(self) -> dict[str, Any]:
-        """The summary without the reason why there is no answer."""
+        """Summary without the `no_answer` entry."""
         return {key: value for key, value in self.summary.items() if self.complete or key != "no_answer"}
 
     def digest(self) -> str:
@@ -143,7 +143,7 @@ class Content:
 
 
 class Digest:
-    """Digest of a content that is added group by group and variable by variable, ordered by name."""
+    """Digest of a content; the content is added group by group and variable by variable, ordered by name."""
 
     def __init__(self, summary: Mapping[str, Any], timed: tuple[str, ...]) -> None:
         self._sha256 = hashlib.sha256()
@@ -203,7 +203,7 @@ def check_name(name: str) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to JSON types; raises ValueError for a number that is not finite, TypeError if impossible."""
+    """Convert a value to JSON types; raises ValueError for a non-finite number, TypeError for any other type."""
     if isinstance(value, float):
         if not math.isfinite(value):
             raise ValueError(f"not a finite number: {value}")

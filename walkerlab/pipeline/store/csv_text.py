@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 FORMULA = re.compile(r"[=+\-@\t\r]")
-"""How texts begin that spreadsheets compute."""
+"""First character of a text that a spreadsheet would evaluate."""
 NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
-    """Values as CSV under their heads; nothing where one is missing."""
+    """Format rows as CSV below a header; a missing value becomes an empty cell."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(map(csv_cell, heads))
@@ -21,7 +21,7 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
 
 
 def csv_cell(value: Any) -> Any:
-    """A value of a CSV file; a text that a spreadsheet would compute as a formula begins with an apostrophe."""
+    """Convert a value to a CSV cell; text that a spreadsheet would evaluate gets a leading apostrophe."""
     if isinstance(value, str) and FORMULA.match(value) and not NUMERAL.fullmatch(value):
         return f"'{value}"
     return "" if value is None else value

@@ -1,4 +1,4 @@
-"""Reuse of results from other run folders, which are identified by their stage key."""
+"""Reuse of results with the same stage key from other run folders."""
 
 import mmap
 import os
@@ -12,7 +12,7 @@ from walkerlab.pipeline.store.runfolder import RunFolder
 
 
 def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """Find the file and result for a key in another run folder; None without one. Damaged files are ignored."""
+    """Find the file and result for a key in another run folder; None if there is none. Damaged files are ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
@@ -26,18 +26,18 @@ def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Store
 
 
 def mentions(path: Path, key: str) -> bool:
-    """Whether a file contains a key; a cheap test before a file is read and verified."""
+    """Whether a file contains a key; a cheap test before the file is read and verified."""
     try:
         with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             return data.find(key.encode()) >= 0
-    except (OSError, ValueError):  # not there, no file, or empty
+    except (OSError, ValueError):  # the file is missing, not a regular file, or empty
         return False
 
 
 def take_over(origin: Path, target: Path) -> None:
     """Link or copy a result's file to `target`.
 
-    Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if the system refuses.
+    Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if both fail.
     """
     with replacing(target) as temporary:
         try:

@@ -12,7 +12,7 @@ from pathlib import Path
 from walkerlab.errors import StorageError
 
 TEMPORARY = ".*.tmp"
-"""Pattern of temporary files; those found under the run folder's lock have no owner any more."""
+"""Pattern of temporary files; a process that holds the run folder's lock may remove all that it finds."""
 
 ADVICE = {
     errno.ENOSPC: "Free some space, or choose another folder with --runs.",
@@ -32,7 +32,7 @@ ADVICE = {
 
 @contextlib.contextmanager
 def storing(path: Path) -> Iterator[None]:
-    """Turn an OSError while `path` is stored into StorageError."""
+    """Convert an OSError that is raised while `path` is stored to StorageError."""
     try:
         yield
     except OSError as error:
@@ -41,7 +41,7 @@ def storing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def drawing_into(folder: Path) -> Iterator[None]:
-    """Turn storage errors of the system into StorageError; other errors of the code inside pass."""
+    """Convert errors of storing files in `folder` to StorageError; other errors of the `with` block pass."""
     try:
         yield
     except OSError as error:
@@ -58,9 +58,9 @@ def refused(path: Path, error: OSError) -> StorageError:
 def write_atomically(path: Path, *parts: bytes) -> None:
     """Write a file completely, or leave the old one untouched.
 
-    parts  of the content, in order
+    parts  pieces of the content, in order
 
-    Raises StorageError if the system refuses (full disk, read-only folder, ...).
+    Raises StorageError if the file cannot be written (full disk, read-only folder, ...).
     """
     with replacing(path) as temporary, temporary.open("xb") as file:
         file.writelines(parts)
@@ -74,7 +74,7 @@ def as_text(name: str) -> str:
 def write_through(path: Path, data: bytes) -> None:
     """Write to a file that a user names: a regular file atomically, a device or pipe directly.
 
-    Links are followed, never replaced. Raises StorageError if the system refuses.
+    Links are followed, never replaced. Raises StorageError if the file cannot be written.
     """
     with storing(path):
         special = path.exists() and not stat.S_ISREG(path.stat().st_mode)
@@ -86,9 +86,9 @@ def write_through(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary file that replaces `path` afterwards; on failure `path` is unchanged.
+    """Give a `with` block a temporary file that replaces `path` at its end; after a failure `path` is unchanged.
 
-    Raises StorageError if the system refuses.
+    Raises StorageError if the file cannot be written.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     with storing(path):
@@ -100,10 +100,10 @@ def replacing(path: Path) -> Iterator[Path]:
                 os.fsync(file.fileno())
             temporary.replace(path)
         finally:
-            # it remains after a failure, or if it was a hard link to `path` itself
+            # the temporary file remains after a failure, or if it was a hard link to `path` itself
             with contextlib.suppress(OSError):
                 temporary.unlink()
-        if hasattr(os, "O_DIRECTORY"):  # elsewhere the system has no call for a folder's entries
+        if hasattr(os, "O_DIRECTORY"):  # other systems cannot flush a folder's entries
             descriptor = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
             try:
                 os.fsync(descriptor)
@@ -112,7 +112,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
-    """Raise OSError if the disk has no room for a new file of `size` bytes; leaves no file."""
+    """Raise OSError if the disk has no room for a new file of `size` bytes; the trial file is removed."""
     with path.open("xb") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -122,7 +122,7 @@ def refuse_full_disk(path: Path, size: int) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder and its parents; raises StorageError if the system refuses."""
+    """Create a folder and its parents; raises StorageError if that fails."""
     with storing(path):
         path.mkdir(parents=True, exist_ok=True)
 
@@ -136,7 +136,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        # reading allocates the memory at once, so pass the actual size
+        # `read` allocates the memory at once, so pass the actual size
         return file.read(status.st_size)
 
 

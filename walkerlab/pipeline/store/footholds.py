@@ -1,4 +1,4 @@
-"""The uneven ground of a stored walk, as it is drawn."""
+"""Uneven ground of a stored walk, for drawings."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,16 +7,16 @@ from walkerlab.pipeline.store.content import Group
 
 Array = NDArray[np.float64]
 
-UNEVEN = "foothold_height_m"  # stored of each step where the ground is uneven
-FAR = 1e6  # m, before everything that is drawn
+UNEVEN = "foothold_height_m"  # variable that is stored for each step on uneven ground
+FAR = 1e6  # m; the first level begins this far behind the first foothold, outside any drawing
 
 
 def ground_levels(steps: Group) -> tuple[Array, Array] | None:
     """Return where each level of a walk's ground begins along the slope, midway between footholds, and its height (m).
 
-    steps  as both models store them
+    steps  stored group of the walk's steps
 
-    None on even ground.
+    Returns None on even ground.
     """
     if UNEVEN not in steps.variables:
         return None

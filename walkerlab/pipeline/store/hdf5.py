@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from walkerlab.pipeline.store.content import Attribute, Group, Variable
 
-# What netCDF readers take for a dimension without a coordinate; the number is its length, by their convention.
+# Text by which netCDF readers recognise a dimension without a coordinate; the length follows it.
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 CONVENTIONS = "CF-1.11"
 """Metadata conventions of the files, for netCDF readers."""
@@ -19,12 +19,12 @@ TEXT = h5py.string_dtype()
 MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64
 LEAST_BYTES = 32
-"""Minimum size of a group's member in a file; bounds their number, circular links included."""
+"""Minimum size of a group's member in a file; it limits the number of members, even with circular links."""
 
 
 def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
-    """Build an HDF5 file in memory, so that a full disk fails an ordinary write and not the HDF5 library."""
-    # No file of that name is touched: the memory driver has no backing store.
+    """Build an HDF5 file in memory, so that only an ordinary write, not the HDF5 library, can fail on a full disk."""
+    # No file named "image" is created: the memory driver has no backing store.
     with h5py.File("image", "w", driver="core", backing_store=False) as file:
         file.attrs.update(root)
         for path, group in sorted(content.items()):
@@ -38,9 +38,9 @@ def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
 def write_in_turn(
     path: Path, variables: Iterable[tuple[str, Variable]], root: Callable[[], Mapping[str, Attribute]]
 ) -> None:
-    """Write a file whose variables at the root come one by one, coordinates first, and after them its attributes.
+    """Write the variables at a file's root one by one, coordinates first, and then the attributes of the root.
 
-    Raises OSError if the system refuses.
+    Raises OSError if that fails.
     """
     with h5py.File(path, "w") as file:
         write_variables(file, variables)
@@ -59,7 +59,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
     """Variables at the root of a file, by name."""
 
     def __init__(self, file: Path) -> None:
-        """Read the names and positions."""
+        """Read the names and addresses of the datasets at the root."""
         self.file = file
         with h5py.File(file) as opened:
             members = dict(opened)
@@ -86,7 +86,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
 
 
 def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> None:
-    """Write variables one by one, coordinates first; a dimension without one is stored as a bare length."""
+    """Write variables one by one, coordinates first; a dimension without a coordinate is stored as a bare length."""
     for name, variable in variables:
         dataset = write_variable(target, name, variable)
         if variable.dims == (name,):
@@ -101,7 +101,7 @@ def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> N
 def write_variable(target: Any, name: str, variable: Variable) -> Any:
     """Write one array with its labels."""
     kind = variable.values.dtype.kind
-    # booleans as bytes, marked as xarray does: netCDF has no such type
+    # booleans are stored as bytes and marked as xarray marks them, since netCDF has no boolean type
     dtype = {"O": TEXT, "f": "<f8", "i": "<i8", "b": "i1"}[kind]
     dataset = target.create_dataset(name, data=variable.values, dtype=dtype)
     marks = {mark: 1 for mark in ("timing", "missing") if getattr(variable, mark)}
@@ -113,22 +113,22 @@ def write_variable(target: Any, name: str, variable: Variable) -> Any:
 def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
     """Parse the groups, by path, and the root attributes of an untrusted HDF5 file.
 
-    Nothing is read that declares more than the file can hold. Raises ValueError for content that `image` cannot write,
-    and the HDF5 library's own errors.
+    Data that declare more than the file can hold are not read. Raises ValueError for them and for content that `image`
+    cannot write, and the HDF5 library's own errors.
     """
     with h5py.File(h5py.h5f.open_file_image(data)) as file:
         return dict(walk_groups(file, "", Budget(len(data)))), read_attributes(file)
 
 
 class Budget:
-    """Remaining bytes that a file of a given size can declare."""
+    """Bytes that the contents of a file may still declare, given its size."""
 
     def __init__(self, size: int) -> None:
         """Start with the size of the file, in bytes."""
         self.left = size
 
     def spend(self, size: int) -> None:
-        """Raise ValueError if more is declared than the file holds."""
+        """Subtract declared bytes; raises ValueError if the contents declare more than the file holds."""
         self.left -= size
         if self.left < 0:
             raise ValueError("it declares more data than the file holds")
@@ -162,12 +162,12 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Map addresses to names; looking up the name of a referenced scale would search the whole file."""
+    """Map addresses to names, since HDF5 would search the whole file for the name of a referenced scale."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
 def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
-    """Read one array with its labels; `names` of the group's members by address."""
+    """Read one array with its labels; `names` maps the addresses of the group's members to their names."""
     values = read_values(name, dataset, budget)
     if read_text(dataset, "dtype", "") == "bool":
         values = values.astype(np.bool_)
@@ -205,7 +205,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
     values = np.empty(dataset.shape, dtype=object)
-    # along the last dimension, of which a sweep of one parameter has all its points
+    # read in slices of the last dimension, which holds all points of a sweep over one parameter
     for row in np.ndindex(dataset.shape[:-1]):
         for start in range(0, dataset.shape[-1], STRINGS_AT_ONCE):
             part = (*row, slice(start, start + STRINGS_AT_ONCE))

@@ -13,7 +13,7 @@ GROUP = "files"
 
 
 def index(folder: Path, files: Iterable[Path]) -> Group:
-    """Build the group that lists files below a run folder, to be stored at `GROUP`.
+    """Build the group that lists files below a run folder, for storage under the name `GROUP`.
 
     Raises ValueError for a file outside the folder and FileNotFoundError for a missing one.
     """
@@ -30,7 +30,7 @@ def index(folder: Path, files: Iterable[Path]) -> Group:
 
 
 def indexed_files(content: Content) -> dict[str, str]:
-    """Return the digest of each listed file by its path in the run folder; empty without a list."""
+    """Return the digest of each listed file, by path in the run folder; empty if the content has no list."""
     group = content.groups.get(GROUP)
     return dict(zip(group["file"].tolist(), group["sha256"].tolist(), strict=True)) if group is not None else {}
 

@@ -1,4 +1,4 @@
-"""Identity and key of a result: config slice, inputs and code."""
+"""Identity and key of a result, from its config slice, inputs and code."""
 
 import hashlib
 import re
@@ -9,7 +9,7 @@ from typing import Any, Final
 from walkerlab.config.canonical import canonical_json
 
 SCHEMA_VERSION = 2
-"""Version of the artifacts' layout; raise it when older files must not be read any more."""
+"""Version of the artifacts' layout; raise it when older files must no longer be read."""
 DIGEST: Final = re.compile("[0-9a-f]{64}")
 
 
@@ -17,21 +17,21 @@ DIGEST: Final = re.compile("[0-9a-f]{64}")
 class Identity:
     """Everything that determines a stage's result."""
 
-    stage: str  # name
+    stage: str  # name of the stage
     config_slice: Mapping[str, Any]  # keys of the config that the stage reads, with their values
     input_keys: Mapping[str, str]  # stage keys of its inputs, by stage
-    code_digest: str  # see `sources`
-    schema_version: int = SCHEMA_VERSION  # of the artifact's layout
+    code_digest: str  # digest of the stage's code, see `walkerlab.code_digest`
+    schema_version: int = SCHEMA_VERSION  # version of the artifact's layout
 
     @property
     def key(self) -> str:
-        """Stage key: sha256 of all fields except the name, independent of the order of keys."""
+        """Stage key: sha256 of all fields except the name; the order of keys does not matter."""
         parts = [self.schema_version, dict(self.config_slice), dict(self.input_keys), self.code_digest]
         return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 def changed_parts(old: Identity, new: Identity) -> list[str]:
-    """Describe the differences of two identities; empty if their keys are equal."""
+    """Describe the differences between two identities; empty if their keys are equal."""
     changes = list(differences("", old.config_slice, new.config_slice))
     for name in sorted({*old.input_keys, *new.input_keys}):
         if old.input_keys.get(name) != new.input_keys.get(name):
@@ -45,7 +45,7 @@ def changed_parts(old: Identity, new: Identity) -> list[str]:
 
 
 def differences(where: str, old: Any, new: Any) -> Iterator[str]:
-    """Iterate over differing leaves of two config slices, e.g. 'walker.leg_mass_kg 5.0 -> 6.0'."""
+    """Iterate over the differing values of two config slices, as text such as 'walker.leg_mass_kg 5.0 -> 6.0'."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for name in sorted({*old, *new}):
             yield from differences(f"{where}.{name}" if where else name, old.get(name), new.get(name))

@@ -18,23 +18,23 @@ from walkerlab.pipeline.store.commit import commit_of_package
 from walkerlab.pipeline.store.files import as_text
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "h5py", "pydantic", "ruamel.yaml", "matplotlib", "jinja2")
-"""Libraries that numbers and figures may depend on."""
+"""Libraries that results and figures may depend on."""
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Origin of a result: who computed it, from what, when, and with which versions."""
+    """Origin of a result: config, command, time, machine and versions."""
 
     config: str  # the resolved config, as YAML text
-    command_line: str  # as typed
-    seed: int  # of everything random
+    command_line: str  # command as typed
+    seed: int  # seed of all random numbers
     # started_utc, ended_utc: ISO 8601
     started_utc: str
     ended_utc: str
     platform: str  # operating system, processor, Python
     package_version: str
     library_versions: Mapping[str, str]
-    # of the source tree that the package runs from or was built from, '-dirty' if it was changed, if known
+    # commit of the source tree that the package runs from or was built from, '-dirty' if changed; None if unknown
     git_commit: str | None = None
     input_digests: Mapping[str, str] = field(default_factory=dict)  # digest of each input's content, by stage
 

@@ -15,31 +15,31 @@ from walkerlab.pipeline.store.files import make_folder, read_bounded, remove_lef
 
 RECORD, LOCK = ".run.json", ".lock"
 RECORD_BYTES = 1 << 20
-"""Maximum size of a record."""
+"""Maximum size of a run record."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """Record of the config of a run folder's results; results reused from another run name that run."""
+    """Record of the run whose results a folder holds; results taken over from another run name that run instead."""
 
-    run: str  # the folder's name when it was written
+    run: str  # name of the folder when the record was written
     source: str  # origin of the config, as in `RunFolder`
     config: str  # resolved config of the results, as YAML text
-    changes: tuple[str, ...] = ()  # as in `RunFolder`
+    changes: tuple[str, ...] = ()  # changes of the config, as in `RunFolder`
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """runs/<name>/ of one run."""
+    """Folder runs/<name>/ of one run."""
 
     runs_dir: Path  # the folder of all runs
-    name: str  # of the run; path-safe
-    source: str = ""  # of its config: a path relative to `runs_dir`, or a built-in config; empty if unknown
+    name: str  # name of the run, safe as a folder name
+    source: str = ""  # origin of its config: a path relative to `runs_dir`, or a built-in config; empty if unknown
     changes: tuple[str, ...] = ()  # KEY=VALUE of each key in which the config differs from its source
 
     @classmethod
     def at(cls, path: Path) -> RunFolder:
-        """Return the run in a folder, with recorded source and changes."""
+        """Return the run in a folder, with its recorded source and changes."""
         folder = path if path.name not in ("", "..") else path.resolve()
         record = cls(folder.parent, folder.name).record()
         if record is None:
@@ -52,7 +52,7 @@ class RunFolder:
 
     @property
     def explicit_path(self) -> str:
-        """The folder as a path that cannot be mistaken for a name."""
+        """Path of the folder in a form that cannot be mistaken for a run's name."""
         text = str(self.path)
         return text if os.sep in text else f".{os.sep}{text}"
 
@@ -83,7 +83,7 @@ class RunFolder:
             return None
 
     def write_record(self, record: Record) -> None:
-        """Write the run record; raises StorageError if the system refuses."""
+        """Write the run record; raises StorageError if that fails."""
         write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
     @contextlib.contextmanager
@@ -92,12 +92,12 @@ class RunFolder:
 
         Creates the folder if needed and removes leftovers of killed writers.
 
-        wait  whether to wait for another process; `say` is then called with a message
+        wait  whether to wait for another process, after a call of `say` with a message
 
         Raises LockedError if another process holds the lock and `wait` is false, StorageError if the folder or
         the lock file cannot be created.
         """
-        # Imported here: a run that reuses everything takes no lock.
+        # Imported here: a run that reuses everything needs no lock.
         from filelock import FileLock, Timeout
 
         make_folder(self.path)
@@ -120,5 +120,5 @@ class RunFolder:
 
 
 def changes_in(name: str) -> tuple[str, ...]:
-    """Return the changes in a folder's name, for folders without a record."""
+    """Read the config changes (KEY=VALUE) from a folder's name, for folders without a record."""
     return tuple(filter(None, name.partition("@")[2].split(",")))

@@ -1,1 +1,1 @@
-"""One question over many configs: which points, computed where, and what became of each."""
+"""Sweeps of one stage over many configs: the points, the engines that compute them, and their results."""

@@ -1,4 +1,4 @@
-"""Points of a sweep: computed in any process and stored in chunks, files named by their content."""
+"""Points of a sweep, which any process can compute, and chunks: files that store several points."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Labels = Mapping[str, tuple[str, str]]
 FOLDER: Final = "sweep-chunks"
 NOT_OF_THE_POINT: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
-"""Number of memories that a process keeps."""
+"""Number of memories (see `memory_for`) that a process keeps."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -49,12 +49,12 @@ class PointResult:
     numbers: Annotated[str, Label("", "the stage's summary by name, as JSON and without run times")] = "{}"
     wall_s: Annotated[float, Label("s", "time it took", timing=True)] = 0.0
     bug: str = ""
-    """Traceback of a bug that stopped the computation; empty without one."""
+    """Traceback of a bug that stopped the computation; empty if there was none."""
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Rows of some points, with unit and meaning of quantities that the stage labels."""
+    """Results of some points, with units and meanings of the quantities that the stage labels."""
 
     rows: tuple[PointResult, ...]
     labels: Labels
@@ -62,18 +62,18 @@ class Chunk:
 
 @lru_cache(maxsize=MEMORIES)
 def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one memory for each forced sweep
-    """Return this process's memory of inputs, kept from chunk to chunk; arguments as in `compute_point`."""
+    """Return this process's memory of inputs, which is kept from chunk to chunk; arguments as in `compute_point`."""
     module, _, name = graph.partition(":")
     return MemoryResults(getattr(importlib.import_module(module), name))
 
 
 def compute_point(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> Chunk:
-    """Compute one point in this process; a failure becomes its result.
+    """Compute one point in this process; an error becomes its result.
 
-    key     of the result
+    key     stage key of the point's result
     graph   import path of the pipeline, module:NAME
-    again   whether its walk is repeated for the numerical error
-    forced  identifies a sweep that reuses no earlier result; empty for others
+    again   whether to repeat its walk for the numerical error
+    forced  identifies a sweep that reuses no earlier result; empty for other sweeps
     """
     memory = memory_for(graph, forced)
     stages = memory.keys.graph
@@ -103,7 +103,7 @@ def chunk_of(key: str, answer: Content) -> Chunk:
 
 
 def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Flatten a summary to numbers, texts and lists of numbers with dotted names, as `dissipated_J.friction`."""
+    """Flatten a summary to numbers, texts and lists of numbers with dotted names, such as `dissipated_J.friction`."""
     flat: dict[str, Any] = {}
 
     def take(name: str, value: Any) -> None:
@@ -140,7 +140,7 @@ def without_outputs(config: Config, target: str, graph: Graph) -> Config:
 
 
 def labels_in(content: Content) -> dict[str, tuple[str, str]]:
-    """Return unit and meaning of the summary's quantities that are also a variable in a group."""
+    """Return unit and meaning of each quantity of the summary that is also a variable in a group."""
     labels = {}
     for group in content.groups.values():
         for name in content.summary.keys() & group.variables.keys():
@@ -149,7 +149,7 @@ def labels_in(content: Content) -> dict[str, tuple[str, str]]:
 
 
 def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provenance: Provenance) -> None:
-    """Store a chunk without its failed points; raises StorageError if the system refuses."""
+    """Store a chunk without its failed points; raises StorageError if that fails."""
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
         return
@@ -166,10 +166,10 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
 def stored_chunks(
     runs_dir: Path, stage: str, code_digest: str, keys: Mapping[str, Any], warn: Callable[[str], None]
 ) -> Iterator[Chunk]:
-    """Iterate over the stored results of a stage under its present code, in all run folders.
+    """Iterate over a stage's stored results that the present code computed, in all run folders.
 
-    wanted  keys of single runs to include; chunks are included whole
-    warn    called for damaged chunks
+    keys  stage keys of the sweep; a single run's result is included if its key is among them, chunks always are
+    warn  called with a message about each damaged chunk
     """
     for path in sorted(runs_dir.glob(f"*/{FOLDER}/{stage}-{code_digest[:8]}-*.h5")):
         try:

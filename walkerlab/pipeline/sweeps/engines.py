@@ -1,4 +1,4 @@
-"""Engines that compute chunks: each makes a concurrent.futures executor."""
+"""Engines that compute chunks; each provides a concurrent.futures executor."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "M
 class Order:
     """Options of an engine."""
 
-    workers: int = 0  # processes; 0 for the engine's default
-    address: str = ""  # of a running scheduler; empty to start one
-    modules: tuple[str, ...] = ()  # that workers will need
-    folder: Path = Path()  # for the engine's files
-    options: Mapping[str, str] = field(default_factory=dict)  # specific to the engine, by name
+    workers: int = 0  # number of processes; 0 for the engine's default
+    address: str = ""  # address of a running scheduler; empty to start one
+    modules: tuple[str, ...] = ()  # modules that workers will need
+    folder: Path = Path()  # folder for the engine's files
+    options: Mapping[str, str] = field(default_factory=dict)  # options of this engine only, by name
 
 
 @dataclass(frozen=True)
@@ -37,19 +37,19 @@ class Pool:
     """A running executor."""
 
     executor: Executor
-    workers: int  # number of chunks that it computes at once
+    workers: int  # number of chunks that it computes at the same time
 
 
 @dataclass(frozen=True)
 class SweepEngine:
-    """An engine."""
+    """Engine that computes the chunks of a sweep."""
 
-    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]  # context that gives a pool and closes it
+    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]  # gives a pool and closes it
     chunk_s: float  # target duration of a chunk, s: long compared with the engine's overhead
 
     @contextlib.contextmanager
     def start_early(self, order: Order) -> Iterator[SweepEngine]:
-        """Return the engine for one sweep; local workers already import their modules while points are prepared."""
+        """Give the engine for one sweep; its local workers import their modules while the points are prepared."""
         if self.opened is not local:
             yield self
             return
@@ -70,7 +70,7 @@ def local(order: Order) -> Iterator[Pool]:
 
 @contextlib.contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Let processes started inside compute in one thread."""
+    """Let processes that start within the `with` block compute in one thread each."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
@@ -112,7 +112,7 @@ def dask(order: Order) -> Iterator[Pool]:
 
 @contextlib.contextmanager
 def slurm(order: Order) -> Iterator[Pool]:
-    """Submit a Slurm job for each chunk; `cluster=local` runs them on this machine, for trials."""
+    """Submit a Slurm job for each chunk; `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", order)
     options: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in order.options.items()}
@@ -136,12 +136,12 @@ def slurm(order: Order) -> Iterator[Pool]:
 
 
 class JobExecutor(Executor):
-    """Executor over a library's jobs; a thread waits for each."""
+    """Executor that starts jobs of a library; a thread waits for each job."""
 
     def __init__(self, start: Callable[..., Any]) -> None:
-        """Store how to start a job.
+        """Store the function that starts a job.
 
-        start  called with a function and its arguments, returns a job whose `result()` waits
+        start  called with a function and its arguments; returns a job whose `result()` waits
         """
         self._start = start
         self.jobs: set[Any] = set()
@@ -154,7 +154,7 @@ class JobExecutor(Executor):
         def wait() -> None:
             try:
                 result = job.result()
-            except BaseException as error:  # a cancelled job raises no Exception
+            except BaseException as error:  # a cancelled job may raise an error that is no Exception
                 future.set_exception(error)
             else:
                 future.set_result(result)
@@ -165,13 +165,13 @@ class JobExecutor(Executor):
 
 
 def refuse_address(name: str, order: Order) -> None:
-    """Raise ConfigError if an engine that takes no address got one."""
+    """Raise ConfigError if an address is given for an engine that takes none."""
     if order.address:
         raise ConfigError(f"--engine {name}={order.address}: {name} takes no address.", "Only dask does.")
 
 
 def extra(module: str, name: str) -> Any:
-    """Import a library of one of the package's extras; raises ConfigError if it is not installed."""
+    """Import a library that an extra of the package installs; raises ConfigError if it is not installed."""
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -192,7 +192,7 @@ def engine_named(text: str) -> tuple[SweepEngine, str]:
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
-    # the test that multiprocessing itself uses: a process that it starts runs the script first
+    # multiprocessing's own test for a process that it started; such a process first runs the calling script
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
             "--engine dask: the processes that Dask starts run the calling script, which would sweep once more.", GUARD

@@ -1,4 +1,4 @@
-"""The points of a sweep: a stage, parameters with their values, and how these are combined."""
+"""Points of a sweep: a stage, parameters with their values, and the way to combine them."""
 
 import math
 import re
@@ -33,10 +33,10 @@ SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter."""
+    """Parameter of a sweep, with its values."""
 
-    key: str  # dotted, as in a config
-    values: tuple[Value, ...]  # in order; for a list of points one for each point
+    key: str  # dotted config key
+    values: tuple[Value, ...]  # values in order; for a list of points, one per point
     source: str  # origin of the values, for messages
     ends: tuple[float, float] | None = None  # bounds of an interval to sample; None if the values are given
 
@@ -49,9 +49,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class SweptStage:
-    """A stage over values of parameters.
+    """Stage with the parameter values at which a sweep computes it.
 
-    names   of the parameters in results: the last part of the key, or more parts where two would be equal
+    names   names of the parameters in results: the last part of each key, or more parts if last parts coincide
     """
 
     stage: str
@@ -120,15 +120,15 @@ def build_sweep(
 ) -> SweptStage:
     """Build a sweep from command-line options or a `sweep` block.
 
-    over    for each parameter its key, its values (a list, or FROM:TO:N) and their origin
-    sample  e.g. latin-hypercube:500; empty for the values themselves
+    over    key of each parameter, its values (a list, or FROM:TO:N) and their origin
+    sample  such as latin-hypercube:500; empty to use the values themselves
 
     Raises ConfigError for invalid options.
     """
     axes: tuple[Axis, ...] = ()
     for key, values, source in over:
         axes = (*axes, axis(key, values, source))
-        if not (zip or sample):  # before the values of the next parameter are written out
+        if not (zip or sample):  # checked before the next parameter's values are created
             refuse_too_many("sweep", math.prod(max(1, len(parameter.values)) for parameter in axes))
     repeated = {
         parameter.key
@@ -150,13 +150,13 @@ def build_sweep(
 
 
 def refuse_too_many(what: str, count: int) -> None:
-    """Raise ConfigError for more than MAX_POINTS points, requested by `what`."""
+    """Raise ConfigError for more than MAX_POINTS points; `what` is the option or key that requests them."""
     if count > MAX_POINTS:
         raise problem_error(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
-    """Parse one `--over KEY=VALUES` into key, values and origin; raises ConfigError for another form."""
+    """Parse one `--over KEY=VALUES` into key, values and origin; raises ConfigError for any other form."""
     key, equals, values = text.partition("=")
     source = f"--over {text}"
     key = key.strip()
@@ -170,23 +170,23 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
 
 
 def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
-    """Build the error for an invalid parameter, option or key, which is its position."""
+    """Build the error for an invalid parameter, option or key; `source` names it instead of a position in a file."""
     return problem_error(Position(source, 0, 0), text, allowed, near)
 
 
 @cache
 def key_fields() -> dict[str, FieldInfo]:
-    """Return the fields of all keys of a config that hold a value, by dotted key."""
+    """Return the field of every config key that holds a value, by dotted key."""
     return {".".join(path): field for path, field in leaves(Config)} | dict(SlopeInDegrees.model_fields)
 
 
 def axis(key: str, values: Any, source: str) -> Axis:
-    """Build one parameter; raises ConfigError for an unknown key or invalid values."""
+    """Build the axis of one parameter; raises ConfigError for an unknown key or invalid values."""
     fields = key_fields()
     if key not in fields and not any(key.startswith(f"{known_key}.") for known_key in fields):
         if any(known_key.startswith(f"{key}.") for known_key in fields):
             raise bad(source, f"{key}: is a block of keys, not a value")
-        if not key.startswith("walker."):  # one of another type has keys of its own, which are checked point by point
+        if not key.startswith("walker."):  # walkers of other types have other keys, which are checked at each point
             raise bad(source, f"{key}: unknown key", near=nearest(key, fields))
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
@@ -210,7 +210,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
 
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
-    """Convert whole numbers to integers for an integer key; the schema rejects other numbers."""
+    """Convert whole numbers to integers for an integer key; the schema rejects all others."""
     field = key_fields().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
@@ -226,7 +226,7 @@ def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[floa
 
 
 def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
-    """Draw points from the intervals or lists of all parameters; raises ConfigError for an unknown sampler.
+    """Draw points from the intervals or lists of all parameters; raises ConfigError for an invalid sampler.
 
     sample  SAMPLER:N
     """
@@ -244,7 +244,7 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
         from scipy.stats import qmc
 
         if name == "sobol":
-            # drawn in full powers of two, where the sequence is balanced; fewer points are a prefix of more
+            # Sobol sequences are balanced at powers of two, so draw one in full and keep its first `count` points
             unit = qmc.Sobol(dimensions, seed=generator).random_base2(math.ceil(math.log2(count)))[:count]
         else:
             unit = qmc.LatinHypercube(dimensions, seed=generator).random(count)
@@ -262,10 +262,10 @@ def values_at(axis: Axis, column: Any) -> Iterator[Value]:
 
 
 def described(config: Config, key: str) -> tuple[str, str]:
-    """Return unit and meaning of a key; a unit that depends on the config is that of this config."""
+    """Return unit and meaning of a key; a unit that depends on the config is the one in this config."""
     *above, last = key.split(".")
     block = value_at(config, above)
-    # the config's own blocks, which may be of a type that the schema only allows
+    # the config may have a block of another type than the schema's default, with other keys
     field = key_fields().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:
         return "1", key
@@ -274,9 +274,9 @@ def described(config: Config, key: str) -> tuple[str, str]:
 
 
 def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
-    """Raise ConfigError, before anything is computed, for a quantity that the stage never has.
+    """Raise ConfigError for a quantity that the stage never has, before anything is computed.
 
-    names  by option, as typed
+    names  requested quantities, by option as typed
     """
     for option, name in names.items():
         if name not in question.names and not has_quantity(question.stage, name):

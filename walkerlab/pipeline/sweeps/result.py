@@ -28,30 +28,30 @@ OWN: Final = {
     "status": "answered, no-answer, or failed: not computed",
     "reason": "why there is no answer",
 }
-"""Columns of every point, besides the stage's quantities."""
+"""Columns that every point has in addition to the stage's quantities."""
 STATES: Final = ("state", "start_state", "final_state")
 TEXT_BYTES: Final = 6
-"""Size of a short text in a file relative to its size in memory."""
+"""Size of a short text in a file, relative to the size of its pointer in memory."""
 
 
 class SweepVariable:
-    """Column of a number, a list of numbers or a text for each of `size` results."""
+    """Column of sweep results: a number, a list of numbers or a text for each of `size` results."""
 
     def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
-        """Start empty; `shape` is that of one value."""
+        """Start with gaps only; `shape` is the shape of one value."""
         self.kinds: set[type] = set()
         self.text = text
         self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
 
     def put(self, places: Integers, values: Sequence[Any]) -> None:
-        """Store values of some results; the column grows for a value of a larger shape."""
+        """Store values at some places; the column grows to fit a value of a larger shape."""
         if self.text:
             # equal texts share one object
             self.values[places] = [sys.intern(value) for value in values]
             return
         try:
             array = np.array(values)
-        except ValueError:  # lists of different lengths
+        except ValueError:  # the lists have different lengths
             for k, value in enumerate(values):
                 self.put(places[k : k + 1], [value])
             return
@@ -85,8 +85,8 @@ def types_in(values: Sequence[Any]) -> set[type]:
 class Merge:
     """Merges the rows of a sweep's results into one column per quantity.
 
-    config   the one that is varied
-    inverse  which result each point has
+    config   base config of the sweep
+    inverse  index of the result of each point
     """
 
     def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
@@ -120,11 +120,11 @@ class Merge:
 
     @property
     def numbers(self) -> Collection[str]:
-        """Names of quantities with one number per result."""
+        """Names of the quantities that have a single number per result."""
         return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
 
     def of(self, name: str) -> NDArray[Any] | None:
-        """Return the points' values of a quantity, NaN or '' for a gap; None if no point has it."""
+        """Return a quantity's values at the points, with NaN or '' for gaps; None if no point has the quantity."""
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
     def content(self) -> InTurn:
@@ -153,7 +153,7 @@ class Merge:
         return InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
-        """Describe how the walks ended and the role of the ground; empty for a stage that does not walk."""
+        """Describe the endings of the walks and the role of the ground; empty for a stage that does not walk."""
         question, config = self.question, self.config
         outcomes = self.columns["outcome"].values[self.inverse]
         pads, pitch = None, self.of("pitch_m")
@@ -167,7 +167,7 @@ class Merge:
         return describe_endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
 
     def numerical_error(self) -> dict[str, Any]:
-        """Return the largest errors of the repeated walks; `ended_otherwise` counts walks whose error is unknown."""
+        """Return the largest errors of the repeated walks; `ended_otherwise` counts those that ended differently."""
         errors = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
         reasons, ends = self.of("numerical_error.reason"), errors["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
@@ -184,7 +184,7 @@ class Merge:
         return {"numerical_error": summary}
 
     def variable(self, name: str) -> Variable:
-        """Remove and return a variable over the points, so that no two copies exist."""
+        """Remove and return a variable over the points; without the removal two copies would exist."""
         column = self.columns.pop(name)
         values = column.typed()[self.inverse]
         extra = values.shape[1:]
@@ -247,7 +247,7 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 
 
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
-    """Format a variable as columns, one for each entry of a list; gaps are empty."""
+    """Split a variable into columns, one for each entry of a list; gaps are empty."""
     values = variable.values
     points, own = values.shape[:dimensions], values.shape[dimensions:]
     rows = values.reshape((int(np.prod(points)), *own))

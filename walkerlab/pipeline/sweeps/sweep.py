@@ -39,15 +39,15 @@ PIPELINE_AT = "walkerlab.pipeline.graph:PIPELINE"
 
 @dataclass(frozen=True)
 class SweepWork:
-    """Options of computing a sweep."""
+    """Options for computing a sweep."""
 
-    engine: SweepEngine = ENGINES["local"]  # that computes the points
+    engine: SweepEngine = ENGINES["local"]  # engine that computes the points
     order: Order = field(default_factory=Order)  # options of the engine
     chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
     graph: str = PIPELINE_AT  # import path of the pipeline, module:NAME
-    # called with the names of quantities once a point has an answer; may raise
+    # called with the names of all quantities so far after each chunk that has an answer; may raise
     check: Callable[[Collection[str]], None] = lambda _names: None
 
 
@@ -56,8 +56,8 @@ class Swept:
     """Result of a sweep."""
 
     question: SweptStage
-    path: Path  # its file
-    summary: Mapping[str, Any]  # of the file
+    path: Path  # file of the sweep
+    summary: Mapping[str, Any]  # summary stored in the file
     reused: int  # number of points whose result existed
     wall_s: float  # total time
     bugs: tuple[str, ...] = ()  # tracebacks of bugs that stopped points
@@ -68,7 +68,7 @@ class Swept:
 
     @property
     def group(self) -> Group:
-        """Variables over the points, each read from the file on access."""
+        """Variables over the points; each is read from the file on access."""
         return GroupOnDisk(self.path)
 
     @property
@@ -82,7 +82,7 @@ class Swept:
         return int(self.summary["failed"])
 
     def error(self) -> WalkerlabError:
-        """Return the error for points that were not computed; the others are stored."""
+        """Return the error for points that were not computed; all other points are stored."""
         message = f"{self.failed} of {len(self.question)} points were not computed"
         why = f"`reason` in {self.path} says why."
         if not self.bugs:
@@ -103,16 +103,16 @@ class Foreseen:
     points: tuple[str, ...]  # descriptions of the first points
     count: int  # number of points
     there: int  # number of points with a stored result
-    estimate_s: float | None  # time for the rest, s; None if no such point was timed
+    estimate_s: float | None  # expected time for the other points, s; None if no stored point was timed
 
 
 class SweepRun:
-    """A sweep whose points are all valid."""
+    """Sweep whose points are all valid."""
 
     def __init__(self, question: SweptStage, loaded: LoadedConfig, folder: RunFolder, graph: Graph = PIPELINE) -> None:
-        """Check every point by the schema.
+        """Check every point against the schema.
 
-        Raises ConfigError for points that are no configs and for a stage that has no result without files.
+        Raises ConfigError for invalid points and for a stage that cannot be swept.
         """
         refuse_unknown_stage(question.stage, graph)
         self.question, self.folder, self.loaded = question, folder, loaded
@@ -120,7 +120,7 @@ class SweepRun:
         keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
         self.places = {key.ljust(32, b"\0").hex(): place for place, key in enumerate(unique.tolist())}
-        # first of the points that share a key
+        # index of the first point with each key
         self.first = np.full(len(unique), len(keys))
         np.minimum.at(self.first, self.inverse, np.arange(len(keys)))
         over = {axis.key: list(axis.values) for axis in question.axes}
@@ -130,13 +130,13 @@ class SweepRun:
         self.path = folder.path / f"sweep-{question.stage}-{'-'.join(question.names)[:60]}-{digest}.h5"
 
     def config(self, index: int) -> Config:
-        """Build one point's config, on demand since a sweep may have a million points."""
+        """Build the config of one point, on demand because a sweep may have a million points."""
         return self.loaded.variant(self.question.settings(index))
 
     def checked_keys(self) -> list[bytes]:
         """Return the stage key of every point (32 bytes each), in order.
 
-        Raises ConfigError that names the invalid points with their values, each reason once.
+        Raises ConfigError that names invalid points with their values, one point for each reason.
         """
         keys: list[bytes] = []
         problems: dict[str, str] = {}
@@ -154,18 +154,18 @@ class SweepRun:
         return keys
 
     def unread(self) -> Iterator[str]:
-        """Iterate over parameters that neither the stage nor its inputs read."""
+        """Iterate over swept parameters that neither the stage nor its inputs read."""
         base = self.keys.of(self.config(0), self.question.stage)
         for number, axis in enumerate(self.question.axes):
             settings = self.question.settings(0)
             settings[number] = axis.setting(len(axis.values) - 1)
             if axis.values[-1] != axis.values[0]:
-                with contextlib.suppress(ConfigError):  # that corner is invalid
+                with contextlib.suppress(ConfigError):  # this combination of values may be invalid
                     if self.keys.of(self.loaded.variant(settings), self.question.stage) == base:
                         yield axis.key
 
     def foresee(self, workers: int, max_points: int) -> Foreseen:
-        """Return the plan without changing a file; raises ConfigError as `run` does."""
+        """Return the plan without changing a file; raises ConfigError if the folder holds results of another config."""
         refuse_another_config(self.folder, self.loaded.config)
         stored = np.zeros(len(self.places), bool)
         rows: list[PointResult] = []
@@ -185,7 +185,7 @@ class SweepRun:
         """Compute the points without a stored result and write the sweep's file.
 
         Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
-        StorageError, and NoAnswer if no worker lives.
+        StorageError, and NoAnswer if workers keep dying.
         """
         started = time.perf_counter()
         reporter = reporter or Silent()
@@ -228,7 +228,7 @@ class SweepRun:
     def _compute(
         self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, origin: provenance.Provenance
     ) -> tuple[str, ...]:
-        """Compute the missing points; return tracebacks of bugs, one for each place in the code."""
+        """Compute the missing points; return the tracebacks of bugs, one for each place in the code."""
         missing = np.sort(self.first[~merge.has_row])
         if not missing.size:
             return ()
@@ -242,7 +242,7 @@ class SweepRun:
             if any(row.status == "answered" for row in chunk.rows):
                 work.check(merge.numbers)
             for bug in (row.bug for row in chunk.rows if row.bug):
-                place = bug.rpartition("\n  ")[0]  # without the message, which differs from point to point
+                place = bug.rpartition("\n  ")[0]  # leave out the message, which differs from point to point
                 if place not in bugs:
                     reporter.warn(f"a bug stopped a point of the sweep; the others go on.\n{bug}")
                     bugs[place] = bug
@@ -259,7 +259,7 @@ class SweepRun:
         return tuple(bugs.values())
 
     def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
-        """Iterate over the points to compute; walks of a sample are repeated for their numerical error."""
+        """Iterate over the points to compute; a sample of their walks is repeated for the numerical error."""
         stage, forced = self.question.stage, token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
@@ -276,6 +276,6 @@ def refuse_unknown_stage(name: str, graph: Graph) -> None:
 
 
 def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:
-    """Return the modules needed to compute a stage; raises ConfigError for a stage that cannot be swept."""
+    """Return the modules that are needed to compute a stage; raises ConfigError if it cannot be swept."""
     refuse_unknown_stage(stage, graph)
     return tuple(needed.module for needed in graph.needed_for(stage, config))
