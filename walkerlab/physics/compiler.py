@@ -1,4 +1,4 @@
-"""Compilation and caching of kernels with numba: one process compiles each kernel, and parts are compiled into kernels.
+"""Compilation and caching of kernels with numba: one process compiles each kernel; parts get no code of their own.
 
 The module uses private parts of numba. If a version lacks one, `absent` lists it, and kernels use only numba's public
 interface, with the same results.

@@ -11,7 +11,7 @@ LOSS_ENTRIES, SUPPLY_ENTRIES = slice(DAMPING_LOSS, PUSH_OFF), slice(PUSH_OFF, TO
 
 class Loss(NamedTuple):
     key: str  # name of the loss in results
-    where: str  # completes 'energy is lost'
+    where: str  # text that completes 'energy is lost ...'
     variable: str  # name of the variable that holds the loss over time; empty if there is none
     meaning: str  # description of the variable
     cause: str  # label in figures

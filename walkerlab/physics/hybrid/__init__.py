@@ -12,7 +12,7 @@ Contact model (`contact_loop`)
     modes         forms of the tree (`ground/walker`): the first stance foot hinged or free, each knee locked or not;
                   in every form a foot has ground or not, and a knee is RELEASED, BENT, STOPPING or LOCKED
     each foot     HEIGHT: touch, which ends a step if the foot is far enough ahead, or lift; LEFT_EDGE, RIGHT_EDGE: the
-                  foot crosses an edge of its pad; RELEASE, FULL_DAMPING, FRICTION_SWITCHES: switching points of the
+                  foot crosses an edge of a pad; RELEASE, FULL_DAMPING, FRICTION_SWITCHES: switching points of the
                   force law, where integration steps end and nothing else happens; VERTICAL_VELOCITY: the leading foot
                   stops sinking in, and the trailing knee is released
     walker        PASSING: the feet pass each other, and each may gain or lose its ground; FALL: the hip is too low:

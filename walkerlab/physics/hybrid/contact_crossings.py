@@ -47,7 +47,7 @@ from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_
 
 NO_SIDE = 0  # side of an event function that may cross zero in either direction
 ZERO_ROUNDING = 1e-14  # m, rad or their rates; smaller values of event functions count as zero
-CLEARLY_MOVED = 1e-12  # m, rad or their rates; a change over a step that is larger than this is not rounding
+CLEARLY_MOVED = 1e-12  # m, rad or their rates; larger changes over a step are not rounding
 
 
 @kernel_part
@@ -97,7 +97,7 @@ def sample_foot(
 
 @kernel_part
 def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
-    """Return fraction of the step (or NO_CROSSING) and number of the first event of the knees."""
+    """Return the step's fraction (or NO_CROSSING) and the number of the knees' first event."""
     # a bent knee straightens, a knee in its stop turns back, or the stance foot stops sinking in and releases a knee
     best, event = NO_CROSSING, -1
     for knee in range(2):
@@ -121,7 +121,7 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
 def earliest_crossing(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Return fraction of the step (or NO_CROSSING) and number of the first event; `watch_order` includes PASSING."""
+    """Return the step's fraction (or NO_CROSSING) and the number of the first event; `watch_order` adds PASSING."""
     sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
     best, event = NO_CROSSING, -1
     for foot in range(2):

@@ -28,7 +28,7 @@ FARTHEST_SLIDE = 0.25  # fraction of the stride measure that a stance foot's mat
 
 
 class Frame(NamedTuple):
-    """Dimensions and settings that the criteria for events use."""
+    """Dimensions of the walker, and a setting, that the criteria of events use."""
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)

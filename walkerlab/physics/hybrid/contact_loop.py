@@ -41,7 +41,7 @@ LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-REWINDS = 24  # rewinds of one step, then its end is taken as the event, which rounding moves at each attempt
+REWINDS = 24  # rewinds of one step after which its end counts as the event, which rounding moves at each attempt
 DOUBTS = 12  # rewinds of one step after which an event is dropped if the step's end does not confirm it
 
 
@@ -59,7 +59,7 @@ class EventSearch(NamedTuple):
     """State of the search for an event's time, in which steps are made to end at the expected time."""
 
     target: float  # s, latest end of the next step
-    event: int  # event that is searched for, or the last one
+    event: int  # event that is being located, or the last event
     latest: float  # s, end of the step in which the event appeared: upper bound of the search
     arriving: bool  # whether the target is the event's expected time
     refinements: int  # number of corrections of that time
@@ -145,7 +145,7 @@ def aim(
 def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
-    """Shorten the step from `start` to `end` (s) to end at its event, or accept it if it does so up to rounding."""
+    """Shorten the step from `start` to `end` (s) so that it ends at its event, or accept it if it already does."""
     latest = search.latest if search.arriving else end
     refinements = search.refinements if search.arriving and event == search.event else 0
     wait = max(fraction * (end - start), EVENT_TIME)
@@ -153,10 +153,10 @@ def approach(
     if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
         return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
     if early and is_switching(event):
-        # the event function is too far from a polynomial on this step; on half of the step it is closer
+        # the event function is too far from a polynomial on this step: try half the step
         if search.rewinds < REWINDS:
             return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
-        # even on a short step it is not close enough: ignore this event, but no other event of the step
+        # a short step does not help either: ignore this event, but no other event of the step
         walk_state.progress.passes_switching = True
         return EventSearch(end, event, latest, False, 0, 0, False, False)
     return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
@@ -175,7 +175,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
 
 @kernel_part
 def forget_zeros(walk_state: WalkState, h: float) -> None:
-    """Clear `at_zero`, which prevents that an event is found twice, after a step of h (s) that is long enough."""
+    """Clear `at_zero`, which keeps events from being found twice, unless the last step of h (s) was too short."""
     if h > 2.0 * EVENT_TIME:
         for i in range(walk_state.at_zero.size):
             walk_state.at_zero[i] = 0
@@ -201,7 +201,7 @@ def react(
         note_work(observer, system, method.y)
     if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
         return WALKED
-    # the caller applies jumps of the tangent: at a change of form, and where forces jump as the legs change roles
+    # the caller must apply the tangent's jumps: at changes of form, and where forces jump as the legs change roles
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return CHANGES_FORM
     if not is_switching(event):

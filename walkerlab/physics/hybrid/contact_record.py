@@ -95,7 +95,7 @@ class ContactObserver(NamedTuple):
 def observe(
     observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
 ) -> None:
-    """Record the last integration step, which must be valid, with its event functions sampled."""
+    """Record the last integration step; it must be valid, and its event functions must be sampled."""
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
         balance(observer, method, system)
@@ -151,7 +151,7 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Copy the account at a step's touch, for the work in completed steps; the hip's work then includes springs."""
+    """Copy the account at a step's touch, for the work in completed steps; hip work then includes the springs."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
     observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - spring_energy(system, y)
@@ -232,8 +232,8 @@ def add_work(
 @kernel_part
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
     """Compute the energies (J) lost to damping and friction under a foot with ground."""
-    # If the force law has released the foot, damping takes the energy that the ground's spring loses. Quadrature would
-    # be inaccurate for its powers of the penetration. Steps end at the release, so a foot is released for a whole step.
+    # If the force law has released the foot, the damping loss is the energy that the ground's spring loses: quadrature
+    # would be inaccurate for powers of the penetration. Steps end at the release, so it holds throughout a step.
     damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])

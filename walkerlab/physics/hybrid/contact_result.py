@@ -72,7 +72,7 @@ def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """Write the result of `sample_energies`; `system`, the free walker, takes each sample's ground and knees."""
+    """Fill in `sample_energies`; `system` is the free walker, and its ground and knees are set to each sample's."""
     for i in range(samples.states.shape[0]):
         for k in range(2):
             system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
@@ -248,7 +248,7 @@ def run_parts(
     observer: ContactObserver,
     walk_state: WalkState,
 ) -> Stopped:
-    """Take the hinged step, if there is one, then the free walk."""
+    """Walk the hinged step, if there is one, and then the free steps."""
     # A walk that completed all steps continues, unobserved, until the foot that carried the last step has lifted.
     y, spent = start, np.zeros(4, np.int64)
     if hinged:

@@ -43,21 +43,21 @@ class WalkState(NamedTuple):
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
     touch_height: Any  # (steps,) m, height of the foothold above the slope
-    slip: Any  # (steps,) m, net slip of each step's stance foot; for the last step, up to now while `is_to_lift`
+    slip: Any  # (steps,) m, net slip of each step's stance foot; for the last step, slip up to now until the foot lifts
     rolling: Any  # (steps,) m, rolling distance of each step's stance foot
     has_ground: Any  # (2,) whether there is ground under a foot
     level: Any  # (2,) m, height of the ground above the slope, for each foot
     cells: Any  # (2,) cell below each foot, in the foot's lane
     left_cells: Any  # (2,) cell of each foot's last stance
     foothold: Any  # (2,) m, position of each foot's last touch
-    touched: Any  # (2,) m, `material_along` at that touch
-    slipped: Any  # (2,) m, slip of each foot from that touch to its latest lift
-    rolled: Any  # (2,) m, rolling distance over the same time
+    touched: Any  # (2,) m, `material_along` at each foot's last touch
+    slipped: Any  # (2,) m, slip of each foot from its last touch to its latest lift
+    rolled: Any  # (2,) m, rolling distance of each foot over the same time
     leaving: Any  # (2,) whether a foot is the former stance foot and has not lifted yet
     knee: Any  # (2,) state of each knee
     knee_strike: Any  # (steps + 1,) s, time at which the knee of the step's swing leg locked; -1 if it has not
     sides: Any  # (event functions,) side of zero on which each event function is: 1, -1, or 0 if not stored
-    at_zero: Any  # (event functions,) whether the last event left it at zero
+    at_zero: Any  # (event functions,) whether the last event left each event function at zero
     progress: WalkProgress
 
 
@@ -134,7 +134,7 @@ def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], 
 
 @kernel_part
 def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
-    """Compute the position (m) that a foot at `along` (m) would have without rolling; changes of it are slip."""
+    """Compute the position (m) that a foot at `along` (m) would have without rolling; its change is slip."""
     # The velocity of the material point at the bottom of the ball is that of the contact point plus radius times
     # angular velocity, so the displacements differ by radius times the change of the angle.
     for k in range(form.bodies):

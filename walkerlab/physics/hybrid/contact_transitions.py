@@ -49,9 +49,9 @@ from walkerlab.physics.hybrid.contact_state import (
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import by_type_or_default, kernel_part
 
-STEP_AHEAD = 0.25  # fraction of the stride measure: minimum distance ahead of the other foot where a step can end
-AT_SURFACE = 1e-11  # m; a foot closer to the surface is at it within the error of the event's time
-TRIP = 0.25  # fraction of the stride measure; on the pad that it left, a touch this far from its last stance is a trip
+STEP_AHEAD = 0.25  # fraction of the stride measure; a touch less than this ahead of the other foot ends no step
+AT_SURFACE = 1e-11  # m; a foot this close to the surface is on it, within the error of an event's time
+TRIP = 0.25  # fraction of the stride measure; a foot that touches its old pad this far from where it stood has tripped
 
 
 @kernel_part
@@ -73,7 +73,7 @@ def apply_event(
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
         outcome = GOES_ON
         for foot in range(2):
-            # equal legs pass in a hinged step with both feet at the surface; rounding must not decide which is above it
+            # in a hinged step, equal legs pass with both feet at the surface; rounding must not decide which is above
             at_surface = abs(feet[foot].height) < AT_SURFACE
             above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
             find_ground(terrain, walk_state, foot, above)
@@ -153,7 +153,7 @@ def set_foothold(
     foot: int,
     y: Any,
 ) -> int:
-    """Set a swing foot's ground to the height of its next foothold; on an ordinary plane, a foot below is stubbed."""
+    """Set a swing foot's ground to its next foothold's height; on an ordinary plane, a foot below it is stubbed."""
     set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
@@ -278,7 +278,7 @@ def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
 
 @kernel_part
 def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
-    """Release the trailing knee after a touch: at once, after the push-off, or once the leading foot stops sinking."""
+    """Release the trailing knee at a touch, or set the time of its release: see `AT_COMPRESSION`, `AT_PULSE_END`."""
     if form.kneed:
         if form.release_at_touch and form.push_off != 0.0:
             walk_state.progress.release = AT_PULSE_END

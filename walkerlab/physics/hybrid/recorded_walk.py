@@ -48,7 +48,7 @@ CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to 
 class Samples(NamedTuple):
     """Samples of a walk, on a regular grid and on both sides of every heel strike."""
 
-    time_s: Array  # (samples,) strictly rising; the last float before a heel strike stands for the state before it
+    time_s: Array  # (samples,) strictly rising; the sample before a heel strike is one float earlier than the one after
     state: Array  # (samples, 2 n) rad, rad/s, swing leg first
     step: NDArray[np.int64]  # (samples,) number of the step, from 0
     bent: NDArray[np.bool_]  # (samples,) whether the swing leg's knee is free
@@ -111,11 +111,11 @@ def take_walk(
     """Walk `steps` steps from `start`, or until the walk ends, with a limited budget of evaluations per step.
 
     advance      called after each block with the number of steps taken in it
-    heights      (steps + 1,) m, heights of the footholds above the slope, from the start's on; None for even ground
+    heights      (steps + 1,) m, heights of the footholds above the slope, the start's first; None for even ground
     step_length  m, step length of the gait, by default the distance between the feet at the start. On uneven ground, a
                  foot that lands less than a quarter of it ahead of the other foot ends the walk as a fall
 
-    A negative normal force does not stop the walk, since feet of the model cannot lift off, but it sets the outcome.
+    A negative normal force does not stop the walk, since the model's feet cannot lift off, but it sets the outcome.
     """
     recorder = Recorder(walker, tolerances, start, sampled)
     recorder.heights = heights
@@ -157,7 +157,7 @@ class Recorder:
         self.pieces: list[Samples] = []
 
     def walk_on(self, rises: Array) -> Outcome:
-        """Take up to `rises.size - 1` more steps; `rises` holds each foothold's rise (m), from the present one on."""
+        """Take up to `rises.size - 1` more steps; `rises` (m) begins with the rise to the present foothold."""
         steps = rises.size - 1
         seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
         if self.sampled:  # enough samples for the longest steps

@@ -54,7 +54,7 @@ SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of integers
 
 NOBODY = -1
 FIRST_LANE_STEP = 0.1  # pendulum times
-ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion bridges a shorter rest of the way to a heel strike
+ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion takes the walk to a heel strike that is closer than this
 STRIKE_REFINEMENTS = 6
 MAX_TRIES = 20_000  # attempted steps in one swing
 MIN_LANE_STEP = 1e-13  # pendulum times

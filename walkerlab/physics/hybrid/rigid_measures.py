@@ -21,7 +21,7 @@ def energies(walker: RigidModel, states: Array) -> Array:
 
 
 def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
-    """Compute the ground force on the stance foot (samples, 2), N, along and normal to the slope; `bent`: knee free."""
+    """Compute the force on the stance foot (samples, 2), N, along and normal to the slope; `bent` marks a free knee."""
     out = np.zeros((len(states), 2))
     free = np.zeros(len(states), np.bool_) if bent is None else bent
     fill_reactions(walker, np.ascontiguousarray(states), free, out)
@@ -42,7 +42,7 @@ def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None
 
 @dataclass(frozen=True)
 class Places:
-    """Points of the walker at each sample (m): distance along the slope from the first foothold, height above it."""
+    """Points of the walker at each sample (m): along the slope from the first foothold, and height above the slope."""
 
     contact: Array  # (samples, 2) contact point of the stance foot
     hip: Array  # (samples, 2)

@@ -32,13 +32,13 @@ class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of 
     max_friction_ratio: float  # tangential over normal force
     max_scuff_depth: float  # m
     energy_drift: float  # J, largest range of the energy within a swing
-    min_impulse: float  # N s, normal
+    min_impulse: float  # N s, normal impulse of the ground in a strike
     max_impulse_ratio: float  # tangential over normal impulse
     min_energy: float  # J
     max_energy: float  # J
     energy: float  # J, latest value
-    energy_integral: float  # J s, over the walk
-    duration: float  # s, of the walk
+    energy_integral: float  # J s, time integral of the energy over the walk
+    duration: float  # s, duration of the walk
     strike_loss: float  # J, kinetic energy lost in strikes
     forward_work: float  # J, positive work of the hip's constant torque
     step_strike_loss: float  # J
@@ -106,7 +106,7 @@ def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, afte
 
 @kernel_part
 def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
-    """Return pull of the ground (N), friction ratio and depth of the swing foot (m); see section 3.1 of the paper."""
+    """Return the ground's pull (N), the friction ratio and the swing foot's depth (m); see section 3.1 of the paper."""
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
     return -normal, ratio, -swing_foot(mode.model, y)[0]

@@ -60,8 +60,8 @@ from walkerlab.physics.solvers.system import derivative
 
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
-SHORTEST_LANDING = 0.25  # fraction of the gait's step length: on uneven ground, a foot must land further ahead
-SEARCH_START = 1e-6  # fraction of the first step; rounding makes a straight knee at rest cross zero before 1e-9
+SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground a foot must land at least this far ahead
+SEARCH_START = 1e-6  # fraction of the first step; before 1e-9, rounding makes a straight knee at rest cross zero
 # event functions, rows of the finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
 LEG_RATE = 4  # row of the legs' relative angular velocity, which is no event
@@ -82,7 +82,7 @@ def knee_angle(model: RigidModel, y: Any, first: int) -> float:
 
 @kernel_part
 def hip_above_fall(model: RigidModel, y: Any) -> float:
-    """Compute how much higher (m) the hip is than the height at which the walker has fallen."""
+    """Compute the height (m) of the hip above the limit below which the walker has fallen."""
     return hip_height(model, y) - FALLEN_HIP * model.leg_length
 
 
@@ -235,8 +235,8 @@ def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> 
     """Apply the strike at the end of a phase, after a last Newton correction of its time; return that time (s).
 
     Afterwards `method` holds the state before the strike, `new` the state after it, and `strikes` the waits of tangent
-    columns. The strike's time moves with a column Phi (saltation): Phi becomes J (Phi + f wait), minus f+ wait for a
-    knee strike. After a heel strike it stays on the section. f, f+: the state's rates before and after the strike.
+    columns. A column Phi becomes J (Phi + f wait) at a heel strike, which keeps it on the section, and J (Phi + f wait)
+    - f+ wait at a knee strike (saltation). f, f+: rates before and after the strike; J: derivative of the jump.
     """
     model, y, waits = system.model, method.y, strikes.waits
     n, knee = len(model.arm_x), is_bent(system)
@@ -281,8 +281,8 @@ class HeelStrikes(NamedTuple):
     knee_time: Any  # (steps,) s, times of the knee strikes; empty without knees
     rise: Any  # (steps + 1,) m, input: rise of each foothold from the one before, beginning with the present one
     nearest: float  # m, a foot that lands less than this ahead of the stance foot ends the walk; 0 on even ground
-    lift: Any  # (steps + 1, columns) m, input: change of each rise along each column
-    waits: Any  # (steps, columns) s, change of each step's duration along each column
+    lift: Any  # (steps + 1, columns) m, input: derivative of each rise in each column's direction
+    waits: Any  # (steps, columns) s, derivative of each step's duration in each column's direction
 
 
 def new_heel_strikes(
@@ -301,7 +301,7 @@ def walk(
 ) -> tuple[int, int]:
     """Walk until `strikes` is full or the walk ends; return the outcome's number and the number of steps taken.
 
-    walker  RigidModel in an array (), which compiled code receives ten times faster than a tuple
+    walker  RigidModel in an array of shape (), which compiled code receives ten times faster than a tuple
     y       (m,) state at time 0, with tangent columns if the method has room for them; overwritten with the last state
     """
     model = walker[()]

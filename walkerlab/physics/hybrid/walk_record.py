@@ -21,7 +21,7 @@ class WalkWork(NamedTuple):
 
 
 class DrivenWork(NamedTuple):
-    """Work done on the walker during the completed steps, and its weight."""
+    """Work done on the walker during the completed steps, and the walker's weight."""
 
     weight: float  # N
     gravity: float  # J, work from the first foothold to the last, along the slope and over uneven ground
@@ -46,7 +46,7 @@ class DrivenWork(NamedTuple):
 
 
 def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
-    """Draw the heights (steps + 1,), m, of footholds on rough ground: the first zero, the others independent normal."""
+    """Draw heights (steps + 1,), m, of the footholds of rough ground: the first is 0, the rest normally distributed."""
     # The first heights do not depend on the number of heights.
     return np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, steps))
 
@@ -85,7 +85,7 @@ class WalkRecord:
 
     @property
     def ground_m(self) -> Array:
-        """Heights (steps + 1,) of the footholds above the slope, from the start's foothold on."""
+        """Heights (steps + 1,) of the footholds above the slope, the start's first."""
         heights = np.zeros(self.steps) if self.foothold_height_m is None else self.foothold_height_m
         return np.append(0.0, heights)
 

@@ -78,7 +78,7 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
 
 @kernel_part
 def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int, end: int) -> None:
-    """Evaluate stages `first` to `end - 1` of a step h (s) from `y_old` at time t (s); `at` keeps the last state."""
+    """Evaluate stages `first` to `end - 1` of a step of h from `y_old` at time t (s); `at` keeps the last state."""
     y, at, K = method.y_old, method.at, method.stages
     total = vector(block(system))
     width = len(total)
@@ -137,7 +137,7 @@ def scaled_norm(method: Dop853, v: Any) -> float:
 
 @kernel_part
 def change_of_step(error: float) -> float:
-    """Compute the ratio of the next step to a step with this error; the eighth root is three square roots."""
+    """Compute the ratio of the next step to a step with this error; three square roots give the eighth root."""
     return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))
 
 

@@ -132,7 +132,7 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
 @functools.cache
 def teach_arithmetic() -> None:
     """Register arithmetic on lanes with numba; needed before the first kernel with lanes is compiled."""
-    # Importing this module does not do it, because it affects everything that the process compiles.
+    # This is not done on import, because it affects everything that the process compiles.
     unary, binary, variadic = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
     for plain, in_place, instruction in (
         (operator.add, operator.iadd, "fadd"),

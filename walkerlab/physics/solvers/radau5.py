@@ -52,7 +52,7 @@ P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 
 P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
 RADAU_SAFETY, RADAU_SHRINK, RADAU_GROWTH = 0.9, 0.125, 8.0
-KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios for which the factored matrices are kept
+KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # range of step ratios in which the factored matrices are kept
 FRESH_RATE = 1e-3  # the Jacobian is kept if Newton converges faster
 FIRST_RADAU_STEP = 1e-6
 MAX_NEWTON = 7
@@ -195,7 +195,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
 
 @begin.case(Radau5)
 def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
-    """Evaluate derivative and Jacobian at the start, and discard step control's history."""
+    """Evaluate derivative and Jacobian at the start, and discard the history of step control."""
     clock, control = method.clock, method.control
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_RADAU_STEP
     for i in range(method.y.size):
