@@ -1,7 +1,7 @@
-"""Compilation and caching of kernels by numba: no machine code for parts alone, and one process compiles each kernel.
+"""Compilation and caching of kernels with numba: one process compiles each kernel; parts get no code of their own.
 
-This uses private parts of numba. If a version lacks one, `absent` lists it and kernels use numba's public interface,
-with the same results.
+The module uses private parts of numba. If a version lacks one, `absent` lists it, and kernels use only numba's public
+interface, with the same results.
 """
 
 import functools
@@ -21,7 +21,7 @@ from walkerlab.physics.kernel_cache import PACKAGE, cache_folder, lock_of, watch
 compiling: list[tuple["KernelCache", str]] = []
 """Kernels that this process is compiling, with their signatures; each is called by the one before it."""
 absent: list[str] = []
-"""Private parts that this version of numba lacks; kernels then use only its public interface."""
+"""Private parts that this version of numba lacks; if there are any, kernels use only its public interface."""
 
 
 def private_class(name: str, *members: str) -> Any:
@@ -60,7 +60,7 @@ Record = private_class("numba.core.types.npytypes.Record", "mangling_args")
 
 
 def layout_symbol(record: Any) -> tuple[str, tuple[str, ...]]:
-    """Return a record type's name in symbols of machine code, the same in every process."""
+    """Return the name of a record type in the symbols of machine code; it is the same in every process."""
     # Numba uses a counter instead: two processes can then give parts compiled for different records the same symbol,
     # and a third process that loads both runs one in place of the other.
     return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:16],)
@@ -69,8 +69,9 @@ def layout_symbol(record: Any) -> tuple[str, tuple[str, ...]]:
 if hasattr(Record, "mangling_args"):
     Record.mangling_args = property(layout_symbol)
 
-# Numba imports scipy.linalg with its first kernel to see whether it is installed, which takes longer than loading all
-# compiled kernels. It is installed; numba imports it again where a function multiplies matrices, which no kernel does.
+# With its first kernel, numba imports scipy.linalg to see whether it is installed, which takes longer than loading all
+# compiled kernels. Prevent that import and set the answer: it is installed. Numba imports it again where a function
+# multiplies matrices, which no kernel does.
 BLAS = "scipy.linalg.cython_blas"
 if BLAS not in sys.modules:
     sys.modules[BLAS] = None  # type: ignore[assignment]
@@ -91,7 +92,7 @@ if absent:
 
 
 class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
-    """Locator of kernels in `cache_folder`: depends on a file's content, not on its age or on where it is installed."""
+    """Locator of kernels in `cache_folder`; it depends on the content of the source file, not on its age or folder."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
         super().__init__(py_func, py_file)
@@ -109,7 +110,7 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
 
 
 class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
-    """Cache of files in `cache_folder`, and of notebook cells, which have no file, in IPython's folder."""
+    """Cache in `cache_folder` for kernels from files, and in IPython's folder for kernels from notebook cells."""
 
     _locator_classes = (KernelLocator, IPythonCacheLocator)
 
@@ -117,7 +118,7 @@ class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
 class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
     """Index of a kernel's stored code; empty if it holds types that this process cannot import."""
 
-    # Numba reads the types of all stored versions of a kernel, including those for systems of other programs.
+    # Numba reads the types of all stored versions of a kernel, including types that another program defined.
 
     def _load_index(self) -> Any:
         try:
@@ -136,7 +137,7 @@ class StoredKernel(FunctionCache):  # type: ignore[misc, valid-type]
 
 
 class KernelCache:
-    """Cache of a kernel as numba uses it: of several processes that call the kernel at once, only one compiles it."""
+    """Cache of a kernel, with numba's interface; if several processes call the kernel at once, only one compiles it."""
 
     def __init__(self, py_func: Any) -> None:
         self._function = py_func
@@ -148,7 +149,7 @@ class KernelCache:
         return StoredKernel(self._function)
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Load stored code after waiting for any process that compiles it; None if this process must compile it."""
+        """Load stored code after waiting for any process that is compiling it; None if this process must compile it."""
         code = self.stored.load_overload(signature, context)
         if code is not None or str(signature) in self._locks:
             return code
@@ -187,9 +188,9 @@ def _release(lock: Any) -> None:
 
 
 class QuickFlags(Flags):  # type: ignore[misc, valid-type]
-    """Compiler flags that compare only flags that are set."""
+    """Compiler flags that are equal if the same flags are set."""
 
-    # Numba looks operators up by flags and compares every flag that exists.
+    # Numba looks up operators by their flags; its own comparison goes through every flag that exists.
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, QuickFlags) and self._values == other._values
@@ -199,7 +200,7 @@ class QuickFlags(Flags):  # type: ignore[misc, valid-type]
 
 
 class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
-    """Numba's compiler without vectorised loops, which releases the kernel's lock if it fails."""
+    """Numba's compiler without vectorised loops; if compilation fails, it releases the kernel's lock."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -220,7 +221,7 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
 
 
 class _Refreshed:
-    """Context of numba that is not refreshed again: the kernel's own compiler has done so."""
+    """Numba context that ignores `refresh`, because the kernel's compiler has already refreshed it."""
 
     def __init__(self, context: Any) -> None:
         self._context = context
@@ -235,7 +236,7 @@ class _Refreshed:
 class _NumberTyping(_Refreshed):
     """Typing context that resolves each operator and function of numbers only once."""
 
-    # Numba tries all overloads for arrays, sets and strings at every call.
+    # Numba itself tries all overloads, even those for arrays, sets and strings, at every call.
 
     signatures: dict[Any, Any] = {}  # noqa: RUF012 - shared by all parts
 
@@ -264,9 +265,9 @@ class _WithoutEnvironment:
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
-    """Code of a part, linked into kernels, which are optimised as a whole; it has no machine code of its own."""
+    """Code of a kernel part, without machine code of its own: it is linked into kernels and optimised with them."""
 
-    # Numba also optimises and emits every part on its own, which takes a third of the compile time.
+    # Numba itself also optimises and emits every part separately, which takes a third of the compile time.
 
     @property
     def codegen(self) -> Any:
@@ -285,7 +286,7 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
 
 
 class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
-    """Numba's passes with a `_PartLibrary`."""
+    """Numba's compiler passes, which put the code into a `_PartLibrary`."""
 
     def __init__(self, typing: Any, target: Any, *rest: Any) -> None:
         """Reuse the contexts that the kernel's compiler has refreshed."""
@@ -300,7 +301,7 @@ class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
 
 
 def cached_plainly(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
-    """Compile and cache a function by numba's public interface, also in `cache_folder`."""
+    """Compile a function and cache it in `cache_folder`, using only numba's public interface."""
     compiled = numba.njit(**flags)(function)
     chosen = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_folder())

@@ -1,19 +1,20 @@
-"""Energy account of a walk on compliant ground: losses and inputs with their texts and colours."""
+"""Energy account of a walk on compliant ground: its entries, and texts and colours for the losses."""
 
 from typing import NamedTuple
 
-# entries of the account, J so far; the last two are the work of the hip torque, a part of HIP, and its positive work
+# entries of the account (J, up to the present time); TORQUE is the work of the hip torque, a part of HIP_WORK, and
+# FORWARD is the positive work of that torque
 DAMPING_LOSS, FRICTION_LOSS, EDGES, KNEE_STRIKES, KNEE_STOP, PUSH_OFF, HIP_WORK, TORQUE, FORWARD = range(9)
 ENTRIES = FORWARD + 1
 LOSS_ENTRIES, SUPPLY_ENTRIES = slice(DAMPING_LOSS, PUSH_OFF), slice(PUSH_OFF, TORQUE)
 
 
 class Loss(NamedTuple):
-    key: str  # of the loss in results
-    where: str  # completes 'energy is lost'
-    variable: str  # over time; empty if the loss has no variable of its own
-    meaning: str  # of the variable
-    cause: str  # as figures name it
+    key: str  # name of the loss in results
+    where: str  # text that completes 'energy is lost ...'
+    variable: str  # name of the variable that holds the loss over time; empty if there is none
+    meaning: str  # description of the variable
+    cause: str  # label in figures
     colour: str
 
 
@@ -38,6 +39,6 @@ LOSSES = (
     Loss("knee_strikes", "in knee strikes", "", "", "knees", "#CC79A7"),
     Loss("knee_stop", "in the knees' stops", "", "", "knees", "#CC79A7"),
 )
-"""In the order of the account."""
+"""Losses, in the order of the account."""
 SAMPLED = {place: loss for place, loss in enumerate(LOSSES) if loss.variable}
 CHANNELS = {loss.key: loss.where for loss in LOSSES}

@@ -1,7 +1,7 @@
 """Folder of compiled kernels: one for each state of the sources, version of numba and processor.
 
-Numba's cache does not notice changes of a called function in another file. The folder's name therefore holds a digest
-of all sources that kernels can use, and an edited function never runs stale. Caches of other programs are not touched.
+Numba's cache does not notice changes in a function that a kernel calls from another file. The folder's name therefore
+contains a digest of all sources that kernels can use, so stale code never runs. Caches of other programs are untouched.
 """
 
 import contextlib
@@ -26,15 +26,15 @@ PACKAGE = PHYSICS.parent
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
 KEPT_GENERATIONS = 8
-UNUSED_S = 30 * 86_400.0  # older generations that no process has opened for so long may be deleted
+UNUSED_S = 30 * 86_400.0  # older generations are deleted if no process has opened them for this long
 
 
 class CacheWarning(RuntimeWarning):
-    """Compiled code is stored in another folder than the chosen one."""
+    """Warning that compiled code is stored in a folder other than the chosen one."""
 
 
 watchers: list[Callable[[str], None]] = []
-"""Called with the name of the kernel that this process compiles or waits for, and with '' at the end."""
+"""Callbacks that receive the name of the kernel that this process compiles or waits for, and '' at the end."""
 
 
 @contextlib.contextmanager
@@ -48,7 +48,7 @@ def watch_compilation(watcher: Callable[[str], None]) -> Iterator[None]:
 
 
 def sources_digest() -> str:
-    """Digest (hex) of all files that hold kernels and of everything these import."""
+    """Return the digest (hex) of all files that contain kernels and of everything that they import."""
     sources = Sources()
     homes = (path for home in KERNEL_HOMES for path in (PHYSICS / home).rglob("*.py"))
     files = (path.relative_to(PACKAGE.parent) for path in homes if HOLDS_KERNELS.search(path.read_bytes()))
@@ -70,7 +70,7 @@ def processor_name() -> str:
 
 
 def cache_root() -> Path:
-    """Folder of all compiled code: $WALKERLAB_CACHE, or the user's cache, or a temporary folder with a warning."""
+    """Return the folder of all compiled code: $WALKERLAB_CACHE, the user's cache, or else a temporary folder."""
     chosen = os.environ.get("WALKERLAB_CACHE")
     usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
     return _first_usable((Path(chosen), usual) if chosen else (usual,))
@@ -94,8 +94,8 @@ def _first_usable(candidates: tuple[Path, ...]) -> Path:
 
 @functools.cache
 def cache_folder() -> Path:
-    """Return this processor's folder for this state of the sources."""
-    # The first call of a process creates it if necessary and then deletes folders that were not used for long.
+    """Return the folder of kernels compiled from the present sources for this processor."""
+    # The first call of a process creates it if necessary, and then deletes folders unused for a long time.
     import numba
 
     root, host = cache_root(), processor_name()
@@ -109,7 +109,7 @@ def cache_folder() -> Path:
 
 
 def _remove_unused(generations: list[Path]) -> None:
-    """Delete folders that were not used for long, except the latest few; a process that uses one compiles again."""
+    """Delete folders unused for a long time, except the latest few; a process that still uses one compiles again."""
     last_used: dict[Path, float] = {}  # s since the epoch
     for folder in generations:
         with contextlib.suppress(OSError):  # another process may have deleted it
@@ -124,8 +124,8 @@ def nothing_compiled_yet() -> bool:
 
 
 def lock_of(name: str) -> Any:
-    """Create a lock between processes in the folder of compiled code."""
-    # imported here because a process that finds everything compiled takes no lock
+    """Create an interprocess lock, a file in the folder of compiled code."""
+    # imported here because a process that finds everything compiled needs no lock
     from filelock import FileLock
 
     return FileLock(cache_folder() / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")

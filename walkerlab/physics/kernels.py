@@ -96,7 +96,7 @@ def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], 
 
 
 def uncompiled(compiled: F) -> F:
-    """Return the Python function of a kernel, for methods that are not compiled."""
+    """Return the Python function of a kernel, for integration methods that are not compiled."""
     return cast(F, cast(Any, compiled).py_func)
 
 
@@ -140,7 +140,7 @@ class ByType:
         body = self._bodies.get(chosen, self._default)
         if body is None:
             name = chosen.__name__ if hasattr(chosen, "_fields") else label
-            # numba passes on errors of other classes than its own unchanged
+            # numba passes on errors unchanged unless they are of its own classes
             raise TypeError(f"{self.__name__} has no body for {name}: register one with @{self.__name__}.case(...)")
         return body
 
@@ -213,13 +213,13 @@ def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
 
 
 def vector(like: Any) -> Any:
-    """Allocate scratch (n,) for the calling function, as long as the tuple or record array `like`."""
-    # in Python it holds NaN, so that reading unwritten scratch shows
+    """Allocate scratch memory (n,) for the calling function, as long as the tuple or record array `like`."""
+    # filled with NaN in Python, so that a read of unwritten scratch memory shows up
     return np.full(len(like), np.nan)
 
 
 def matrix(like: Any) -> Any:
-    """Allocate scratch (n, n), as `vector` does."""
+    """Allocate scratch memory (n, n), as `vector` does."""
     return np.full((len(like), len(like)), np.nan)
 
 
@@ -234,8 +234,8 @@ def zeros(context: Any, like: Any) -> Any:
 
 
 def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
-    """Make compiled calls of `function(like)` return memory of the caller's frame."""
-    # An intrinsic behind an overload would return memory of the overload's frame.
+    """Make compiled calls of `function(like)` return memory in the caller's stack frame."""
+    # An intrinsic called through an overload would return memory in the overload's frame.
 
     class Scratch(AbstractTemplate):  # type: ignore[misc]
         key = function

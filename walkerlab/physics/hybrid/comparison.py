@@ -1,7 +1,7 @@
 """Differences between two walks: at equal times, at equal phases of each step, and as orbits in the phase plane.
 
 A frequency error of one percent makes the difference at equal times grow without bound, however similar the gaits. The
-other two do not depend on the frequency.
+other two differences do not depend on the frequency.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 Quantity = Literal["angle", "velocity"]
 
 LEG_COUNT = 2
-JUMP = 1e-9  # relative to the duration of a walk: closer samples are the two sides of a strike
+JUMP = 1e-9  # fraction of a walk's duration; samples closer than this are the two sides of a strike
 PHASES = 401  # samples per step
 IMPACT_PHASE = 0.02  # phase at which a compliant impact is over
 POINT_SPACING = 5e-3  # spacing of the points of an orbit, relative to its range
-BLOCK_POINTS = 256  # points per block, which bounds the memory
+BLOCK_POINTS = 256  # points per block, which limits the memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +43,13 @@ class Motion:
 
     @cached_property
     def _first_samples(self) -> NDArray[np.int64]:
-        """First sample of each smooth piece: the start, and the sample after each jump of the velocities."""
+        """Indices of the first samples of smooth pieces: the start, and the sample after each jump of velocities."""
         close = np.diff(self.time) < JUMP * (self.time[-1] - self.time[0])
         return np.concatenate(([0], np.flatnonzero(close) + 1))
 
     @cached_property
     def _pieces(self) -> list[tuple[CubicHermiteSpline, PchipInterpolator]]:
-        """Interpolants of each smooth piece: Hermite splines of angles, monotone ones of velocities."""
+        """Interpolants of each smooth piece: Hermite splines of the angles, monotone splines of the velocities."""
         # Monotone splines do not overshoot at an impact.
         ends = (*self._first_samples[1:], self.time.size)
         pieces = []
@@ -60,7 +60,7 @@ class Motion:
         return pieces
 
     def at(self, times: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities (times, leg); at a heel strike, those after it."""
+        """Compute angles and velocities (times, leg) at times (s); at a heel strike, the values just after it."""
         angle, velocity = np.empty((times.size, LEG_COUNT)), np.empty((times.size, LEG_COUNT))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
         for index in np.unique(piece_of):
@@ -70,14 +70,14 @@ class Motion:
         return angle, velocity
 
     def last_before(self, end: float) -> float:
-        """Return the last instant before a jump at `end`, or `end` where nothing jumps."""
+        """Return the time (s) of the last sample before a jump at `end`, or `end` itself if nothing jumps at it."""
         index = int(np.searchsorted(self.time, end))
         if index < self.time.size and self.time[index] == end and index in self._first_samples[1:]:
             return float(self.time[index - 1])
         return end
 
     def during(self, step: int, phases: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities at phases of a step: 0 just after its first impact, 1 just before the next."""
+        """Compute angles and velocities (phases, leg) at phases of a step: 0 is after an impact, 1 before the next."""
         start, end = self.span(step)
         return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
 
@@ -92,7 +92,7 @@ class Motion:
         return (inside - start) / (end - start)
 
     def last_stride(self) -> Motion:
-        """Cut out the last two completed steps, with both impacts; raises ValueError if there are fewer."""
+        """Cut out the last two completed steps with the impacts that end them; raises ValueError if there are fewer."""
         if self.steps < 2:
             raise ValueError("no stride was completed")
         start = self.time[0] if self.steps == 2 else self.last_before(self.step_ends[-3])
@@ -104,9 +104,9 @@ class Motion:
 
 
 def add_strike_samples(motion: Motion) -> Motion:
-    """Extrapolate missing samples at the end of every step and on both sides of every knee strike."""
-    # A compliant impact or an ideal lock takes less than the time between samples: interpolating across it would smear
-    # the jump.
+    """Add missing samples, by extrapolation, at the end of every step and on both sides of every knee strike."""
+    # A compliant impact or an ideal lock is shorter than the sampling interval: interpolation across it would smear the
+    # jump.
     side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
     added = [
         (end, slice(place - 3, place))
@@ -130,13 +130,13 @@ def add_strike_samples(motion: Motion) -> Motion:
 
 
 def jumps_among(times: Array, time: float, strikes: Array, close: float) -> bool:
-    """Whether a strike, other than those closer than `close` (s) to `time`, lies between it and the times."""
+    """Whether a strike lies in the interval that `times` and `time` span, further than `close` (s) from `time`."""
     between = (strikes > min(times[0], time)) & (strikes < max(times[-1], time)) & (np.abs(strikes - time) > close)
     return bool(between.any())
 
 
 def extrapolate(motion: Motion, samples: slice, time: float) -> tuple[Array, Array]:
-    """Extrapolate angles and velocities (leg,) to a time by the parabola through three samples."""
+    """Extrapolate angles and velocities (leg,) to `time` (s) with a parabola through three samples."""
     times = motion.time[samples]
     weights = [np.prod([(time - node) / (own - node) for node in times if node != own]) for own in times]
     return np.asarray(weights @ motion.angle[samples]), np.asarray(weights @ motion.velocity[samples])
@@ -144,19 +144,19 @@ def extrapolate(motion: Motion, samples: slice, time: float) -> tuple[Array, Arr
 
 @dataclass(frozen=True, eq=False)
 class WalkDifference:
-    """One walk minus another, along time, or along steps and phases; the last axis is the leg."""
+    """Difference of two walks over time, or over steps and phases; the last axis is the leg."""
 
     angle: Array
     velocity: Array
 
     def largest(self, of: Quantity) -> list[float]:
-        """Return the largest difference (leg,) of each leg's angle (rad) or velocity (rad/s)."""
+        """Return the largest absolute difference (leg,) in angle (rad) or velocity (rad/s)."""
         largest: list[float] = np.abs(getattr(self, of)).reshape(-1, LEG_COUNT).max(axis=0).tolist()
         return largest
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
-    """Return the times (s) of all samples of either while both walk, and `walk` minus `reference` there."""
+    """Return the sample times (s) of both walks, while both last, and `walk` minus `reference` at these times."""
     time = np.union1d(walk.time, reference.time)
     time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
     angle, velocity = walk.at(time)
@@ -165,7 +165,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """Compute `walk` minus `reference` (step, phase, leg) in the steps of both; ValueError if one completed none."""
+    """Compute `walk` minus `reference` (step, phase, leg) in common steps; raises ValueError if there are none."""
     steps = min(walk.steps, reference.steps)
     if steps == 0:
         raise ValueError("no step was completed by both")
@@ -176,8 +176,8 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkD
 
 
 def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
-    """Mark where both walks move smoothly (step, phase): not at impacts, nor between the knee strikes of both."""
-    # Between them the velocities differ by the whole jump, however similar the motions are.
+    """Mark the phases (step, phase) in which both walks are smooth: not at impacts, nor between their knee strikes."""
+    # Between the two knee strikes the velocities differ by the whole jump, however similar the walks are.
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
     for step, row in enumerate(clear):
         strikes, others = walk.knee_phases(step), reference.knee_phases(step)
@@ -191,7 +191,7 @@ def orbit_distances(walk: Motion, reference: Motion) -> Array:
     """Compute the symmetric Hausdorff distance (leg,) between the orbits of the last strides in the phase plane.
 
     Each axis is scaled by the reference orbit's range: 0.01 is one percent of the orbit's size. Raises ValueError
-    if one of them completed no stride.
+    if either walk completed no stride.
     """
     stride, reference_stride = walk.last_stride(), reference.last_stride()
     distances = np.empty(LEG_COUNT)
@@ -207,20 +207,20 @@ def phase_plane(motion: Motion, leg: int) -> Array:
 
 
 def hausdorff(curve: Array, reference: Array) -> float:
-    """Compute the largest distance of a point of either polyline (points, 2) from the other."""
+    """Compute the largest distance from a point on either polyline (points, 2) to the other polyline."""
     return max(farthest_distance(refine(curve), reference), farthest_distance(refine(reference), curve))
 
 
 def refine(curve: Array) -> Array:
-    """Insert points into a polyline, no further apart than FINENESS."""
+    """Insert points into a polyline (points, 2) so that neighbours are at most POINT_SPACING apart."""
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))))
     points = np.union1d(along, np.linspace(0.0, along[-1], int(along[-1] / POINT_SPACING) + 2))
     return np.column_stack([np.interp(points, along, axis) for axis in curve.T])
 
 
 def farthest_distance(points: Array, polyline: Array) -> float:
-    """Compute the largest distance of one of the points (n, 2) from the polyline (m, 2)."""
-    # Coordinates apart: a sum over an axis of two is several times slower.
+    """Compute the largest distance from one of the points (n, 2) to the polyline (m, 2)."""
+    # x and y are kept in separate arrays: a sum over an axis of length two is several times slower.
     (start_x, start_y), (edge_x, edge_y) = polyline[:-1].T, np.diff(polyline, axis=0).T
     length_squared = np.maximum(edge_x**2 + edge_y**2, np.finfo(float).tiny)
     largest = 0.0

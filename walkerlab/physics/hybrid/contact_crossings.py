@@ -1,8 +1,8 @@
 """Event functions of a walk on compliant ground, sampled along a step, and their first crossing.
 
-Some events change the ground (touch, lift, a pad's edge, feet passing, the fall). The walk stores the side of zero that
-their functions are on, and the event is leaving that side, so simultaneous events cannot hide one another. The others
-are switching points of the force law, where its derivatives jump: ending a step there preserves the method's order.
+For touch, lift, pad edges, feet passing, slide and fall, the walk state stores the sign of the event function, and a
+change of that sign is the event, so simultaneous events cannot hide one another. Other events are switching points of
+the force law, where its derivatives jump: steps that end at these points preserve the method's order.
 """
 
 from typing import Any
@@ -45,14 +45,14 @@ from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.kernels import kernel_part, vector
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
-NO_SIDE = 0  # for an event function that may cross zero either way
-ZERO_ROUNDING = 1e-14  # m, rad or their rates: smaller values of event functions are zero
-CLEARLY_MOVED = 1e-12  # same units: larger changes over a step are not rounding
+NO_SIDE = 0  # side of an event function that may cross zero in either direction
+ZERO_ROUNDING = 1e-14  # m, rad or their rates; smaller values of event functions count as zero
+CLEARLY_MOVED = 1e-12  # m, rad or their rates; larger changes over a step are not rounding
 
 
 @kernel_part
 def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
-    """Compute the height of the hip over the slope (m)."""
+    """Compute the height of the hip above the slope (m)."""
     height = y[1] if form.places > 0 else form.root_height
     for k in range(form.bodies):
         height += s[k] * form.hip_x[k] + c[k] * form.hip_y[k]
@@ -97,7 +97,7 @@ def sample_foot(
 
 @kernel_part
 def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
-    """Find the first event of the knees; returns the fraction of the step and the event."""
+    """Return the step's fraction (or NO_CROSSING) and the number of the knees' first event."""
     # a bent knee straightens, a knee in its stop turns back, or the stance foot stops sinking in and releases a knee
     best, event = NO_CROSSING, -1
     for knee in range(2):
@@ -121,7 +121,7 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
 def earliest_crossing(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Find the first event and its fraction of the step, or NO_CROSSING; `watch_order` includes PASSING."""
+    """Return the step's fraction (or NO_CROSSING) and the number of the first event; `watch_order` adds PASSING."""
     sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
     best, event = NO_CROSSING, -1
     for foot in range(2):
@@ -158,11 +158,11 @@ def earliest_crossing(
 
 @kernel_part
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
-    """Find the fraction of the step at which an event function leaves its stored side of zero."""
-    # It is 0 if the function is already on the other side, because the previous step, ended by another event, went past
-    # this zero or ended on it. For a function that is zero at the start, the direction of its change decides, unless it
-    # has moved by rounding alone: a foot just released from its hinge may still sink in. A function that its own event
-    # left at zero has already changed sides, so it returns only if it is on the other side throughout.
+    """Find the fraction of the step at which an event function leaves its side of zero, or NO_CROSSING."""
+    # The result is 0 if the function is already on the other side, because the previous step ended with another event
+    # past this zero or on it. If the function is zero at the start, the direction of its change decides, unless the
+    # change is mere rounding: a foot just released from its hinge may still sink in. If its own event left it at zero,
+    # its side has already changed, and the result is 0 only if it is on the other side at all nodes.
     value = finder.values[event, 0]
     at_zero = zero_at_start or abs(value) < ZERO_ROUNDING
     if side != NO_SIDE:

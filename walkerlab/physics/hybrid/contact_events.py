@@ -1,8 +1,8 @@
-"""Events of a walk on compliant ground, and the quantities they are judged by.
+"""Events of a walk on compliant ground, and the settings of their criteria.
 
-Events are numbered like the rows of the finder that hold their event functions: PER_FOOT rows for foot 0, as
-many for foot 1, then those of the walker and of its knees. Event `foot * PER_FOOT + HEIGHT` is a touch or a lift.
-They are module constants: kernels treat members of an IntEnum as objects, and compile a third longer.
+The number of an event is the row of its event function in the crossing finder: PER_FOOT rows for each foot, then rows
+for the walker and for its knees. Event `foot * PER_FOOT + HEIGHT` is a touch or a lift. The numbers are module
+constants because kernels treat members of an IntEnum as objects and compile a third longer with them.
 """
 
 from typing import NamedTuple
@@ -12,23 +12,23 @@ from walkerlab.physics.kernels import by_reference, kernel_part
 
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
-FRICTION_SWITCHES = 5  # up to four, of the friction law
-MATERIAL, VERTICAL_VELOCITY = 9, 10  # no events: position of the foot's material, and rate of its height
+FRICTION_SWITCHES = 5  # first of up to four switching points of the friction law
+MATERIAL, VERTICAL_VELOCITY = 9, 10  # position of the foot's material (m), which is no event; rate of its height (m/s)
 PER_FOOT = 11
 # event functions of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
-# event functions of both knees: angle beyond straight, and its rate
+# event functions of the knees, two rows each: angle beyond straight, and its rate
 EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
 EVENT_FUNCTIONS = SLIDE + 5
 PULSE_END = EVENT_FUNCTIONS  # has no event function: it is due at a fixed time
 NO_EVENT = -1
-LEGS_TURN = EVENT_FUNCTIONS  # row of the rate between the legs, which is no event
+LEGS_TURN = EVENT_FUNCTIONS  # row of the legs' relative angular velocity, which is no event
 EVENT_ROWS = EVENT_FUNCTIONS + 1
-FARTHEST_SLIDE = 0.25  # of the pitch, of a stance foot's material from where it touched
+FARTHEST_SLIDE = 0.25  # fraction of the pitch that a stance foot's material may slide from its touch
 
 
 class Frame(NamedTuple):
-    """Dimensions of the walker that events are judged by."""
+    """Dimensions of the walker, and a setting, that the criteria of events use."""
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)

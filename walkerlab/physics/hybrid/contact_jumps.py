@@ -32,15 +32,15 @@ from walkerlab.physics.solvers.system import Floats
 def change_form(
     walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, method: Any
 ) -> Floats:
-    """Return the state in the form after a knee's event and record the energy lost; replaces the state of `method`."""
-    # A lock is a plastic impact; a latch loses the energy held in its spring; a release changes no velocity. The
-    # tangent jumps, also at a step's touch if the hip torque changes legs. For a walker with a push-off, whose pulse
-    # starts at the touch, the tangent is afterwards that of walks that touch at the same time.
+    """Return the state in the walker's new form after an event; records the energy lost and updates the tangent."""
+    # A lock is a plastic impact, a latch loses the elastic energy of its stop, a release changes no velocity. The
+    # tangent jumps at all of these, and at a step's touch if the hip's torque then acts on the other leg. A push-off
+    # starts at that touch: the tangent of a walker with a push-off then compares walks that touch at the same time.
     y, t = method.y, float(method.clock[T])
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     x = to_full(before.form, y, size)
-    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch: the other leg was the stance leg
+    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # the touch ends a step: the other leg was the stance leg
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     locks = EXTENSION <= event < PULSE_END
     new = x

@@ -38,34 +38,34 @@ from walkerlab.physics.solvers.stepping import (
 NO_LIMIT = -1
 AT_LIFT = -2  # stop once the foot that carried the last step has lifted
 LONGEST_STEP = 10.0  # pendulum times within which a step must end
-LONGEST_FLIGHT = 0.25  # pendulum times without any foot on the ground
+LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-REWINDS = 24  # of one step; then its end is accepted as the event, which rounding moves at each attempt
-DOUBTS = 12  # rewinds of one step after which an event that its end does not confirm is dropped
+REWINDS = 24  # rewinds of one step after which its end counts as the event, which rounding moves at each attempt
+DOUBTS = 12  # rewinds of one step after which an event is dropped if the step's end does not confirm it
 
 
 @callable_kernel
 def scan(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Sample a step into `finder.values` and find its first event, as `earliest_crossing` does."""
+    """Sample all event functions on a step into `finder.values`, and return the result of `earliest_crossing`."""
     for node in range(finder.nodes.size):
         sample_event_functions(system, ground, walk_state, finder.states[node], node, finder)
     return earliest_crossing(system, ground, walk_state, watch_order, finder)
 
 
 class EventSearch(NamedTuple):
-    """State of the search for the time of an event, by steps that end at its expected time."""
+    """State of the search for an event's time, in which steps are made to end at the expected time."""
 
-    target: float  # s, end of the next step at the latest
-    event: int  # the event sought, or the last one
-    latest: float  # s, end of the step in which it appeared, which bounds the search
+    target: float  # s, latest end of the next step
+    event: int  # event that is being located, or the last event
+    latest: float  # s, end of the step in which the event appeared: upper bound of the search
     arriving: bool  # whether the target is the event's expected time
-    refinements: int  # corrections of that time
-    rewinds: int  # of the present step
-    stands: bool  # whether the last step is valid; if not it is repeated up to the new target
-    happens: bool  # whether the event is at the end of the step
+    refinements: int  # number of corrections of that time
+    rewinds: int  # number of rewinds of the present step
+    stands: bool  # whether the last step is valid; if not, it is repeated up to the new target
+    happens: bool  # whether the event happens at the end of the step
 
 
 @kernel
@@ -80,9 +80,9 @@ def walk_in_form(
 ) -> tuple[int, int]:
     """Walk until the walk state is full, the walk changes its form, the hinge is released, or the walk ends.
 
-    method  holds the start, and the end on return
-    until   number of steps after which it also stops when the feet pass each other; NO_LIMIT; or AT_LIFT: a walk whose
-            walk state is full continues until the foot that carried its last step has lifted
+    method  holds the start state, and the end state on return
+    until   NO_LIMIT; a number of steps, after which the walk also ends when the feet pass each other; or AT_LIFT: when
+            the walk state is full, the walk continues until the foot that carried the last step has lifted
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
@@ -124,7 +124,7 @@ def steps_are_left(walk_state: WalkState, until: int) -> bool:
 
 @kernel_part
 def seek(target: float, event: int) -> EventSearch:
-    """Start the search for the next event, with steps up to a time (s); `event` was the last one."""
+    """Start the search for the next event, with steps up to time `target` (s); `event` was the last event."""
     return EventSearch(target, event, target, False, 0, 0, False, False)
 
 
@@ -132,7 +132,7 @@ def seek(target: float, event: int) -> EventSearch:
 def aim(
     search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
 ) -> EventSearch:
-    """Decide whether the last step is valid and where the next must end; `fraction` is above 1 without an event."""
+    """Decide whether the last step is valid and when the next must end; a `fraction` above 1 means no event."""
     start, end = method.clock[T_OLD], method.clock[T]
     if fraction <= 1.0:
         return approach(search, walk_state, start, end, fraction, event)
@@ -145,7 +145,7 @@ def aim(
 def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
-    """Shorten the step from start to end (s) to its event, or accept it if the event, up to rounding, is at its end."""
+    """Shorten the step from `start` to `end` (s) so that it ends at its event, or accept it if it already does."""
     latest = search.latest if search.arriving else end
     refinements = search.refinements if search.arriving and event == search.event else 0
     wait = max(fraction * (end - start), EVENT_TIME)
@@ -153,10 +153,10 @@ def approach(
     if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
         return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
     if early and is_switching(event):
-        # the event function is not polynomial on this step; on half of it, it is closer to one
+        # the event function is too far from a polynomial on this step: try half the step
         if search.rewinds < REWINDS:
             return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
-        # nor on a short step: ignore this event, but no other event of the step
+        # a short step does not help either: ignore this event, but no other event of the step
         walk_state.progress.passes_switching = True
         return EventSearch(end, event, latest, False, 0, 0, False, False)
     return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
@@ -164,7 +164,7 @@ def approach(
 
 @kernel_part
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
-    """Let the event happen at the end of a step that just failed to reach it, or extend the step by `wait` (s)."""
+    """Decide after a step that just missed its event: accept the event, extend the step by `wait` (s), or drop it."""
     happens = abs(wait) <= EVENT_TIME
     doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
     target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
@@ -175,7 +175,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
 
 @kernel_part
 def forget_zeros(walk_state: WalkState, h: float) -> None:
-    """Clear the marks of event functions at zero after a step of h (s), so that each event is found once."""
+    """Clear `at_zero`, which keeps events from being found twice, unless the last step of h (s) was too short."""
     if h > 2.0 * EVENT_TIME:
         for i in range(walk_state.at_zero.size):
             walk_state.at_zero[i] = 0
@@ -201,7 +201,7 @@ def react(
         note_work(observer, system, method.y)
     if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
         return WALKED
-    # the tangent jumps with the motion: in a change of form, and where the hip's legs change roles
+    # the caller must apply the tangent's jumps: at changes of form, and where forces jump as the legs change roles
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return CHANGES_FORM
     if not is_switching(event):
@@ -216,13 +216,13 @@ def is_hinged(system: OnGround) -> bool:
 
 @kernel_part
 def jumps_at_touch(system: OnGround) -> bool:
-    """Whether a step's touch may change forces abruptly: the hip's legs change roles, or a push-off begins."""
+    """Whether forces may change abruptly at a step's touch: the legs change roles at the hip, or a push-off begins."""
     return is_sprung(system.form, HIP_ROW) or system.form.push_off != 0.0
 
 
 @kernel_part
 def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
-    """Compute the time (s) when the walk ends without an event (step or flight too long), or a pulse ends."""
+    """Compute the time (s) at which step or flight becomes too long, or the push-off ends if that is earlier."""
     by_step = walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time
     by_flight = walk_state.progress.airborne_since + LONGEST_FLIGHT * frame.pendulum_time
     left = pulse_left(system, t)
@@ -231,7 +231,7 @@ def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) ->
 
 @kernel_part
 def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
-    """Estimate the time (s) from the end of the last step to the zero of an event function, by its slope there."""
+    """Estimate the time (s) from the end of the last step to the zero of an event function, from its final slope."""
     last = finder.nodes.size - 1
     h = method.clock[T] - method.clock[T_OLD]
     change = finder.values[event, last] - finder.values[event, last - 1]
@@ -244,8 +244,8 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 @kernel_part
 def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
-    """End the walk if its flight or step is too long at time t (s); record the last time a foot was on the ground."""
-    # A foot that leaves at t still has ground here: the event at the step's end is applied later.
+    """Return the outcome if flight or step is too long at time t (s), or GOES_ON; updates `airborne_since`."""
+    # A foot that lifts at t still counts as on the ground, because the event at the step's end is applied later.
     grounded = is_hinged(system)
     for foot in range(2):
         grounded = grounded or (walk_state.has_ground[foot] != 0 and not is_above(walk_state, foot))

@@ -31,7 +31,7 @@ from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_cross
 from walkerlab.physics.solvers.radau5 import Radau5
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
 
-# the start of a step and the nodes of a Radau quadrature on it, with its weights
+# nodes of a Radau quadrature on a step, preceded by the start of the step, and their weights
 Quadrature = tuple[tuple[float, ...], tuple[float, ...]]
 OF_ORDER_5: Quadrature = (
     (0.0, 0.15505102572168219, 0.6449489742783178, 1.0),
@@ -46,21 +46,21 @@ OF_ORDER_9: Quadrature = (
 @by_reference
 class ContactSamples(NamedTuple):
     time_s: Any  # (samples,)
-    states: Any  # (samples, 4 + 2 n) of the whole walker
-    has_ground: Any  # (samples, 2)
-    stance: Any  # (samples,)
+    states: Any  # (samples, 4 + 2 n) states of the whole walker
+    has_ground: Any  # (samples, 2) whether each foot has ground
+    stance: Any  # (samples,) stance foot
     knees: Any  # (samples, 2) state of each knee
-    level: Any  # (samples, 2) m, height over the slope of the ground for each foot
-    account: Any  # (samples, entries) J
+    level: Any  # (samples, 2) m, height of the ground above the slope, for each foot
+    account: Any  # (samples, entries) J, energy account so far
 
     @property
     def dissipated_J(self) -> Any:
-        """Energy dissipated, (samples, 5), in the order of `energy_channels.LOSSES`."""
+        """Energy dissipated so far (samples, 5), in the order of `energy_channels.LOSSES`."""
         return self.account[:, LOSS_ENTRIES]
 
     @property
     def driven_J(self) -> Any:
-        """Energy supplied by push-off and hip, (samples, 2)."""
+        """Energy supplied so far by push-off and hip (samples, 2)."""
         return self.account[:, SUPPLY_ENTRIES]
 
 
@@ -68,12 +68,12 @@ class ContactSamples(NamedTuple):
 class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Counts, extremes and initial energy of a walk: a structured scalar that kernels write to."""
 
-    recorded: int  # samples
+    recorded: int  # number of samples recorded
     max_penetration: float  # m
-    residual: float  # J, the largest of the energy balance
-    start_energy: float  # J, with the potential energy from a fixed origin
-    energy_below: float  # J, with the potential energy from the slope below the walker
-    start_spring: float  # J, elastic energy of the hip's spring
+    residual: float  # J, largest residual of the energy balance
+    start_energy: float  # J, initial energy, with potential energy measured from a fixed origin
+    energy_below: float  # J, initial energy, with potential energy measured from the slope below the walker
+    start_spring: float  # J, initial elastic energy of the springs at the hinges
 
 
 CONTACT_TALLY = record_type(ContactTally, {})
@@ -85,8 +85,8 @@ class ContactObserver(NamedTuple):
 
     track_energy: bool  # whether to keep the energy balance
     samples: ContactSamples
-    account: Any  # (entries,) J, so far
-    account_at_touch: Any  # (entries,) J, until the last step's touch
+    account: Any  # (entries,) J, up to the present time
+    account_at_touch: Any  # (entries,) J, up to the last touch that ended a step
     tally: ContactTally
     tangent: Tangent  # derivative of the state with respect to the start; empty unless requested
 
@@ -95,7 +95,7 @@ class ContactObserver(NamedTuple):
 def observe(
     observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
 ) -> None:
-    """Record the last step, which is valid and whose event functions are sampled."""
+    """Record the last integration step; it must be valid, and its event functions must be sampled."""
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
         balance(observer, method, system)
@@ -130,7 +130,7 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
 
 @kernel_part
 def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
-    """Record works and losses of the last step and the energy residual at its end."""
+    """Record work and losses of the last integration step, and the energy residual at its end."""
     account = observer.account
     add_work_until(method, system, 1.0, account)
     lost = -account[PUSH_OFF] - account[HIP_WORK]
@@ -151,7 +151,7 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Record the work until the end of a step, which belongs to completed steps, including the hip's spring."""
+    """Copy the account at a step's touch, for the work in completed steps; hip work then includes the springs."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
     observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - spring_energy(system, y)
@@ -159,7 +159,7 @@ def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
 
 @kernel_part
 def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, foot: int) -> None:
-    """Record the penetration of a foot in the last step: at its end, or where the foot stopped sinking in."""
+    """Record the largest penetration of a foot in the last step: at its end, or where the foot stopped sinking in."""
     end, first = finder.nodes.size - 1, foot * PER_FOOT
     deepest = -finder.values[first + HEIGHT, end]
     if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
@@ -183,7 +183,7 @@ def end_energy(system: OnGround, y: Any) -> float:
 
 @by_type_or_default
 def quadrature(method: Any) -> Quadrature:
-    """Return the rule that integrates powers over a step of a method, as exact as the best dense output."""
+    """Return the quadrature rule for powers over a method's step, as accurate as the best dense output."""
     return OF_ORDER_9
 
 
@@ -194,7 +194,7 @@ def collocation_rule(method: Radau5) -> Quadrature:
 
 @kernel_part
 def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
-    """Add the works and losses (J) of the first `fraction` of the last step to an account (entries,)."""
+    """Add the work and losses (J) in the first `fraction` of the last integration step to an account (entries,)."""
     nodes, weights = quadrature(method)
     fractions, states = vector(nodes), matrix(OF_STATES)
     for i in range(len(nodes)):
@@ -214,7 +214,7 @@ def add_work(
     span: float,
     account: Any,
 ) -> None:
-    """Add works and losses (J) from `begin` on for a time `span` (s) to an account, with the states at the nodes."""
+    """Add the work and losses (J) from time `begin` (s) over `span` (s) to an account, from the states at the nodes."""
     for foot in range(2):
         if system.has_ground[foot] != 0:
             damping, friction = foot_work(system, states, weights, foot, span)
@@ -232,8 +232,8 @@ def add_work(
 @kernel_part
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
     """Compute the energies (J) lost to damping and friction under a foot with ground."""
-    # Where the force law has released the foot, the loss is the spring's energy: quadrature integrates its powers of
-    # the penetration badly, and steps end at the release.
+    # If the force law has released the foot, the damping loss is the energy that the ground's spring loses: quadrature
+    # would be inaccurate for powers of the penetration. Steps end at the release, so it holds throughout a step.
     damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])

@@ -1,4 +1,4 @@
-"""A whole walk on compliant ground: hinged first step if wanted, then free, with everything observed on the way."""
+"""A whole walk on compliant ground: an optional hinged first step, then the free walk, and the result of both."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -40,9 +40,9 @@ from walkerlab.physics.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RH
 from walkerlab.physics.solvers.system import Floats, State
 
 USUAL_STEP = 3.0  # pendulum times; most steps are shorter
-# Residuals over rtol times energy and work exchanged: random walks leave at most 0.5 by radau5 at any rtol from 1e-2 to
-# 1e-9 (scripts/contact_campaign.py prints those of its walks), and 9 by the libraries' multistep methods; cases of the
-# stability catalogue, of which ground of 1e14 N/m is the worst, leave at most 9.
+# Limit for the residual of the energy balance, divided by rtol times (energy + work exchanged). In random walks this is
+# at most 0.5 with radau5 for rtol from 1e-2 to 1e-9 (scripts/contact_campaign.py prints it), and at most 9 with the
+# libraries' multistep methods. In the stability catalogue it is at most 9; the worst case is ground of 1e14 N/m.
 UNEXPLAINED = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
 FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
@@ -52,8 +52,8 @@ FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines 
 class Stopped:
     outcome: Outcome
     time_s: float
-    state: State  # of the free walker with all bodies
-    work: NDArray[np.int64]
+    state: State  # state of the free walker with all bodies
+    work: NDArray[np.int64]  # (4,) counts, as in `stepping`
 
 
 def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
@@ -72,7 +72,7 @@ def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """Write `sample_energies`; `system` is free with all bodies, and its ground and knees are set to each sample's."""
+    """Fill in `sample_energies`; `system` is the free walker, and its ground and knees are set to each sample's."""
     for i in range(samples.states.shape[0]):
         for k in range(2):
             system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
@@ -97,15 +97,15 @@ def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None
 
 @dataclass(frozen=True, eq=False)
 class ContactWalkResult(WalkRecord):
-    """A walk on compliant ground."""
+    """Result of a walk on compliant ground."""
 
-    slip_m: Floats  # (steps,) of the stance foot's material; without the last step if its foot did not lift
-    rolling_m: Floats  # likewise, rolling of the stance foot
+    slip_m: Floats  # (steps,) slip of the stance foot's material; without the last step if its foot did not lift
+    rolling_m: Floats  # (steps,) rolling of the stance foot, for the same steps
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
     explained_residual_J: float  # largest residual that the tolerance explains
-    dissipated_J: Floats  # (5,)
+    dissipated_J: Floats  # (5,) in the order of `energy_channels.LOSSES`
     samples: ContactSamples | None
     method: str  # integration method
 
@@ -136,7 +136,7 @@ def new_observer(
     track_energy: bool = True,
     directions: int = 0,
 ) -> ContactObserver:
-    """Create an observer of a walk from y, with samples at rising `times` (s) and a tangent along some `directions`."""
+    """Create an observer of a walk from y, with samples at rising `times` (s) and a tangent of `directions` columns."""
     times = np.zeros(0) if times is None else times
     samples = times.size
     tally = new_record(CONTACT_TALLY)
@@ -158,7 +158,7 @@ def new_observer(
 
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
-    """Return the walker in its present form; it shares the memory of the walk state."""
+    """Return the walker in its present form, which shares memory with the walk state."""
     memory = walk_state
     return on_ground(walker, memory.has_ground, memory.knee, hinged, memory.level, memory.progress)
 
@@ -215,12 +215,12 @@ def walk_contact(
     steps: int,
     sampling: float | Floats | None,
 ) -> ContactWalkResult:
-    """Walk up to `steps` steps, the first carried by foot `stance`, which is hinged if `hinged`.
+    """Walk up to `steps` steps, the first on foot `stance`, which is hinged during that step if `hinged`.
 
-    start     state of the free walker (4 + 2 n); its angles and angular velocities start a hinged one
-    sampling  time between samples, their times (samples,), rising, in s, or None for no samples
+    start     state (4 + 2 n) of the free walker; a hinged step uses only its angles and angular velocities
+    sampling  sampling interval (s), rising sample times (samples,) in s, or None for no samples
 
-    A start with the hip already too low is rejected.
+    A start whose hip is already too low is rejected.
     """
     frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(walker.whole, start, s, c)
@@ -248,8 +248,8 @@ def run_parts(
     observer: ContactObserver,
     walk_state: WalkState,
 ) -> Stopped:
-    """Take the hinged step, if there is one, then the free walk."""
-    # A walk that completed all steps continues, unobserved, until the foot that carried the last one has lifted.
+    """Walk the hinged step, if there is one, and then the free steps."""
+    # A walk that completed all steps continues, unobserved, until the foot that carried the last step has lifted.
     y, spent = start, np.zeros(4, np.int64)
     if hinged:
         first = walk_on(walker, ground, tolerances, walk_state, observer, start, hinged=True)
@@ -267,13 +267,13 @@ def run_parts(
 
 
 def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
-    """Return dissipated energies (J) by name; the knees' channels only for a walker with knees."""
+    """Return dissipated energies (J) by name of the loss; losses in knees only for a walker with knees."""
     pairs = zip(LOSSES, dissipated.tolist(), strict=True)
     return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
 
 
 def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
-    """Release a hinged foot, which has neither slipped nor rolled, on the ground and about to lift."""
+    """Update the walk state for the release of a hinged foot: it has not slipped or rolled, and is at the surface."""
     foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
@@ -289,13 +289,13 @@ def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> flo
 
 def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:
     """Return the outcome of a walk, or `SOLVER_FAILED` if its energy balance does not close."""
-    # This detects faults and estimates no error: a walk may be off by far more than its balance.
+    # This detects faults but does not estimate errors: a walk's error may be far larger than its residual.
     closes = observer.tally.residual <= explained_residual(observer, tolerances)
     return Outcome(ended) if closes else Outcome.SOLVER_FAILED
 
 
 def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
-    """Gather the works over distances (m) along the slope and up; account (entries,) in J."""
+    """Gather the drives' work from the account (J), and gravity's over distances `along` the slope and `up` (m)."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
     return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
 

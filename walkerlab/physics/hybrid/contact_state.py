@@ -1,4 +1,4 @@
-"""State of a walk on compliant ground besides its coordinates: stance, contacts, sides of the event functions."""
+"""State of a walk on compliant ground apart from its coordinates: stance, contacts, signs of the event functions."""
 
 from typing import Any, NamedTuple
 
@@ -31,33 +31,33 @@ from walkerlab.physics.hybrid.contact_events import (
 from walkerlab.physics.kernels import by_reference, kernel_part
 from walkerlab.physics.solvers.system import State
 
-# release of the trailing knee: not due, as the leading foot stops sinking in, or as the push-off ends
+# release of the trailing knee: not due, due when the leading foot stops sinking in, due when the push-off ends
 NOT_DUE, AT_COMPRESSION, AT_PULSE_END = range(3)
-START_ROUNDING = 1e-14  # relative rounding of a start's coordinates and velocities
+START_ROUNDING = 1e-14  # relative rounding error of a start's coordinates and velocities
 
 
 @by_reference
 class WalkState(NamedTuple):
-    """State of a walk besides its coordinates, changed by events; the result is gathered from it."""
+    """State of a walk apart from its coordinates; events change it, and the result is gathered from it."""
 
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
-    touch_height: Any  # (steps,) m, of the foothold over the slope
-    slip: Any  # (steps,) m, net slip of each step's stance foot; of the last one up to now, while `is_to_lift`
-    rolling: Any  # (steps,) m, its rolling distance
+    touch_height: Any  # (steps,) m, height of the foothold above the slope
+    slip: Any  # (steps,) m, net slip of each step's stance foot; for the last step, slip up to now until the foot lifts
+    rolling: Any  # (steps,) m, rolling distance of each step's stance foot
     has_ground: Any  # (2,) whether there is ground under a foot
-    level: Any  # (2,) m, height over the slope of the ground for each foot
-    cells: Any  # (2,) cell of its lane below a foot
-    left_cells: Any  # (2,) cell of its last stance
-    foothold: Any  # (2,) m, position of its touch
-    touched: Any  # (2,) m, `material_along` of its touch
-    slipped: Any  # (2,) m, slip from its touch to its latest lift
-    rolled: Any  # (2,) m, its rolling distance
-    leaving: Any  # (2,) whether a foot has yet to lift from the step that it carried
+    level: Any  # (2,) m, height of the ground above the slope, for each foot
+    cells: Any  # (2,) cell below each foot, in the foot's lane
+    left_cells: Any  # (2,) cell of each foot's last stance
+    foothold: Any  # (2,) m, position of each foot's last touch
+    touched: Any  # (2,) m, `material_along` at each foot's last touch
+    slipped: Any  # (2,) m, slip of each foot from its last touch to its latest lift
+    rolled: Any  # (2,) m, rolling distance of each foot over the same time
+    leaving: Any  # (2,) whether a foot is the former stance foot and has not lifted yet
     knee: Any  # (2,) state of each knee
     knee_strike: Any  # (steps + 1,) s, time at which the knee of the step's swing leg locked; -1 if it has not
-    sides: Any  # (event functions,) side of zero of each event function
-    at_zero: Any  # (event functions,) whether the last event left it at zero
+    sides: Any  # (event functions,) side of zero on which each event function is: 1, -1, or 0 if not stored
+    at_zero: Any  # (event functions,) whether the last event left each event function at zero
     progress: WalkProgress
 
 
@@ -93,7 +93,7 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
 
 
 def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
-    """Return the state of each knee (2,): the stance leg's is locked, the other is not."""
+    """Return the state of each knee (2,) at the start: locked in the stance leg, released or bent in the swing leg."""
     knee = np.full(2, RELEASED, np.int8)
     if walker.kneed:
         knee[stance] = LOCKED
@@ -105,9 +105,9 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
 def initial_sides(
     walker: ContactWalker, feet: tuple[FootMotion, FootMotion], stance: int, y: State
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Return the side of zero of every event function at the start, and which are zero to rounding."""
-    # A function that is zero takes the side towards which its velocity points. If that is also zero, a foot on the
-    # ground counts as below it, and of feet side by side the stance foot as the one ahead.
+    """Return the side of zero of every event function at the start, and whether each is zero to rounding."""
+    # A function that is zero takes the side towards which its rate points. If the rate is also zero, a foot on the
+    # ground counts as below it, and the stance foot counts as ahead of a foot beside it.
     sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
     sides[[FALL, SLIDE]] = 1
     n, whole = int(walker.whole.bodies), walker.whole
@@ -125,7 +125,7 @@ def initial_sides(
 
 
 def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
-    """Return the side of zero of a value, or of its rate if it is zero to rounding; and whether it is zero."""
+    """Return the sign of a value, or of its rate if the value is zero to rounding; and whether the value is zero."""
     for value, scale in zip(value_and_rate, scales, strict=True):
         if abs(value) > START_ROUNDING * scale:
             return (1 if value > 0.0 else -1), value is not value_and_rate[0]
@@ -134,9 +134,9 @@ def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], 
 
 @kernel_part
 def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
-    """Compute where a foot at `along` (m) would be without rolling; its change is slip."""
-    # The velocity of the material point at the bottom of the ball is the contact point's plus radius times
-    # angular velocity, so its displacement is the contact point's plus radius times the change of the angle.
+    """Compute the position (m) that a foot at `along` (m) would have without rolling; its change is slip."""
+    # The velocity of the material point at the bottom of the ball is that of the contact point plus radius times
+    # angular velocity, so the displacements differ by radius times the change of the angle.
     for k in range(form.bodies):
         along += form.rolling[foot, k] * y[form.places + k]
     return along
@@ -149,16 +149,16 @@ def is_above(walk_state: WalkState, foot: int) -> bool:
 
 @kernel_part
 def is_ahead(walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot is further along than the other; valid where the order of the feet is watched."""
+    """Whether a foot is ahead of the other; valid only where the order of the feet is watched."""
     return (walk_state.sides[PASSING] > 0) == (foot == 1)
 
 
 @kernel_part
 def is_to_lift(walk_state: WalkState) -> bool:
-    """Whether the foot that carried the last step has yet to lift."""
+    """Whether the foot that carried the last step has not lifted yet."""
     return walk_state.leaving[1 - walk_state.progress.stance] != 0
 
 
 def steps_with_lift(walk_state: WalkState) -> int:
-    """Count the steps whose slip and rolling are complete, because their foot has lifted: all, or all but the last."""
+    """Count the steps whose stance foot has lifted, which completes slip and rolling: all, or all but the last."""
     return int(walk_state.progress.steps) - int(is_to_lift(walk_state))

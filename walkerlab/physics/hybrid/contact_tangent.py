@@ -1,9 +1,9 @@
 """Tangent of a walk on compliant ground: the variational equations along the steps taken.
 
 On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. It is solved by the three-stage Radau collocation
-method on the same step, with J at the stages: for radau5 that is the exact derivative of the step itself. The force law
-is continuous at its switching points and at touch and lift, so Phi does not jump there; it does where a knee locks or
-is released. A foot that leaves its pad under load would need a jump; no gait has one.
+method on the same step, with J at the stages: for radau5 this is the exact derivative of the step itself. The force law
+is continuous at its switching points and at touch and lift, so Phi jumps only in changes of form, see `contact_jumps`.
+A foot that leaves its pad under load would also need a jump, but that happens in no gait.
 """
 
 from typing import Any, NamedTuple
@@ -17,9 +17,9 @@ from walkerlab.physics.solvers.radau5 import RADAU_NODES
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate
 from walkerlab.physics.solvers.system import jacobian
 
-THIS_SIDE = 4e-12  # s, a few event-time uncertainties
+THIS_SIDE = 4e-12  # s, a few times the uncertainty of event times
 ROOT6 = 6.0**0.5
-# Radau IIA, Hairer and Wanner II (5.6)
+# coefficients of Radau IIA: Hairer and Wanner II, (5.6)
 RADAU_WEIGHTS = np.array(
     [
         [(88.0 - 7.0 * ROOT6) / 360.0, (296.0 - 169.0 * ROOT6) / 1800.0, (-2.0 + 3.0 * ROOT6) / 225.0],
@@ -31,13 +31,13 @@ RADAU_WEIGHTS = np.array(
 
 @by_reference
 class Tangent(NamedTuple):
-    """The derivative Phi, and workspace sized for the n values of the whole walker's state."""
+    """Derivative Phi of the state, and workspace for the n values of the whole walker's state."""
 
-    # While the walker moves as one of fewer bodies, only the first rows are used.
+    # In a form of the walker with fewer bodies, only the first rows are used.
 
     Phi: Any  # (n, directions); no directions unless the tangent is requested
-    stages: Any  # (4, n, n) Jacobians at the three stages, and one more to extrapolate with
-    system: Any  # (3 n, 3 n)
+    stages: Any  # (4, n, n) Jacobians at the three stages, and one more for extrapolation
+    system: Any  # (3 n, 3 n) matrix of the collocation equations, or its factors
     pivots: Any  # (3 n,)
     rates: Any  # (3 n,) stage derivatives of one direction
 
@@ -82,7 +82,7 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 
 @kernel_part
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
-    """Compute the Jacobian at the step's end from inside, extrapolated from two states shortly before."""
+    """Compute the Jacobian at the step's end, extrapolated from two states shortly before the end."""
     # A step that ends at a switching point of the force law may end on either side of it, and the Jacobian jumps there.
     near = min(0.25, THIS_SIDE / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
@@ -95,7 +95,7 @@ def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
 
 @kernel_part
 def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
-    """Advance one column of Phi (n,): stage derivatives K = J (Phi + h A K), then the step's sum."""
+    """Advance one column of Phi (n,): solve K = J (Phi + h A K) for the stage derivatives, then add their sum."""
     for i in range(3):
         for row in range(n):
             total = 0.0

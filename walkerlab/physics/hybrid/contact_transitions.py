@@ -49,16 +49,16 @@ from walkerlab.physics.hybrid.contact_state import (
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
 from walkerlab.physics.kernels import by_type_or_default, kernel_part
 
-STEP_AHEAD = 0.25  # of the pitch: least distance ahead at which a step lands
-AT_SURFACE = 1e-11  # m: distance from the surface within the error of an event's time
-TRIP = 0.25  # share of the pitch; a touch further than this from the last stance is a trip
+STEP_AHEAD = 0.25  # fraction of the pitch; a touch less than this ahead of the other foot ends no step
+AT_SURFACE = 1e-11  # m; a foot this close to the surface is on it, within the error of an event's time
+TRIP = 0.25  # fraction of the pitch; a foot that touches its old pad this far from where it stood has tripped
 
 
 @kernel_part
 def apply_event(
     system: OnGround, terrain: Terrain, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
-    """Apply an event to the walk state; returns an outcome if it ends the walk, else GOES_ON."""
+    """Apply an event to the walk state; returns an outcome if the event ends the walk, otherwise GOES_ON."""
     if event == FALL:
         return FELL
     if event == SLIDE:
@@ -73,7 +73,7 @@ def apply_event(
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
         outcome = GOES_ON
         for foot in range(2):
-            # equal legs of a hinged step pass on the surface: rounding must neither lift a foot nor hold it
+            # in a hinged step, equal legs pass with both feet at the surface; rounding must not decide which is above
             at_surface = abs(feet[foot].height) < AT_SURFACE
             above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
             find_ground(terrain, walk_state, foot, above)
@@ -123,7 +123,7 @@ def set_level(
     level: float,
     y: Any,
 ) -> None:
-    """Set the ground height (m) for a foot; the energy in its ground spring is lost."""
+    """Set the ground height (m) for a foot; the energy in the ground's spring under it is lost."""
     if level == walk_state.level[foot]:
         return
     height = motion.height + walk_state.level[foot] - level
@@ -136,7 +136,7 @@ def set_level(
 
 @kernel_part
 def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> bool:
-    """Whether an unloaded foot has yet to take the ground height of its next foothold."""
+    """Whether the ground under a swing foot must still be set to the height of its next foothold."""
     if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.progress.stance:
         return False
     level = foothold_height(terrain, walk_state.progress.steps + 1)
@@ -153,7 +153,7 @@ def set_foothold(
     foot: int,
     y: Any,
 ) -> int:
-    """Set the ground of a swing foot to the height of its next foothold; it carries once the foot has been above it."""
+    """Set a swing foot's ground to its next foothold's height; on an ordinary plane, a foot below it is stubbed."""
     set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
@@ -161,7 +161,7 @@ def set_foothold(
 
 @kernel_part
 def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
-    """Update whether there is ground below a foot in the air, after the feet change places or roles."""
+    """Update whether there is ground below a foot in the air, after the feet have changed places or roles."""
     if above:
         stands = foot == walk_state.progress.stance
         has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
@@ -177,7 +177,7 @@ def lift(
     foot: int,
     y: Any,
 ) -> None:
-    """Handle a foot that rises above the ground, from its stance or out of a scuff."""
+    """Handle a foot that rises above the ground, at the end of its stance or of a scuff."""
     stands = foot == walk_state.progress.stance
     if stands or walk_state.leaving[foot] != 0:
         note_slip(form, walk_state, feet, foot, y)
@@ -205,9 +205,9 @@ def touch(
     t: float,
     y: Any,
 ) -> int:
-    """Handle a foot that comes down on ground; returns an outcome if the walk ends."""
-    # The step ends if it is the swing foot, on another pad than it left and far enough ahead. A swing foot that comes
-    # down on the pad it left, away from where it stood, has tripped over it: it scuffs.
+    """Handle a foot that comes down on the ground; returns an outcome if the walk ends, otherwise GOES_ON."""
+    # The step ends if the swing foot comes down far enough ahead, on a pad other than the one it left. A swing foot
+    # that comes down on the pad it left, but far from where it stood, scuffs: it has tripped over the pad.
     stance = walk_state.progress.stance
     if walk_state.has_ground[foot] == 0:
         return GOES_ON
@@ -244,7 +244,7 @@ def touch(
 
 @by_type_or_default
 def catches(stop: Any) -> bool:
-    """Whether a knee locks as soon as it is straight; a compliant stop turns it back first."""
+    """Whether a knee locks as soon as it is straight; a compliant stop turns the knee back first."""
     return False
 
 
@@ -255,7 +255,7 @@ def lock_catches(stop: IdealLock) -> bool:
 
 @kernel_part
 def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
-    """Handle a knee that gets straight: it locks, or enters its stop, where it latches as it turns back."""
+    """Handle a knee's event: a straight knee locks or enters its stop; a knee that turns back in its stop latches."""
     if event < EXTENSION_RATE and not catches(stop):
         walk_state.knee[(event - EXTENSION) % 2] = STOPPING
         return
@@ -272,13 +272,13 @@ def release(walk_state: WalkState, knee: int) -> None:
 
 @kernel_part
 def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot may come down: its leg has no knee, or the knee is locked."""
+    """Whether a foot's leg is straight: it has no knee, or the knee is locked."""
     return not form.kneed or walk_state.knee[foot] == LOCKED
 
 
 @kernel_part
 def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
-    """Release the trailing knee after the touch, at once or when the leading foot stops sinking in."""
+    """Release the trailing knee at a touch, or set the time of its release: see `AT_COMPRESSION`, `AT_PULSE_END`."""
     if form.kneed:
         if form.release_at_touch and form.push_off != 0.0:
             walk_state.progress.release = AT_PULSE_END

@@ -1,4 +1,4 @@
-"""Codes with which kernels of both models report the end of a walk: outcomes, and the codes below for continuing."""
+"""Codes by which kernels of both models report how a walk ended, or, if negative, how it continues."""
 
 from walkerlab.outcome import Outcome
 
@@ -6,7 +6,7 @@ WALKED, FELL, OFF_PAD = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.OFF_
 LIFTED_OFF, SLID, NO_HEEL_STRIKE = int(Outcome.LIFTED_OFF), int(Outcome.SLID), int(Outcome.NO_HEEL_STRIKE)
 BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
 REJECTED, BENT_KNEE, STUBBED = int(Outcome.REJECTED), int(Outcome.BENT_KNEE), int(Outcome.STUBBED)
-GOES_ON = -1  # it has not ended
+GOES_ON = -1  # the walk has not ended
 CHANGES_FORM = -2  # a contact walk continues in another form: a knee locks or is freed, or the legs change roles
 KNEE_STRUCK = -3  # a rigid swing continues with a straight knee
-FALLEN_HIP = 0.5  # leg lengths: with the hip lower than this over the slope, the walker has fallen
+FALLEN_HIP = 0.5  # leg lengths; a walker whose hip is lower than this above the slope has fallen

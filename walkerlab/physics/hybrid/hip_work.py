@@ -11,11 +11,11 @@ from walkerlab.physics.mechanics.hinges import legs_apart
 from walkerlab.physics.solvers.events import CrossingFinder, first_crossing
 from walkerlab.physics.solvers.stepping import interpolate
 
-BEYOND = 1e-12  # fraction of a step by which the search for the next reversal starts after the last
+BEYOND = 1e-12  # fraction of a step after a reversal at which the search for the next reversal starts
 
 
 class TorqueWork(NamedTuple):
-    """Work of the torque (J)."""
+    """Work of the hip torque (J)."""
 
     net: float
     positive: float
@@ -23,7 +23,7 @@ class TorqueWork(NamedTuple):
 
 @kernel_part
 def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder, row: int, until: float) -> TorqueWork:
-    """Compute the work of the torque (N m) in the last step up to a fraction of it; the finder is overwritten."""
+    """Compute the work of `torque` (N m) in the last step up to fraction `until`; overwrites `row` of the finder."""
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)
@@ -39,6 +39,6 @@ def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder,
 
 @callable_kernel
 def sample_rates(system: Any, finder: CrossingFinder, row: int) -> None:
-    """Evaluate the rate between the legs at the nodes of a step."""
+    """Write the legs' relative angular velocity (rad/s) at the nodes of a step into `row` of the finder."""
     for node in range(finder.nodes.size):
         _, finder.values[row, node] = legs_apart(system, finder.states[node])

@@ -1,4 +1,4 @@
-"""Walks of the rigid model with their records, taken in blocks of a few dozen steps to save memory."""
+"""Recorded walks of the rigid model, simulated in blocks of a few dozen steps to save memory."""
 
 import math
 from collections.abc import Callable
@@ -40,41 +40,41 @@ from walkerlab.physics.solvers.system import State
 
 STEPS_AT_ONCE = 64
 BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance needs about 700
-MAX_FRICTION = 1.0  # coefficient; about that of rubber on dry concrete
-SAMPLES_PER_UNIT_TIME = 64  # in sqrt(L/g)
-CLOSEST_SAMPLES = 1e-2  # of the time between samples; one nearer to a heel strike is dropped
+MAX_FRICTION = 1.0  # friction coefficient, about as for rubber on dry concrete
+SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
+CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 
 
 class Samples(NamedTuple):
-    """Samples of a walk: a regular grid, and both sides of every heel strike."""
+    """Samples of a walk, on a regular grid and on both sides of every heel strike."""
 
-    time_s: Array  # (samples,) strictly rising; the state before a heel strike is one rounding earlier than after
+    time_s: Array  # (samples,) strictly rising; the sample before a heel strike is one float earlier than the one after
     state: Array  # (samples, 2 n) rad, rad/s, swing leg first
-    step: NDArray[np.int64]  # (samples,) from 0
+    step: NDArray[np.int64]  # (samples,) number of the step, from 0
     bent: NDArray[np.bool_]  # (samples,) whether the swing leg's knee is free
 
 
 @dataclass(frozen=True, eq=False)
 class RigidWalkResult(WalkRecord):
-    """A walk of the rigid model."""
+    """Result of a walk of the rigid model."""
 
     start: State
     before: Array  # (steps, 2 n) states just before the touches
-    after: Array  # (steps, 2 n) just after, roles changed
-    min_normal_force: float  # N, of the ground on the stance foot
-    max_friction_ratio: float  # tangential over normal force, where the ground pushes; 0 if nowhere
-    max_scuff_depth: float  # m, of the swing foot below the slope
-    min_normal_impulse: float | None  # N s, of the ground in a strike of knee or heel; None without a step
-    max_impulse_ratio: float  # tangential over normal impulse, where the ground pushes; 0 if nowhere
+    after: Array  # (steps, 2 n) states just after them, with the legs' roles exchanged
+    min_normal_force: float  # N, force of the ground on the stance foot
+    max_friction_ratio: float  # tangential over normal force while the ground pushes; 0 if it never pushes
+    max_scuff_depth: float  # m, depth of the swing foot below the slope
+    min_normal_impulse: float | None  # N s, normal impulse of the ground in a strike; None if no step was completed
+    max_impulse_ratio: float  # tangential over normal impulse while the ground pushes; 0 if it never pushes
     energy_balance_residual: float  # J, over all completed steps
     lost_in_strikes: float  # J
-    energy_drift: float  # J, range of the energy within a swing; the largest of all swings
-    mean_energy: float  # J, time mean; potential from the contact point at each step's touch
+    energy_drift: float  # J, largest range of the energy within a swing
+    mean_energy: float  # J, mean over time; potential energy from the contact point at the touch that begins each step
     samples: Samples | None
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """Ways in which this walk demands more of the ground than real ground provides."""
+        """Demands of this walk that real ground does not meet."""
         reasons = []
         if self.min_normal_force < 0.0:
             reasons.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
@@ -110,12 +110,12 @@ def take_walk(
 ) -> RigidWalkResult:
     """Walk `steps` steps from `start`, or until the walk ends, with a limited budget of evaluations per step.
 
-    advance      called with the number of further steps taken
-    heights      (steps + 1,) m, of the footholds over the slope, the start's first; None for even ground
-    step_length  m, of the gait; by default the start's foot distance. On uneven ground a foot that lands less than a
-                 quarter of it ahead of the other ends the walk as a fall
+    advance      called after each block with the number of steps taken in it
+    heights      (steps + 1,) m, heights of the footholds above the slope, the start's first; None for even ground
+    step_length  m, step length of the gait, by default the distance between the feet at the start. On uneven ground, a
+                 foot that lands less than a quarter of it ahead of the other foot ends the walk as a fall
 
-    A negative normal force does not stop the walk, since the model excludes lifting off, but sets the outcome.
+    A negative normal force does not stop the walk, since the model's feet cannot lift off, but it sets the outcome.
     """
     recorder = Recorder(walker, tolerances, start, sampled)
     recorder.heights = heights
@@ -135,7 +135,7 @@ def take_walk(
 
 
 class Recorder:
-    """Takes blocks of steps, and accumulates their records."""
+    """Recorder of a walk, which simulates blocks of steps and accumulates their records."""
 
     def __init__(self, walker: RigidModel, tolerances: Tolerances, start: State, sampled: bool) -> None:
         self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
@@ -146,7 +146,7 @@ class Recorder:
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS, len(walker.zero_state))
-        # a library's method runs in Python
+        # walks with a library's method run in Python
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
         self.numbers, self.kneed = len(walker.zero_state), walker.kneed
         self.seen = new_observer(np.zeros(0), self.numbers)
@@ -157,10 +157,10 @@ class Recorder:
         self.pieces: list[Samples] = []
 
     def walk_on(self, rises: Array) -> Outcome:
-        """Take up to `rises.size - 1` more steps; `rises` are the rises (m) of the footholds, the present one first."""
+        """Take up to `rises.size - 1` more steps; `rises` (m) begins with the rise to the present foothold."""
         steps = rises.size - 1
         seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
-        if self.sampled:  # enough for the longest steps
+        if self.sampled:  # enough samples for the longest steps
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
         observer = new_observer(times, self.numbers)
@@ -191,7 +191,7 @@ class Recorder:
         return Outcome(status)
 
     def _mean_energy(self, strikes: Array, after: Array) -> float:
-        """Compute the time mean of the energy (J), in each step measured from its contact point."""
+        """Compute the mean energy over time (J), with potential energy from the contact point at each step's touch."""
         zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
         if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
@@ -199,9 +199,9 @@ class Recorder:
         return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
 
     def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
-        """Compute the works over the completed steps, given that of gravity, and the energy residual (J)."""
-        # A push-off does its work before the strike, which loses part of it. With damping, the balance determines the
-        # damper's work, which the states before and after strikes do not give, so the residual is zero.
+        """Compute the work done in the completed steps and the energy residual (J); `gravity` is gravity's work (J)."""
+        # A push-off does its work before the strike, which loses part of it. The work of a damper does not follow from
+        # the states before and after strikes: it is determined by the energy balance, which leaves no residual.
         walker, rows = self.walker, range(len(self.walker.hinges))
         laws = [hinge_law(walker, row) for row in rows]
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
@@ -209,7 +209,7 @@ class Recorder:
         torque = float(laws[HIP_ROW].torque * (apart[1][HIP_ROW] - apart[0][HIP_ROW]).sum())
         stored = [hinge_energy(laws[row], apart[1][row]) - hinge_energy(laws[row], apart[0][row]) for row in rows]
         hip = torque - float(np.sum(stored))
-        # the springs' energy is counted among the works
+        # the energy of the springs is counted as work of the hip
         unsprung = walker.changed(laws=0.0) if walker.sprung else walker
         ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
         residual = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
@@ -219,7 +219,7 @@ class Recorder:
         return DrivenWork(weight, gravity, push, hip, torque, forward), abs(residual)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
-        """Merge the samples on the grid with both sides of the heel strikes."""
+        """Merge the samples on the grid with samples on both sides of the heel strikes."""
         count = int(observer.tally[()].recorded)
         grid = self.interval * np.arange(self.grid_index, self.grid_index + count, dtype=np.float64)
         self.grid_index += count
@@ -236,7 +236,7 @@ class Recorder:
         return Samples(time[order], state[order], step[order], bent[order])
 
     def finished(self, outcome: Outcome) -> RigidWalkResult:
-        if self.tally.duration == 0.0:  # a swing that begins observes its own start
+        if self.tally.duration == 0.0:  # no swing has begun, which would have observed the start
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:

@@ -1,8 +1,8 @@
-"""Walks of the rigid model side by side in lanes, each with its own step size; a lane takes a new start as a walk ends.
+"""Walks of the rigid model in parallel lanes, each with its own step size; a lane whose walk ends takes the next start.
 
-All lanes take a Runge-Kutta step together. A lane whose step may hold a heel strike or a fall is then treated alone:
-the event is located on the quintic Hermite interpolant of its event function, the step is repeated up to there, and a
-last Newton correction completes it. The result of a walk does not depend on the walks in the other lanes.
+All lanes take a Runge-Kutta step together. A lane whose step may contain a heel strike or a fall is then handled alone:
+the event is located on the quintic Hermite interpolant of its event function, the step is repeated up to the event, and
+a last Newton correction completes it. The result of a walk does not depend on the walks in other lanes.
 """
 
 import math
@@ -50,13 +50,13 @@ NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = (
 )  # s: next step, step tried last, time, time left for a heel strike
 ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = 20, 21, 22, 23, 24
 LANE_ROWS = 25
-SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of whole numbers
+SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of integers
 
 NOBODY = -1
 FIRST_LANE_STEP = 0.1  # pendulum times
-ARRIVAL_TIME = 1e-5  # pendulum times from the end of a step to the heel strike that a Taylor expansion bridges
+ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion takes the walk to a heel strike that is closer than this
 STRIKE_REFINEMENTS = 6
-MAX_TRIES = 20_000  # steps in one swing
+MAX_TRIES = 20_000  # attempted steps in one swing
 MIN_LANE_STEP = 1e-13  # pendulum times
 TINY_ERROR = 1e-300
 
@@ -70,20 +70,20 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    unpaired: float  # kg m^2; these values repeat the model's, so that loops need not load them
+    unpaired: float  # kg m^2; the values from this one to `lean` repeat the model's, so that loops need not load them
     mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2
     gravity_down: float
     slope: float  # rad
     lean: float  # rad
-    upright: float  # rad, the stance leg's angle from the slope's normal with the hip above its foot's centre
-    fallen: float  # rad from there, beyond which the hip is too low
+    upright: float  # rad, angle of the stance leg from the slope's normal that puts the hip above its foot's centre
+    fallen: float  # rad from `upright`; further than this the hip is too low
     pendulum_time: float  # s
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Return the model as one of two straight legs; None if it has more bodies."""
+    """Return a model of two straight legs with the values that lanes need; None if it has more bodies or knees."""
     if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y
@@ -104,7 +104,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
 
 @derivative.case(TwoLegs, forced_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
-    """Evaluate the equations of motion of rigid_model.py, written out for two bodies, with floats or lanes."""
+    """Evaluate the equations of motion of rigid_model.py, written out for two bodies, for floats or lanes."""
     R, along, down = system.radius, system.gravity_along, system.gravity_down
     s_1, c_1 = sine_cosine(y[0] + system.slope)
     s_2, c_2 = sine_cosine(y[1] + system.slope)
@@ -130,12 +130,12 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
 
 
 class LaneMemory(NamedTuple):
-    """Workspace of a batch besides its starts and results, for any number of walks."""
+    """Workspace of a batch, apart from its starts and results; its size does not depend on the number of walks."""
 
     rtol: float
     atol: float
-    rows: Any  # (ROWS, WIDTH)
-    slots: Any  # (2, WIDTH) index of the start, and steps taken
+    rows: Any  # (LANE_ROWS, WIDTH)
+    slots: Any  # (2, WIDTH) index of each lane's start, and number of steps taken
     finder: CrossingFinder
 
 
@@ -147,8 +147,8 @@ def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
 
 
 class Fates(NamedTuple):
-    outcome: Any  # (n,)
-    steps: Any  # (n,) taken
+    outcome: Any  # (n,) the outcome's number
+    steps: Any  # (n,) number of steps taken
 
 
 def new_fates(n: int) -> Fates:
@@ -157,12 +157,12 @@ def new_fates(n: int) -> Fates:
 
 @by_type
 def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
-    """Record a heel strike at time t (s) with state y after it; return GOES_ON or the outcome's number."""
+    """Record a heel strike at time t (s), with state y after it; return GOES_ON or the outcome's number."""
 
 
 @kernel
 def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, fates: Fates) -> None:
-    """Walk from starts (n, 4) with both feet on the slope, until the observer ends each walk or it ends by itself."""
+    """Walk from each start (n, 4), both feet on the slope, until the observer ends the walk or it ends by itself."""
     slots = memory.slots
     waiting = 0
     for lane in range(WIDTH):
@@ -185,7 +185,7 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
 
 @kernel_part
 def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
-    """Give a lane the next valid start; returns the number of starts used."""
+    """Give a lane the next valid start; returns the number of starts used so far."""
     while waiting < starts.shape[0]:
         y = (starts[waiting, 0], starts[waiting, 1], starts[waiting, 2], starts[waiting, 3])
         waiting += 1
@@ -224,7 +224,7 @@ def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     """Try a step in every lane and accept it where no event is possible; return whether some lane needs attention.
 
-    It does if its step may hold or has reached an event, if its time is over, or if steps are too many or too small.
+    A lane needs it if its step may contain or has reached an event, its time is over, or steps are too many or small.
     """
     rows = memory.rows
     y, k1 = load_state(rows, START_STATE), load_state(rows, START_RATE)
@@ -260,7 +260,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
 
 @kernel_part
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
-    """Compute a value that is positive where a step from y to `end` may hold a heel strike or a fall."""
+    """Compute a value that is positive where a step of h (s) from y to `end` may contain a heel strike or a fall."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
     start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
     guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
@@ -302,7 +302,7 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Apply the heel strike if the step has reached it, else set the step to the rest of the way."""
+    """Apply the heel strike if the step has reached it; otherwise set the next step to the remaining time."""
     rows, slots = memory.rows, memory.slots
     move_on(memory, lane)
     pendulum_time = walker.pendulum_time
@@ -327,7 +327,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
 
 @kernel_part
 def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
-    """Write the state a short time later into y by a Taylor expansion, of second order in the angles of the guard."""
+    """Write the state after a short `wait` (s) into y, by a Taylor expansion of second order in the angles."""
     for i in range(2):
         omega, alpha = rows[START_STATE + 2 + i, lane], rows[START_RATE + 2 + i, lane]
         y[i] = rows[START_STATE + i, lane] + wait * (omega + 0.5 * wait * alpha)
@@ -346,7 +346,7 @@ def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) 
 
 @kernel_part
 def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
-    """Interpolate swing theta_1 + stance theta_2 + constant over a lane's step."""
+    """Interpolate swing theta_1 + stance theta_2 + constant over a lane's step by a quintic."""
     rows = memory.rows
     a = event_function(rows, START_STATE, lane, swing, stance)
     b = event_function(rows, END_STATE, lane, swing, stance)
@@ -355,7 +355,7 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
 
 @kernel_part
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Find the fraction of a lane's step of the heel strike with the leg ahead, or NO_CROSSING."""
+    """Find the fraction of a lane's step at which the heel strikes with the swing leg ahead, or NO_CROSSING."""
     guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
     at_start = memory.rows[FIRST_TRY, lane] > 0.0
     strike = first_fall(memory.finder, guard, at_start, 0.0)
@@ -369,7 +369,7 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
 
 @kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Find the fraction of a lane's step at which the hip falls below half a leg, or NO_CROSSING if it ends above."""
+    """Find the fraction of a lane's step at which the hip gets too low, or NO_CROSSING if it ends high enough."""
     from_upright = walker.slope - walker.upright
     angle = memory.rows[END_STATE + 1, lane] + from_upright
     if abs(angle) <= walker.fallen:

@@ -14,14 +14,14 @@ from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWIN
 
 
 def energies(walker: RigidModel, states: Array) -> Array:
-    """Compute kinetic and potential energy (samples, 2) of states (samples, 2 n) in J, from the current stance foot."""
+    """Compute kinetic and potential energy (samples, 2), J, of states (samples, 2 n), relative to the stance foot."""
     out = np.zeros((len(states), 2))
     fill_energies(walker, np.ascontiguousarray(states), out)
     return out
 
 
 def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
-    """Compute the ground force on the stance foot (samples, 2) in N: along the slope, and normal to it."""
+    """Compute the force on the stance foot (samples, 2), N, along and normal to the slope; `bent` marks a free knee."""
     out = np.zeros((len(states), 2))
     free = np.zeros(len(states), np.bool_) if bent is None else bent
     fill_reactions(walker, np.ascontiguousarray(states), free, out)
@@ -42,19 +42,19 @@ def fill_reactions(walker: RigidModel, states: Any, bent: Any, out: Any) -> None
 
 @dataclass(frozen=True)
 class Places:
-    """Points of the walker at each sample, in m along the slope from the first foothold and over it."""
+    """Points of the walker at each sample (m): along the slope from the first foothold, and height above the slope."""
 
     contact: Array  # (samples, 2) contact point of the stance foot
     hip: Array  # (samples, 2)
-    swing_foot: Array  # (samples, 2) its lowest point
-    knees: Array | None  # (samples, 2, 2) of swing and stance leg; None without knees
+    swing_foot: Array  # (samples, 2) lowest point of the swing foot
+    knees: Array | None  # (samples, 2, 2) knees of swing and stance leg; None for legs without knees
 
 
 class FootholdsOfWalk(NamedTuple):
-    """Footholds of a walk, beginning with the start's."""
+    """Footholds of a walk, beginning with the one at the start."""
 
     along_m: Array  # (steps + 1,) along the slope
-    height_m: Array  # (steps + 1,) over it
+    height_m: Array  # (steps + 1,) above the slope
     set_down_rad: Array  # (steps + 1,) angle of the leg from the vertical as its foot is set down
 
 
@@ -70,7 +70,7 @@ def places(
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute the walker's points at angles (samples, n) in rad, swing leg first; `knee_m` is in the thigh's frame."""
+    """Compute the walker's points at angles (samples, n), rad, swing leg first; `knee_m` is in the thigh's frame."""
     psi = angle + walker.slope
     rolled = -walker.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
     contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))
@@ -86,7 +86,7 @@ def places(
 
 
 def rotate_levers(psi: Array, lever_x: Any, lever_y: Any) -> Array:
-    """Sum the bodies' levers, rotated by their angles psi (samples, n) from the slope's normal: (samples, 2)."""
+    """Sum the bodies' levers (samples, 2), rotated by the angles psi (samples, n) from the slope's normal."""
     s, c = np.sin(psi), np.cos(psi)
     x, y = np.array(lever_x), np.array(lever_y)
     return np.column_stack((c @ x - s @ y, s @ x + c @ y))

@@ -1,4 +1,4 @@
-"""Records of a rigid walk besides its heel strikes: samples, energies, and how far the model's assumptions hold."""
+"""Records of a rigid walk besides its heel strikes: samples, energies, and extremes that test model assumptions."""
 
 from typing import Any, NamedTuple
 
@@ -27,18 +27,18 @@ class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of 
     current swing. `strike_loss` and `forward_work` cover completed steps, `step_*` the current step.
     """
 
-    recorded: int  # samples
+    recorded: int  # number of samples recorded
     min_normal_force: float  # N
     max_friction_ratio: float  # tangential over normal force
     max_scuff_depth: float  # m
-    energy_drift: float  # J, the largest of all swings
-    min_impulse: float  # N s, normal
+    energy_drift: float  # J, largest range of the energy within a swing
+    min_impulse: float  # N s, normal impulse of the ground in a strike
     max_impulse_ratio: float  # tangential over normal impulse
     min_energy: float  # J
     max_energy: float  # J
-    energy: float  # J, the latest
-    energy_integral: float  # J s, over the walk
-    duration: float  # s, of the walk
+    energy: float  # J, latest value
+    energy_integral: float  # J s, time integral of the energy over the walk
+    duration: float  # s, duration of the walk
     strike_loss: float  # J, kinetic energy lost in strikes
     forward_work: float  # J, positive work of the hip's constant torque
     step_strike_loss: float  # J
@@ -54,8 +54,8 @@ class Observer(NamedTuple):
 
     watching: bool
     times: Any  # (samples,) s, rising
-    states: Any  # (samples, 2 n), or longer with tangent columns, at fixed time since the heel strike
-    steps: Any  # (samples,) the step of each sample
+    states: Any  # (samples, 2 n), followed by any tangent columns, which are at fixed time since the heel strike
+    steps: Any  # (samples,) number of the step of each sample
     tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a step
 
 
@@ -71,7 +71,7 @@ def unwatched() -> Observer:
 
 @kernel_part
 def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
-    """Record the start of a swing, whose energy the swing must keep."""
+    """Record the start of a swing, with the energy that the swing must conserve."""
     if observer.watching:
         start = y[: len(mode.model.zero_state)]  # without tangent columns
         kinetic, potential = energies(mode.model, start)
@@ -106,7 +106,7 @@ def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, afte
 
 @kernel_part
 def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
-    """Return pull of the ground (N), friction ratio and depth of the swing foot (m): see section 3.1 of the paper."""
+    """Return the ground's pull (N), the friction ratio and the swing foot's depth (m); see section 3.1 of the paper."""
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
     return -normal, ratio, -swing_foot(mode.model, y)[0]
@@ -140,7 +140,7 @@ def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float
 
 @kernel_part
 def vertex(before: float, middle: float, after: float) -> float:
-    """Maximum (-1 to 1) of the parabola through values at -1, 0 and 1; 2 if it has none there."""
+    """Find the position of the maximum of the parabola through values at -1, 0 and 1; 2 if it has no maximum."""
     bend = before - 2.0 * middle + after
     return 0.5 * (before - after) / bend if bend < 0.0 else 2.0
 
@@ -149,7 +149,7 @@ def vertex(before: float, middle: float, after: float) -> float:
 def ascend_to_worst(
     tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
-    """Follow a measure to its maximum near fraction `middle` of the step, below `last`, by ever narrower parabolas."""
+    """Record a measure's maximum near fraction `middle` of the step, below `last`, found by ever narrower parabolas."""
     for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
         centre = assumptions_at(method, mode, middle)

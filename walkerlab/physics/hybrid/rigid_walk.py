@@ -60,35 +60,35 @@ from walkerlab.physics.solvers.system import derivative
 
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
-SHORTEST_LANDING = 0.25  # of the gait's step length, ahead of the stance foot, on uneven ground
-SEARCH_START = 1e-6  # fraction of the first step; a straight knee at rest crosses by rounding within 1e-9 of it
+SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground a foot must land at least this far ahead
+SEARCH_START = 1e-6  # fraction of the first step; before 1e-9, rounding makes a straight knee at rest cross zero
 # event functions, rows of the finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
-LEG_RATE = 4  # no event: the rate between the legs
+LEG_RATE = 4  # row of the legs' relative angular velocity, which is no event
 EVENTS = 5
 
 
 @kernel_part
 def is_bent(system: Mode) -> bool:
-    """Whether a knee is free, so that its strike ends the phase."""
+    """Whether the swing knee is free, so that a knee strike ends the phase."""
     return system.phase == BENT and system.model.shank != NO_SHANK
 
 
 @kernel_part
 def knee_angle(model: RigidModel, y: Any, first: int) -> float:
-    """Return the swing shank's angle beyond its thigh from y[first] on, negative while flexed (rad); or its rate."""
+    """Return the angle of the swing knee beyond straight (rad), from angles at y[first] on; or its rate, from rates."""
     return y[first + model.shank] - y[first + model.thigh]
 
 
 @kernel_part
 def hip_above_fall(model: RigidModel, y: Any) -> float:
-    """Compute the height of the hip over the slope above the limit of a fall (m)."""
+    """Compute the height (m) of the hip above the limit below which the walker has fallen."""
     return hip_height(model, y) - FALLEN_HIP * model.leg_length
 
 
 @kernel_part
 def may_end(system: Mode, method: Any, at_start: bool) -> bool:
-    """Whether the last step may hold an event, from values and rates at its ends: false through most of a swing."""
+    """Whether the last step may contain an event, from values and rates at its ends; false for most of a swing."""
     model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
     if hip_above_fall(model, y) < 0.0:
         return True
@@ -105,10 +105,10 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 
 @kernel_part
 def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute the heel strike's event function, one that is positive with the swing foot ahead, and the rates of both.
+    """Compute the heel strike's event function, a function that is positive with the swing foot ahead, and their rates.
 
-    For a straight leg over even ground both are linear in the angles, so that scuffing near mid-swing is no zero.
-    Otherwise they are the foot's height over its next foothold and its distance ahead. `turn` (n,): rates or a column.
+    For a straight leg on even ground both functions are linear in the angles, so scuffing near mid-swing is no zero.
+    Otherwise they are the foot's height above its next foothold and its distance ahead. `turn` (n,): rates or a column.
     """
     model, swing, stance = system.model, turn[SWING], turn[STANCE]
     if is_bent(system) or system.rise != 0.0:
@@ -119,10 +119,10 @@ def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float,
 
 @kernel_part
 def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_start: bool = False) -> Any:
-    """Compute bounds of an event function within a step, from its values and rates per step at the ends.
+    """Compute bounds of an event function within a step from its values, and its rates per step, at both ends.
 
-    They are the bounds of the Bernstein coefficients of Hermite's cubic, widened by an eighth of their spread, far more
-    than the cubic's error. With `zero_at_start` the first coefficient is left out, which divides out that zero.
+    These are the bounds of the Bernstein coefficients of Hermite's cubic, widened by an eighth of their spread, far
+    more than the cubic's error. With `zero_at_start` the first coefficient is left out to divide out that zero.
     """
     second, third = start + start_rate / 3.0, end - end_rate / 3.0
     first = second if zero_at_start else start
@@ -142,7 +142,7 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
 
 @callable_kernel
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """Find the fractions of a sampled step of the heel strike ahead, the fall, and the knee strike."""
+    """Find the fractions of a sampled step at which heel strike ahead, fall and knee strike happen, or NO_CROSSING."""
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
@@ -159,10 +159,10 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
 def take_step(
     model: RigidModel, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
-    """Take one step from time t (s): a swing and its heel strike, after which y holds the state and tangent columns.
+    """Take one step from time t (s): a swing and its heel strike; y then holds the state after it and tangent columns.
 
-    Returns WALKED and the time of the heel strike, with the state before it in the method; or another outcome and its
-    time. The time of the knee strike is written into `strikes`.
+    Returns WALKED and the time of the heel strike, and leaves the state before it in `method`; or another outcome and
+    its time. The time of the knee strike is written into `strikes`.
     """
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
     phase = BENT if model.shank != NO_SHANK else STRAIGHT
@@ -186,7 +186,7 @@ def take_step(
 def swing_phase(
     method: Any, system: Mode, finder: CrossingFinder, observer: Any, t: float, y: Any, latest: float, step: int
 ) -> int:
-    """Integrate up to the strike of knee or heel that ends a phase, or to the time `latest` (s)."""
+    """Integrate up to the knee or heel strike that ends a phase, or to the time `latest` (s)."""
     # A phase starts on the strike that ended the previous one; that zero is ignored.
     limit, coming = latest, False
     at_start = is_bent(system) or system.model.shank == NO_SHANK
@@ -234,9 +234,9 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
 def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> float:
     """Apply the strike at the end of a phase, after a last Newton correction of its time; return that time (s).
 
-    The method then holds the state before the strike, `new` the state after it, and `strikes` the columns' waits. A
-    column Phi also moves with the strike's time (saltation): J (Phi + f wait), minus f+ wait after a knee strike. After
-    a heel strike it stays on the section.
+    Afterwards `method` holds the state before the strike, `new` the state after it, and `strikes` the waits of tangent
+    columns. A column Phi becomes J (Phi + f wait) at a heel strike, which keeps it on the section, and J (Phi + f wait)
+    - f+ wait at a knee strike (saltation). f, f+: rates before and after the strike; J: derivative of the jump.
     """
     model, y, waits = system.model, method.y, strikes.waits
     n, knee = len(model.arm_x), is_bent(system)
@@ -276,13 +276,13 @@ class HeelStrikes(NamedTuple):
     """Heel strikes of a walk, step by step; states include the tangent columns of the walk."""
 
     time: Any  # (steps,) s
-    before: Any  # (steps, m) states just before them
-    after: Any  # (steps, m) just after, roles changed
-    knee_time: Any  # (steps,) s, of the knee strikes before them, if there are knees
-    rise: Any  # (steps + 1,) m, input: each foothold over the one before, the present one first
-    nearest: float  # m, ahead of the stance foot: a foot that lands nearer ends the walk; 0 on even ground
-    lift: Any  # (steps + 1, columns) m, input: change of each rise along each column
-    waits: Any  # (steps, columns) s, change of each step's duration along each column
+    before: Any  # (steps, m) states just before the strikes
+    after: Any  # (steps, m) states just after them, with the legs' roles exchanged
+    knee_time: Any  # (steps,) s, times of the knee strikes; empty without knees
+    rise: Any  # (steps + 1,) m, input: rise of each foothold from the one before, beginning with the present one
+    nearest: float  # m, a foot that lands less than this ahead of the stance foot ends the walk; 0 on even ground
+    lift: Any  # (steps + 1, columns) m, input: derivative of each rise in each column's direction
+    waits: Any  # (steps, columns) s, derivative of each step's duration in each column's direction
 
 
 def new_heel_strikes(
@@ -301,8 +301,8 @@ def walk(
 ) -> tuple[int, int]:
     """Walk until `strikes` is full or the walk ends; return the outcome's number and the number of steps taken.
 
-    walker  (), a RigidModel in an array, which compiled code receives ten times faster than a tuple
-    y       (m,) state at time 0, with tangent columns if the method has room for them; overwritten with the last one
+    walker  RigidModel in an array of shape (), which compiled code receives ten times faster than a tuple
+    y       (m,) state at time 0, with tangent columns if the method has room for them; overwritten with the last state
     """
     model = walker[()]
     t = 0.0

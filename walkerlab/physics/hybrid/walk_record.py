@@ -1,4 +1,4 @@
-"""Result fields of a walk that both models share."""
+"""Fields that results of both models share."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class WalkWork(NamedTuple):
-    """Cost of a walk, in the order of the methods' counters."""
+    """Computational cost of a walk, in the order of the methods' counts."""
 
     rhs_evaluations: int
     accepted: int
@@ -21,14 +21,14 @@ class WalkWork(NamedTuple):
 
 
 class DrivenWork(NamedTuple):
-    """Work during the completed steps, and the weight carried."""
+    """Work done on the walker during the completed steps, and the walker's weight."""
 
     weight: float  # N
-    gravity: float  # J, from the first foothold to the last, along the slope and over uneven ground
+    gravity: float  # J, work from the first foothold to the last, along the slope and over uneven ground
     push_off: float  # J
-    hip: float  # J, of spring, damper and torque
-    hip_torque: float  # J, the constant torque's part of that
-    hip_torque_positive: float  # J, its positive work alone
+    hip: float  # J, work of the hip's spring, damper and torque
+    hip_torque: float  # J, part of the hip's work that the constant torque does
+    hip_torque_positive: float  # J, positive work of the constant torque
 
     @property
     def net_work(self) -> float:
@@ -36,32 +36,32 @@ class DrivenWork(NamedTuple):
         return self.gravity + self.push_off + self.hip
 
     def per_step(self, steps: int) -> dict[str, float]:
-        """Compute the mean work per step (J) by source; the hip torque's are parts of the hip's."""
+        """Compute the mean work per step (J) by source; the hip's work includes the work of its torque."""
         return {name: getattr(self, name) / steps for name in self._fields if name != "weight"}
 
     def cost_of_transport(self, distance: float) -> float:
         """Compute the work spent divided by weight times distance (m) along the slope."""
-        # A spring returns the energy it stores; work against gravity is already counted in that of the drives.
+        # A spring returns the energy it stores; work against gravity is already part of the drives' work.
         return (max(0.0, self.gravity) + self.push_off + self.hip_torque_positive) / (self.weight * distance)
 
 
 def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
-    """Draw heights (steps + 1,) in m of the footholds of rough ground, independent and normal; the start's is zero."""
-    # The first heights do not depend on the number drawn.
+    """Draw heights (steps + 1,), m, of the footholds of rough ground: the first is 0, the rest normally distributed."""
+    # The first heights do not depend on the number of heights.
     return np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, steps))
 
 
 @dataclass(frozen=True, eq=False)
 class WalkRecord:
-    """Steps, outcome and cost of a walk, SI units. A step ends as the swing foot touches the ground."""
+    """Steps, outcome and cost of a walk, SI units. A step ends when the swing foot touches the ground."""
 
     outcome: Outcome
     touch_time_s: Array  # (steps,)
     touch_along_m: Array  # (steps,) along the slope from the first foothold
-    knee_strike_time_s: Array | None  # (steps,) of the swing leg's knee, nan if it did not lock; None without knees
-    end_time_s: float  # of the walk, which may end after the last touch
+    knee_strike_time_s: Array | None  # (steps,) when the swing knee locked, nan if it did not; None without knees
+    end_time_s: float  # end of the walk, which may be later than the last touch
     work: WalkWork
-    foothold_height_m: Array | None  # (steps,) over the slope, where each touch is; None on even ground
+    foothold_height_m: Array | None  # (steps,) height above the slope at each touch; None on even ground
     driven: DrivenWork
 
     @property
@@ -80,17 +80,17 @@ class WalkRecord:
 
     @property
     def lengths_m(self) -> Array:
-        """Distance along the slope of each step from touch to touch, (steps,); the first from the first foothold."""
+        """Distances (steps,) along the slope from touch to touch, the first one from the first foothold."""
         return np.diff(self.touch_along_m, prepend=0.0)
 
     @property
     def ground_m(self) -> Array:
-        """Heights over the slope of the footholds, the start's first, (steps + 1,)."""
+        """Heights (steps + 1,) of the footholds above the slope, the start's first."""
         heights = np.zeros(self.steps) if self.foothold_height_m is None else self.foothold_height_m
         return np.append(0.0, heights)
 
     @property
     def knee_strikes_s(self) -> Array:
-        """Times at which knees locked, (strikes,)."""
+        """Times (strikes,) at which knees locked."""
         times = self.knee_strike_time_s
         return np.zeros(0) if times is None else times[~np.isnan(times)]

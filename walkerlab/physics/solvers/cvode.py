@@ -21,7 +21,7 @@ def is_installed() -> bool:
 
 
 class CvodeSolver:
-    """Integration step by step, with the fields and methods of `scipy.integrate.OdeSolver`."""
+    """CVODE integrator that advances step by step, with the fields and methods of `scipy.integrate.OdeSolver`."""
 
     def __init__(
         self,

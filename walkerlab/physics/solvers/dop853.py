@@ -38,7 +38,7 @@ from walkerlab.physics.solvers.system import Floats, block, derivative
 SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
 EXPONENT = 1.0 / 8.0
 STAGE_COUNT, EXTRA_STAGES = 12, 3
-# row of the derivative at the step's end; rows with dense output
+# row of the derivative at the step's end; number of rows with dense output
 LAST_STAGE, ALL_STAGES = STAGE_COUNT, STAGE_COUNT + 1 + EXTRA_STAGES
 
 
@@ -78,7 +78,7 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
 
 @kernel_part
 def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int, end: int) -> None:
-    """Evaluate stages first to end - 1 of the step from `y_old` at time t over h; `at` keeps the state of the last."""
+    """Evaluate stages `first` to `end - 1` of a step of h from `y_old` at time t (s); `at` keeps the last state."""
     y, at, K = method.y_old, method.at, method.stages
     total = vector(block(system))
     width = len(total)
@@ -99,7 +99,7 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
 
 @kernel_part
 def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
-    """Compute the step from `y_old` over h into `y`; returns its error relative to the tolerance, (10.17)."""
+    """Compute a step of h (s) from `y_old` into `y`; returns its error relative to the tolerance, equation (10.17)."""
     y_old, y, at, K = method.y_old, method.y, method.at, method.stages
     evaluate_stages(method, system, t, h, 1, LAST_STAGE + 1)
     by_order_5, by_order_3 = vector(block(system)), vector(block(system))
@@ -127,7 +127,7 @@ def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
 
 @kernel_part
 def scaled_norm(method: Dop853, v: Any) -> float:
-    """Norm of v with each component divided by its tolerance at the current state."""
+    """Compute the norm of v with each component divided by its tolerance at the current state."""
     total = 0.0
     for i in range(v.size):
         relative = v[i] / (method.atol + method.rtol * abs(method.y[i]))
@@ -137,7 +137,7 @@ def scaled_norm(method: Dop853, v: Any) -> float:
 
 @kernel_part
 def change_of_step(error: float) -> float:
-    """Factor from a step with this error to the next; the eighth root is three square roots."""
+    """Compute the ratio of the next step to a step with this error; three square roots give the eighth root."""
     return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))
 
 
@@ -209,7 +209,7 @@ def rewind_dop853(method: Dop853, system: Any) -> None:
 
 @prepare_dense.case(Dop853)
 def prepare_dense_dop853(method: Dop853, system: Any) -> None:
-    """Evaluate three more stages and the coefficients of degree 7."""
+    """Evaluate three more stages and the coefficients of the dense output."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     evaluate_stages(method, system, t, h, LAST_STAGE + 1, ALL_STAGES)
     y_old, y, K, dense = method.y_old, method.y, method.stages, method.dense

@@ -1,8 +1,8 @@
 """Coefficients of DOP853, the explicit Runge-Kutta pair of order 8(5,3) of Dormand and Prince.
 
-Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), section II.5 and II.6, and
+Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), sections II.5 and II.6, and
 the authors' Fortran code dop853.f. Rows are named as in the book: A_s holds the weights of the stages before stage s,
-A_13 those of the solution of order 8. `nonzero` drops unused weights.
+A_13 the weights of the solution of order 8. `nonzero` drops unused weights.
 """
 
 # fmt: off

@@ -1,8 +1,8 @@
 """Zero crossings of event functions within a step, including several crossings in one step.
 
 An event function on a step is a polynomial through its values on the dense output. A polynomial in Bernstein form lies
-in the hull of its coefficients: coefficients of one sign prove that there is no crossing, and bisection isolates the
-crossings otherwise. A sign check at the ends of a step would miss double crossings.
+in the hull of its coefficients: coefficients of one sign prove that there is no crossing; otherwise bisection isolates
+the crossings. A sign check at the ends of a step would miss double crossings.
 
 A crossing is a change of sign; an event function that touches zero and turns back does not cross. The last event leaves
 its event function at zero. This zero at the start is divided out, so that it is not found again and does not hide a
@@ -22,8 +22,8 @@ from walkerlab.physics.kernels import by_reference, kernel_part
 NO_CROSSING = 2.0
 FALLING, RISING = -1, 1
 MIN_PIECE = 2.0**-48
-ROOT_RESOLUTION = 2.0**-52  # of a crossing within its piece
-DEPTH = 64  # pieces on the stack
+ROOT_RESOLUTION = 2.0**-52  # resolution of a crossing, as a fraction of its piece
+DEPTH = 64  # maximum number of pieces on the stack
 
 
 @by_reference
@@ -32,8 +32,8 @@ class CrossingFinder(NamedTuple):
 
     nodes: Any  # (degree + 1,)
     to_bernstein: Any  # (degree + 1, degree + 1) maps values at the nodes to Bernstein coefficients
-    states: Any  # (degree + 1, state_size) at the nodes, filled by the caller
-    values: Any  # (event functions, degree + 1), filled by the caller
+    states: Any  # (degree + 1, state_size) states at the nodes, filled by the caller
+    values: Any  # (event functions, degree + 1) values at the nodes, filled by the caller
     stack: Any  # (DEPTH, degree + 1) coefficients of the pieces still to search
     ends: Any  # (DEPTH, 2) fractions at which those pieces begin and end
 
@@ -48,7 +48,7 @@ def new_crossing_finder(degree: int, event_functions: int = 1, state_size: int =
 
 @lru_cache
 def sampling(degree: int) -> tuple[Any, Any]:
-    """Compute nodes (degree + 1,) and the matrix from values there to Bernstein coefficients."""
+    """Compute the nodes (degree + 1,) and the matrix that maps values at the nodes to Bernstein coefficients."""
     size = degree + 1
     nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
     basis = np.zeros((size, size))
@@ -66,7 +66,7 @@ def sampling(degree: int) -> tuple[Any, Any]:
 def first_crossing(finder: CrossingFinder, event: int, direction: int, after: float, zero_at_start: bool) -> float:
     """Find the fraction of the step, above `after`, at which an event function first changes sign, or NO_CROSSING.
 
-    `direction` is FALLING, RISING, or 0 for both; `zero_at_start` divides out a zero at the step's start.
+    `direction` is FALLING, RISING, or 0 for either; `zero_at_start` divides out a zero at the step's start.
     """
     if not spans_zero(finder, event):
         return NO_CROSSING
@@ -108,7 +108,7 @@ def value_at(finder: CrossingFinder, event: int, fraction: float) -> float:
 
 @kernel_part
 def spans_zero(finder: CrossingFinder, event: int) -> bool:
-    """Whether an event function may cross: false if it stays further from zero than it varies."""
+    """Whether an event function may cross zero: false if its values are much further from zero than they vary."""
     smallest, largest = finder.values[event, 0], finder.values[event, 0]
     for i in range(1, finder.nodes.size):
         smallest = min(smallest, finder.values[event, i])
@@ -119,7 +119,7 @@ def spans_zero(finder: CrossingFinder, event: int) -> bool:
 
 @kernel_part
 def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> int:
-    """Write the whole step's coefficients to the bottom of the stack; returns their number."""
+    """Write the coefficients for the whole step to the bottom of the stack; returns their number."""
     stack, size = finder.stack, finder.nodes.size
     for i in range(size):
         total = 0.0
@@ -140,7 +140,7 @@ def without_zero_at_start(stack: Any, size: int) -> int:
 
 @kernel_part
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Return the first clear slope of an event function after its zero at the step's start; 0 if it stays there."""
+    """Return the slope per step at which an event function leaves its zero at the start; 0 if not over `clearly`."""
     # The error of the last event's time leaves a small value at the start, which is subtracted.
     size = set_root_piece(finder, event, False)
     for i in range(1, size):
@@ -174,7 +174,7 @@ def split(stack: Any, piece: int, size: int) -> None:
 
 @kernel_part
 def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> float:
-    """Find the only crossing of a piece by the Illinois variant, as a fraction of the step."""
+    """Find the only crossing of a piece, as a fraction of the step, by the Illinois variant of regula falsi."""
     a, b = 0.0, 1.0
     value_a, value_b = stack[piece, 0], stack[piece, size - 1]
     side = 0
@@ -212,7 +212,7 @@ def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
 
 @kernel_part
 def shift_column(columns: Any, at: int, rate: Any, wait: float) -> None:
-    """Move a variational column, from index `at` on, from fixed time to the event's time: Phi + f wait (saltation)."""
-    # After a jump a negative wait moves it back.
+    """Shift the variational column at index `at` from fixed time to the event's time: Phi + f wait (saltation)."""
+    # After a jump, a negative wait shifts the column back to fixed time.
     for i in range(len(rate)):
         columns[at + i] += rate[i] * wait

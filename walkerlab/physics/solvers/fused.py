@@ -1,4 +1,4 @@
-"""Fused multiply-add, only where it is written.
+"""Fused multiply-add, used only where the code calls for it.
 
 If the compiler were free to contract, code compiled twice could differ in the last bits.
 """

@@ -1,6 +1,6 @@
 """Hermite interpolation of an event function over a step, for crossings that another step then refines.
 
-It needs values and two derivatives at both ends, which an explicit method has for free; dense output costs stages.
+It needs values and two derivatives at both ends, which an explicit method has anyway; dense output costs more stages.
 """
 
 from walkerlab.physics.kernels import kernel_part
@@ -15,14 +15,14 @@ from walkerlab.physics.solvers.events import (
 Jet = tuple[float, float, float]
 """A value with its first two derivatives in time."""
 Quintic = tuple[float, float, float, float, float, float]
-"""Bernstein coefficients over the step."""
-LAST_MOVE = 1e-4  # of the step; Newton's error is about the square of its last move
+"""Bernstein coefficients of a quintic polynomial over a step."""
+LAST_MOVE = 1e-4  # fraction of the step; Newton's error is about the square of its last move
 MAX_ITERATIONS = 50
 
 
 @kernel_part
 def hermite(h: float, start: Jet, end: Jet) -> Quintic:
-    """Quintic over a step h (s) with these values and derivatives at its ends."""
+    """Return the quintic over a step of h (s) with the given values and derivatives at both ends."""
     slope, bend = 0.2 * h * start[1], 0.05 * h * h * start[2]
     last_slope, last_bend = 0.2 * h * end[1], 0.05 * h * h * end[2]
     return (
@@ -63,9 +63,9 @@ def value_and_slope(powers: Quintic, x: float) -> tuple[float, float]:
 
 @kernel_part
 def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, after: float) -> float:
-    """Find the fraction of the step, `after` another, at which a quintic first falls through zero, or NO_CROSSING."""
-    # Coefficients of one sign prove that there is no crossing, a single change from positive to negative that there is
-    # one; `crossing_of_piece` treats the rest.
+    """Find the fraction of the step, above `after`, at which a quintic first falls through zero, or NO_CROSSING."""
+    # Coefficients of one sign prove that there is no crossing. A single change from positive to negative proves that
+    # there is exactly one. `crossing_of_piece` handles all other cases.
     changes = 0
     for i in range(1 if zero_at_start else 0, 5):
         changes += (quintic[i] < 0.0) != (quintic[i + 1] < 0.0)

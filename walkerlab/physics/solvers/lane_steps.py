@@ -25,7 +25,7 @@ def derivative(system: Any, t: float, y: State) -> State:
 
 
 def _sums(builder: Any, weights: Any, vectors: Any, length: int) -> list[Any]:
-    """Build the components of the sum of weights[j] vectors[j] as chains of fused multiply-adds."""
+    """Build the sum over j of weights[j] * vectors[j], each component a chain of fused multiply-adds."""
     columns = [cgutils.unpack_tuple(builder, vector) for vector in cgutils.unpack_tuple(builder, vectors)]
     factors = [match_lanes(builder, factor, columns[0][0]) for factor in cgutils.unpack_tuple(builder, weights)]
     sums = []
@@ -44,7 +44,7 @@ def match_lanes(builder: Any, number: Any, partner: Any) -> Any:
 
 @intrinsic
 def combine(context: Any, weights: Any, vectors: Any) -> Any:
-    """Return the sum of weights[j] vectors[j]; all are tuples."""
+    """Return the sum over j of weights[j] * vectors[j], where all vectors are tuples."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         sums = _sums(builder, arguments[0], arguments[1], vectors.dtype.count)
@@ -68,7 +68,7 @@ def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any
 
 @kernel_part
 def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
-    """Compute the stages that solution and error use (k1, k6 .. k12), the solution and its derivative."""
+    """Compute the stages needed for solution and error (k1, k6 to k12), the solution, and its derivative."""
     k2 = derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, A_2, (k1,)))
     k3 = derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, A_3, (k1, k2)))
     k4 = derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, A_4, (k1, k3)))
@@ -87,7 +87,7 @@ def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tu
 
 @kernel_part
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
-    """Sum the squares of both errors divided by the tolerance; `method` holds rtol and atol."""
+    """Compute the sum of squares of each error divided by the tolerance; `method` holds rtol and atol."""
     error_5, error_3 = 0.0, 0.0
     for i in range(len(y)):
         scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))

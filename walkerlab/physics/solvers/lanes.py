@@ -2,7 +2,7 @@
 
 A function of floats also compiles for lanes if it does not branch on them: arithmetic, square roots, `min`, `max` and
 `abs` act on each lane, and a float combined with lanes is the same in each lane. Lanes never mix, so a walk does not
-depend on its neighbours. Processors with shorter registers use several of them.
+depend on its neighbours. Processors with shorter registers use several registers for the lanes.
 """
 
 import functools
@@ -34,7 +34,7 @@ class LanesType(types.Type):  # type: ignore[misc]
         return Conversion.safe if isinstance(other, types.Float | types.Integer) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:  # noqa: ARG002 - numba calls it so
-        """Make a variable lanes if it is a float on one path and lanes on another."""
+        """Give a variable the lanes type if it is a float on one branch and lanes on another."""
         return self if isinstance(other, types.Float | types.Integer) else None
 
 
@@ -49,7 +49,7 @@ class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def spread_over(builder: Any, value: Any) -> Any:
-    """Return lanes unchanged, and a number repeated in each lane."""
+    """Return lanes unchanged, or a number repeated in every lane."""
     if value.type == VECTOR:
         return value
     undefined = ir.Constant(VECTOR, ir.Undefined)
@@ -79,7 +79,7 @@ def _is_number(kind: Any) -> bool:
 
 
 def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: Any) -> None:
-    """Define a function of numbers for lanes; `build` receives the builder and all arguments as lanes."""
+    """Extend a function of numbers to lanes; `build` receives the builder and all arguments as lanes."""
 
     class LaneTemplate(AbstractTemplate):  # type: ignore[misc]
         key = function
@@ -102,7 +102,7 @@ def _instruction(name: str) -> Callable[..., Any]:
 
 
 def _intrinsic(name: str) -> Callable[..., Any]:
-    """Return a builder of calls of LLVM's vector intrinsic."""
+    """Return a function that builds calls of an LLVM vector intrinsic."""
 
     def build(builder: Any, *lanes: Any) -> Any:
         kind = ir.FunctionType(VECTOR, [VECTOR] * len(lanes))
@@ -132,7 +132,7 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
 @functools.cache
 def teach_arithmetic() -> None:
     """Register arithmetic on lanes with numba; needed before the first kernel with lanes is compiled."""
-    # An import alone does not do this because it affects everything that the process compiles.
+    # This is not done on import, because it affects everything that the process compiles.
     unary, binary, variadic = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
     for plain, in_place, instruction in (
         (operator.add, operator.iadd, "fadd"),
@@ -162,7 +162,7 @@ def nearest(context: Any, x: Any) -> Any:
 
 @intrinsic
 def choose(context: Any, sign: Any, if_positive: Any, otherwise: Any) -> Any:
-    """Select `if_positive` in lanes where `sign` is positive, `otherwise` elsewhere, also where `sign` is NaN."""
+    """Select `if_positive` in lanes where `sign` is positive, and `otherwise` in all others, including NaN."""
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         sign, if_positive, otherwise = (

@@ -12,7 +12,7 @@ def reciprocal(x: Any) -> Any:
 
 
 def complex_reciprocal(x: Any) -> Any:
-    """Reciprocal by Smith's formulas, equal to Python's to the last bit; numba's division is a function call."""
+    """Compute 1 / x by Smith's formulas, equal to Python's to the last bit; numba's division is a function call."""
     if abs(x.real) >= abs(x.imag):
         ratio = x.imag / x.real
         whole = x.real + x.imag * ratio
@@ -27,7 +27,7 @@ compile_as(reciprocal, lambda x: (complex_reciprocal if isinstance(x, types.Comp
 
 @kernel_part
 def size(x: Any) -> float:
-    """Sum of the sizes of real and imaginary part: chooses pivots without a square root."""
+    """Compute |Re x| + |Im x|, which chooses pivots without a square root."""
     return abs(x.real) + abs(x.imag)
 
 
@@ -58,7 +58,7 @@ def factor(A: Any, pivots: Any, n: int) -> bool:
 
 @kernel_part
 def solve(A: Any, pivots: Any, b: Any, first: int, n: int) -> None:
-    """Solve with factors from `factor`, overwriting b[first : first + n]."""
+    """Solve A x = b with factors from `factor`; x overwrites b[first : first + n]."""
     for k in range(n):
         best = pivots[k]
         if best != k:

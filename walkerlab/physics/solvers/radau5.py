@@ -52,7 +52,7 @@ P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 
 P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
 RADAU_SAFETY, RADAU_SHRINK, RADAU_GROWTH = 0.9, 0.125, 8.0
-KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # step ratios for which the factored matrices are kept
+KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # range of step ratios in which the factored matrices are kept
 FRESH_RATE = 1e-3  # the Jacobian is kept if Newton converges faster
 FIRST_RADAU_STEP = 1e-6
 MAX_NEWTON = 7
@@ -72,18 +72,18 @@ class Radau5(NamedTuple):
     y: Any
     counts: Any
     at: Any  # (n,) state at which a derivative is evaluated
-    slope: Any  # (2, n) derivative at the start of the next and of the last step
+    slope: Any  # (2, n) derivatives at the start of the next step and at the start of the last one
     z: Any  # (3, n) stages minus the step's start
-    w: Any  # (3, n) z, transformed
+    w: Any  # (3, n) z transformed by T^-1
     f: Any  # (3, n) stage derivatives
     dense: Any  # (3, n) coefficients of the collocation polynomial
-    J: Any  # (n, n)
+    J: Any  # (n, n) Jacobian
     real: Any  # (n, n) factors of gamma/h I - J
     pair: Any  # (n, n) complex factors of (alpha - i beta)/h I - J
     pivots: Any  # (2, n)
-    move: Any  # (n,) Newton's move in the real part of the transformed system
-    move_pair: Any  # (n,) complex, in the other part
-    control: Any  # (7,) see the indices above
+    move: Any  # (n,) Newton's move in the real equations of the transformed system
+    move_pair: Any  # (n,) Newton's move in the complex equations
+    control: Any  # (7,) variables of step control; see the indices above
 
 
 def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
@@ -124,7 +124,7 @@ def solve_pair(method: Radau5, r: Any) -> None:
 
 @kernel_part
 def first_guess(method: Radau5, h: float) -> None:
-    """Extrapolate the stages from the last step's collocation polynomial; zero after a start."""
+    """Extrapolate the stages from the last step's collocation polynomial; after a start, set them to zero."""
     ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
     z, w, dense = method.z, method.w, method.dense
     for i in range(method.y.size):
@@ -195,7 +195,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
 
 @begin.case(Radau5)
 def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
-    """Evaluate derivative and Jacobian at the start, and discard step control's history."""
+    """Evaluate derivative and Jacobian at the start, and discard the history of step control."""
     clock, control = method.clock, method.control
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_RADAU_STEP
     for i in range(method.y.size):
@@ -208,7 +208,7 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> Non
 
 @kernel_part
 def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> float:
-    """Error relative to the tolerance, (8.19); filtered again by (8.20) after a rejection or a start."""
+    """Compute the error relative to the tolerance by (8.19); if `again`, an error over 1 is filtered by (8.20)."""
     n = method.y.size
     error, z = method.f[0], method.z
     for i in range(n):
@@ -230,7 +230,7 @@ def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> 
 
 @kernel_part
 def error_size(method: Radau5, error: Any) -> float:
-    """Root mean square of the error divided by the tolerance."""
+    """Compute the root mean square of the error divided by the tolerance."""
     y, total = method.y, 0.0
     for i in range(y.size):
         scale = method.atol + method.rtol * max(abs(y[i]), abs(y[i] + method.z[2, i]))
@@ -287,7 +287,7 @@ def refresh(method: Radau5, system: Any) -> None:
 
 @kernel_part
 def next_step(method: Radau5, h: float, error: float, shrink: float, safety: float) -> float:
-    """Step after an accepted one: the smaller of the standard and Gustafsson's prediction, (8.25)."""
+    """Choose the step after an accepted one: the smaller of the standard and Gustafsson's prediction, (8.25)."""
     control = method.control
     if control[ERROR_OLD] > 0.0 and control[H_OLD] > 0.0:
         predicted = control[H_OLD] / h * (error * error / control[ERROR_OLD]) ** 0.25 / safety

@@ -1,4 +1,4 @@
-"""Registry of integration methods, and the settings to integrate with."""
+"""Registry of integration methods, and the tolerances of an integration."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,16 +14,16 @@ from walkerlab.physics.solvers.scipy_methods import DENSE_DEGREE, ScipyMethod
 
 @dataclass(frozen=True)
 class Method:
-    name: str  # as in configs
+    name: str  # name in configs
     # factory: (number of equations, rtol, atol, budget of right-hand sides)
     new: Callable[[int, float, float, int], Any]
     stiff: bool  # whether it suits stiff problems
-    orders: tuple[int, int]  # minimum and maximum; equal unless the method varies its order
+    orders: tuple[int, int]  # minimum and maximum order; equal unless the method varies its order
     compiled: bool = False  # whether whole walks compile with it; walks with a library's method run in Python
 
 
 def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
-    """Return a factory for methods with a class of scipy.integrate, which may use the Jacobian."""
+    """Return a factory for methods that use a class of scipy.integrate, with or without the Jacobian."""
     # scipy is imported on first use
 
     def new_solver(*problem: Any, **options: Any) -> Any:
@@ -35,7 +35,7 @@ def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int
 
 
 def cvode_factory(family: str) -> Callable[[int, float, float, int], ScipyMethod]:
-    """Return a factory for methods with one of CVODE's families, "BDF" or "Adams"."""
+    """Return a factory for methods that use one of CVODE's families, "BDF" or "Adams"."""
     return partial(ScipyMethod, partial(cvode.CvodeSolver, family), True)
 
 
@@ -69,7 +69,7 @@ def method_named(name: str) -> Method:
 
 
 ENDLESS = 2**62
-"""Budget of a walk whose right-hand sides are limited per step instead."""
+"""Budget for a walk whose right-hand sides are limited per step instead."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Tolerances:
     rtol: float
     atol: float
     budget: int  # right-hand sides per walk
-    # whether a contact walk is checked by its energy balance; comparisons of methods do without
+    # whether the energy balance of a contact walk is checked; comparisons of methods skip the check
     track_energy: bool = True
 
     @property
@@ -93,7 +93,7 @@ class Tolerances:
 
 
 def sharing(method: Any, clock: Any, counts: Any) -> Any:
-    """Return the method with the clock and counts of another one: both integrate the same walk in turns."""
+    """Return the method with the clock and counts of another method, so that both integrate the same walk in turns."""
     if isinstance(method, ScipyMethod):
         method.clock, method.counts = clock, counts
         return method

@@ -32,7 +32,7 @@ from walkerlab.physics.solvers.stepping import (
 from walkerlab.physics.solvers.system import Integers, derivative, jacobian
 
 DENSE_DEGREE = 7
-"""Degree of all methods' dense output, or higher."""
+"""Upper bound of the degree of all methods' dense output."""
 
 
 class OutOfBudgetError(Exception):
@@ -50,7 +50,7 @@ def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
 
 
 def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
-    """Return a kernel's machine code for arguments of these types, without the cost of dispatch."""
+    """Return a kernel's machine code for arguments of these types; calling it avoids the cost of dispatch."""
     code: Callable[..., None] = function.compile(tuple(numba.typeof(argument) for argument in arguments))
     return code
 
@@ -131,7 +131,7 @@ def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
 
 
 def step_solver(method: ScipyMethod) -> int:
-    """Take one step of a size that the solver chooses; returns a status as `advance` does."""
+    """Take one step, whose size the solver chooses; returns a status as `advance` does."""
     if method.solver is None:
         return OUT_OF_BUDGET
     try:

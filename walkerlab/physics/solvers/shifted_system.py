@@ -1,8 +1,8 @@
 """Linear systems of implicit methods, (s I - J) x = r, reduced to half their size for equations of motion.
 
 With q' = v the upper half of the Jacobian is (0 I). Eliminating the positions leaves
-(s I - J_v - J_q / s) x_v = r_v + J_q r_q / s and x_q = (r_q + x_v) / s: an eighth of the work for the factors.
-Eliminating the velocities instead, x_v = s x_q - r_q would cancel digits where damping is stiff.
+(s I - J_v - J_q / s) x_v = r_v + J_q r_q / s and x_q = (r_q + x_v) / s. The factors take an eighth of the work.
+If the velocities were eliminated instead, x_v = s x_q - r_q would cancel digits where damping is stiff.
 
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), section IV.8, special structure.
 """

@@ -1,12 +1,12 @@
 """Interface of integration methods: functions whose bodies are chosen by the type of the method.
 
-A method is a NamedTuple that owns its memory, so that nothing is allocated while it runs. All have these fields:
+A method is a NamedTuple that owns its memory, so nothing is allocated while it runs. All methods have these fields:
 
 rtol, atol   tolerances on the error of a step
 clock        (3,) start of the last step, its end, and the next step to try, s
 y_old, y     (n,) states at start and end of the last step
 counts       (5,) see the indices below
-dense        (d, n) coefficients of dense output of degree d; a library's method has its own object
+dense        (d, n) coefficients of the dense output of degree d; for a library's method, the library's own object
 """
 
 from typing import Any
@@ -40,7 +40,7 @@ def rewind(method: Any, system: Any) -> None:
 
 @by_type
 def prepare_dense(method: Any, system: Any) -> None:
-    """Make `interpolate` ready for the last step."""
+    """Prepare the dense output of the last step for `interpolate`."""
 
 
 @by_type

@@ -1,7 +1,7 @@
 """Interface of continuous systems: functions whose bodies are chosen by the type of the system.
 
-A system is a NamedTuple that registers a body for each of these; integrators call nothing else. States are arrays (n,)
-in the caller's memory, which `derivative` and `jacobian` never write.
+A system is a NamedTuple that registers a body for each of these functions; integrators call nothing else. States are
+arrays (n,) in the caller's memory, which `derivative` and `jacobian` never write.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ State = tuple[float, ...]
 
 @by_type
 def block(system: Any) -> Any:
-    """Value whose length is the block size of loops over the state: fixed at compile time, it divides n."""
+    """Return a value whose length, fixed at compile time, is the block size of loops over the state; it divides n."""
 
 
 @by_type
