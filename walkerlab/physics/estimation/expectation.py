@@ -1,4 +1,4 @@
-"""Errors that a walk would leave before it is measured, from derivatives of a predicted walk."""
+"""Parameter errors to expect from a walk before it is measured, from the derivatives of a predicted walk."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from walkerlab.physics.solvers.system import Floats
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalk:
-    """A walk that is predicted and not measured, with its derivatives."""
+    """Predicted walk that has not been measured, with its derivatives."""
 
     data: Linearised
-    quantities: tuple[str, ...]  # those that the walk could be measured by
-    step: NDArray[np.int64]  # (values,) index of the step of each value
+    quantities: tuple[str, ...]  # quantities that could be measured
+    step: NDArray[np.int64]  # (values,) index of each value's step
     keys: tuple[str, ...]
     scales: Floats
 
     def expect(
         self, steps: int, measured: Collection[str], noise: Mapping[str, float], roughness_m: float
     ) -> Information:
-        """Return the information on the parameters from the first `steps`, measured by some quantities."""
+        """Return the information about the parameters from the `measured` quantities of the first `steps` steps."""
         deviations = np.array([noise[name] for name in self.quantities])
         used = np.isin(self.data.quantity, [self.quantities.index(name) for name in measured])
         rows = used & (self.step < steps)
@@ -52,7 +52,7 @@ def planned_walk(problem: FitProblem, keys: tuple[str, ...]) -> PlannedWalk | No
 
 
 def steps_of(forecast: Forecast) -> NDArray[np.int64]:
-    """Return the index (values,) of the step of each value."""
+    """Return the index (values,) of the step that each value belongs to."""
     steps = np.tile(np.arange(forecast.steps.count), len(forecast.channels))
     measured = forecast.measured
     return np.append(steps, np.repeat(measured.step, 2)) if isinstance(measured, MeasuredAngles) else steps

@@ -1,4 +1,4 @@
-"""Most likely parameters, start and noise of a measured walk."""
+"""Fit of the most likely parameters, start and noise to a measured walk."""
 
 from __future__ import annotations
 
@@ -22,32 +22,34 @@ from walkerlab.physics.solvers.system import Floats
 
 Loss = Literal["linear", "soft_l1"]
 MAX_ROUNDS: Final = 12
-SETTLED_NOISE: Final = 1e-2  # relative change of a standard deviation
-SETTLED_MOVE: Final = 0.1  # change of an unknown, in standard errors
-FIRST_NOISE: Final = 0.02  # of a quantity's typical size, before any fit
-NOISE_FLOOR: Final = 1e-6  # of a quantity's typical size: noise-free measurements are taken to have this noise
-NO_WALK: Final = 1e3  # whitened residual of unknowns that make no walk
+SETTLED_NOISE: Final = 1e-2  # largest relative change of a settled standard deviation
+SETTLED_MOVE: Final = 0.1  # largest change of a settled unknown, in standard errors
+FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quantity's typical size
+# smallest noise, as a fraction of a quantity's typical size; noise-free measurements are given this noise
+NOISE_FLOOR: Final = 1e-6
+NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
 NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
-EVALUATIONS: Final = 12  # in a round
+EVALUATIONS: Final = 12  # maximum number of evaluations per round
 SETTLED_FIT: Final = 1e-6  # relative change of the cost, or of the unknowns, that ends a round
-SAME_DERIVATIVES: Final = 1e-3  # change of an unknown, in its scale, within which derivatives are kept
+SAME_DERIVATIVES: Final = 1e-3  # derivatives are kept until an unknown changes by this much, in its scale
 INSIDE: Final = 1e-9  # distance from the bounds at the start, in scales
-WEAK_PRIOR: Final = 1.0  # standard deviation of every unknown about its start, in its scale: what is open stays there
+# standard deviation of each unknown about its start, in its scale; undetermined combinations stay at the start
+WEAK_PRIOR: Final = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
     forecast: Forecast
     leg_length_m: float
-    start: tuple[float, ...]  # values of the parameters, in their units
-    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite without bounds
-    # (value, standard deviation) of parameters by index, in their units
+    start: tuple[float, ...]  # initial values of the parameters, in their units
+    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite if there is none
+    # (value, standard deviation) of parameters with prior knowledge, by index, in their units
     priors: dict[int, tuple[float, float]] = field(default_factory=dict)
     loss: Loss = "linear"
 
     def limits(self) -> tuple[Floats, Floats]:
-        """Return bounds (unknowns,) of the scaled unknowns."""
+        """Return lower and upper bounds (unknowns,) of the scaled unknowns."""
         low, high = (np.full(self.forecast.unknowns, sign * np.inf) for sign in (-1.0, 1.0))
         for place, (least, most) in enumerate(self.bounds):
             low[place], high[place] = np.array((least, most)) / self.forecast.scales[place]
@@ -64,21 +66,21 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    u: Floats  # (unknowns,) scaled
-    heights_m: Floats  # most probable
+    u: Floats  # (unknowns,) scaled unknowns
+    heights_m: Floats  # (heights,) most probable floor heights
     noise: Noise
     evaluation: Evaluation
     data: Linearised
-    predicted: Floats  # (values,) over even ground, with the most probable start
-    z: Floats  # (d,) end of that walk, on the section
+    predicted: Floats  # (values,) predicted values over even ground, from the most probable start
+    z: Floats  # (d,) section coordinates at the end of that walk
     rounds: int
     why: str = ""  # reason why it did not converge; empty if it did
 
 
 def fit(problem: FitProblem, start: Floats) -> Fitted | str:
-    """Fit from a start (unknowns,); the reason as text if no walk near the start can be predicted.
+    """Fit the unknowns from a start (unknowns,); return a reason as text if no walk near the start can be predicted.
 
-    Rounds alternate between the unknowns, by least squares on whitened residuals, and the standard deviations.
+    Each round fits the unknowns by least squares on whitened residuals, then the standard deviations.
     """
     forecast, u = problem.forecast, start.copy()
     size, even = typical_sizes(forecast), np.zeros(forecast.heights)
@@ -90,7 +92,8 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
         before, u = u, least_squares_fit(problem, u, start, heights, data, noise)
         data = None if forecast.predict(u, even) is None else linearise(problem, u, heights)
         if data is None:
-            # The data pull the walker out of its basin: the last walk that went on is judged.
+            # The data pull the walker out of its basin of attraction, so the last walk that did not end early is
+            # judged.
             u, why = before, NO_NEIGHBOURS
             data = linearise(problem, u, heights)
         if data is None:
@@ -115,7 +118,7 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
 
 
 def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
-    """Estimate the standard deviations at unknowns (unknowns,) of another fit; None if the walk there ends early."""
+    """Estimate the standard deviations at unknowns (unknowns,), starting from another fit; None if walks end early."""
     even = np.zeros(problem.forecast.heights)
     data, predicted = linearise(problem, u, even), problem.forecast.predict(u, even)
     if data is None or predicted is None:
@@ -129,7 +132,7 @@ def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
 
 
 def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
-    """Return lower heights where the walk over the most probable ones ends early."""
+    """Return the heights, reduced if the walk over them ends early."""
     shares = (share for share in HEIGHT_SHARES if problem.forecast.predict(u, share * heights) is not None)
     return next(shares, 0.0) * heights
 
@@ -141,7 +144,7 @@ def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
 
 
 def typical_sizes(forecast: Forecast) -> Floats:
-    """Return a typical size (quantities,) of each quantity."""
+    """Return the r.m.s. value (quantities,) of each quantity as its typical size."""
     values, quantity = forecast.values, forecast.quantity
     return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
 

@@ -1,4 +1,4 @@
-"""How well a measured walk determines parameters: errors, correlations, and combinations that it leaves open."""
+"""Information about parameters in a measured walk: errors, correlations, and undetermined combinations."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
 OPEN: Final = 1.0
-"""Singular value below which a combination is open: a change by its whole scale stays within the data's noise."""
-LOST_SHARE: Final = 1e-7  # share of the largest singular value, below which a combination has no effect at all
+"""Singular value below which a combination is undetermined: a change by its whole scale stays within the noise."""
+LOST_SHARE: Final = 1e-7  # fraction of the largest singular value below which a combination has no effect at all
 NOISE_DRAWS: Final = 200
 NOISE_LOG_STEP: Final = 0.05
-FARTHEST_NOISE: Final = (3.0, 1.5)  # below and above the likeliest, of logarithms of standard deviations
-LOADED: Final = 0.1  # share of a parameter in an open direction, from which it is named
+FARTHEST_NOISE: Final = (3.0, 1.5)  # farthest below and above the most likely, in logarithms of standard deviations
+LOADED: Final = 0.1  # a parameter is named if its component in an undetermined direction is at least this
 
 
 def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quantities: tuple[str, ...]) -> Information:
-    """Reduce the information of a fit to its parameters; `scales` (parameters,) are their typical changes."""
+    """Return a fit's information about its parameters; `scales` (parameters,) are their typical changes."""
     values_count = fitted.data.residuals.size + len(fitted.data.prior)
     plain = information_from(fitted.evaluation.information, keys, scales, values_count)
     basis = plain.directions[~is_open(plain.singular_values)]
@@ -36,7 +36,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
-    """Reduce information (unknowns, unknowns) at known standard deviations to the parameters, the first unknowns."""
+    """Reduce information (unknowns, unknowns), at known standard deviations, to the parameters (first unknowns)."""
     reduced = free_the_rest(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]
@@ -53,10 +53,10 @@ def correlations(covariance: Floats) -> Floats:
 
 
 def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:
-    """Return the degrees of freedom of Student's t for the errors on the directions `basis`, as of Satterthwaite.
+    """Return the Satterthwaite degrees of freedom of Student's t for errors along the directions `basis`.
 
-    A short walk determines the standard deviations of floor and measurement poorly. Averaged over plausible ones the
-    covariance is larger than at the likeliest ones, by nu / (nu - 2) for Student's t of nu degrees of freedom.
+    A short walk determines the standard deviations of floor and measurement poorly. The covariance averaged over their
+    plausible values is larger than that at the most likely values, by nu / (nu - 2) for nu degrees of freedom.
     """
     if not len(basis):
         return information.freedom
@@ -66,8 +66,8 @@ def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -
 
 
 def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
-    """Average the covariance on directions `basis` (directions, parameters) over plausible standard deviations."""
-    # Weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
+    """Average the covariance along directions `basis` (directions, parameters) over plausible standard deviations."""
+    # The weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
     products, noise = products_of(fitted.data), fitted.noise
     count = basis.shape[1]
     centre = np.log(np.append(noise.measurement, noise.roughness_m or 1.0))
@@ -87,7 +87,7 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
 
 
 def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> tuple[Floats, Floats]:
-    """Return how far below and above `centre` (deviations,) logarithms of standard deviations are plausible."""
+    """Return the plausible ranges below and above `centre` (deviations,), the logarithms of standard deviations."""
     moves = NOISE_LOG_STEP * np.vstack((np.zeros(centre.size), np.eye(centre.size), -np.eye(centre.size)))
     likelihoods = evaluate_at(centre + moves).restricted
     above, below = likelihoods[1 : 1 + centre.size], likelihoods[1 + centre.size :]
@@ -97,7 +97,7 @@ def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> 
 
 
 def free_the_rest(information: Floats, count: int) -> Floats:
-    """Return the information (..., count, count) on the first unknowns while the others are free (Schur complement)."""
+    """Return the information (..., count, count) on the first unknowns if the others are free (Schur complement)."""
     own, cross, rest = (
         information[..., :count, :count],
         information[..., :count, count:],
@@ -111,7 +111,7 @@ def is_open(singular: Floats) -> NDArray[np.bool_]:
 
 
 def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, ...], set[str]]:
-    """Name the combinations that the walk leaves open, and the parameters in them."""
+    """Describe the combinations that the walk does not determine; also return the parameters in them."""
     named, keys = [], set[str]()
     largest = information.singular_values.max(initial=0.0)
     for value, direction in zip(information.singular_values, information.directions, strict=True):
@@ -129,7 +129,7 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
 
 
 def combination_in_words(parts: list[tuple[str, float]]) -> str:
-    """Write which parameters change together, with their shares of a change by their scale."""
+    """Describe which parameters change together, and by which fraction of its scale each of them changes."""
     if len(parts) == 1:
         return parts[0][0]
     up = [f"{key} ({share:.2g})" for key, share in parts if share > 0.0]
@@ -144,7 +144,7 @@ def reason_in_words(value: float, largest: float) -> str:
 
 
 def contributions(fitted: Fitted, quantities: tuple[str, ...], count: int, basis: Floats) -> dict[str, float]:
-    """Return the share of information on directions `basis` (directions, count) that is lost without each quantity."""
+    """Return the fraction of information along `basis` (directions, count) that is lost without each quantity."""
     if not len(basis):
         return dict.fromkeys(quantities, 0.0)
     whole = np.diag(basis @ free_the_rest(fitted.evaluation.information, count) @ basis.T)

@@ -1,4 +1,4 @@
-"""Whether a fitted model explains a measured walk."""
+"""Judgement of whether a fitted model explains a measured walk."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from walkerlab.physics.estimation.prediction import Forecast
 from walkerlab.physics.estimation.result import Fit
 from walkerlab.physics.solvers.system import Floats
 
-LARGEST_SHARE: Final = 0.05  # of a quantity's size, as noise or as systematic difference
-ROUGHEST: Final = 0.02  # of the leg length
+LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
+ROUGHEST: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations
-SMALLEST_OUTLIER: Final = 0.01  # of a quantity's size: a missed heel strike is off by far more
+SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; a missed heel strike is off by far more
 ALTERNATION: Final = 5.0  # standard deviations by which odd and even steps differ
 PHASE_BINS: Final = 20
 
 
 def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float) -> tuple[Fit, str]:
-    """Return whether a model fits, and the reason as text if it does not; `sizes` are typical of the quantities."""
+    """Return whether a model fits, with a reason as text if not; `sizes` are the quantities' typical values."""
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             name, unit = name_and_unit(quantity)
@@ -66,7 +66,7 @@ def whitened_residuals(forecast: Forecast, fitted: Fitted) -> Floats:
 
 
 def alternation_of(residuals: Floats) -> float:
-    """Return the difference between odd and even steps, as a normal deviate as unlikely as Student's t of few steps."""
+    """Return the difference between odd and even steps as a normal deviate of the same probability as Student's t."""
     odd, even = residuals[::2], residuals[1::2]
     if min(odd.size, even.size) < 2:
         return 0.0
@@ -76,7 +76,7 @@ def alternation_of(residuals: Floats) -> float:
 
 
 def judge_phases(forecast: Forecast, fitted: Fitted, size: float) -> tuple[Fit, str]:
-    """Compare the mean difference of the angles at each phase of the step with the angles' size."""
+    """Judge the angles by their mean difference at each phase of the step, relative to their `size` (rad)."""
     assert isinstance(forecast.measured, MeasuredAngles)
     mean = phase_means(forecast, fitted)
     systematic = float(np.sqrt(np.nanmean(mean**2)))
@@ -86,7 +86,7 @@ def judge_phases(forecast: Forecast, fitted: Fitted, size: float) -> tuple[Fit, 
 
 
 def phase_means(forecast: Forecast, fitted: Fitted) -> Floats:
-    """Return the mean residual (phases, legs) of the angles at each phase; the stance leg's and swing leg's."""
+    """Return the mean residual (phases, 2) of the angles at each phase of the step, the swing leg's first."""
     assert isinstance(forecast.measured, MeasuredAngles)
     residuals = fitted.data.residuals[-forecast.measured.angles_rad.size :].reshape(-1, 2)
     swaps = forecast.measured.step % 2 == 1

@@ -19,7 +19,7 @@ class MeasuredSteps:
 
     periods_s: Floats  # (steps,)
     lengths_m: Floats | None = None  # (steps,)
-    touch_angles_rad: Floats | None = None  # (steps,) of the leg that touches, from the vertical
+    touch_angles_rad: Floats | None = None  # (steps,) angle from the vertical of the leg that touches down
 
     @property
     def count(self) -> int:
@@ -33,14 +33,15 @@ class MeasuredSteps:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredAngles:
-    """Angles of both legs within consecutive steps, each at its share of the step's period."""
+    """Angles of both legs in consecutive steps, with the phase of each sample in its step."""
 
-    touches_s: Floats  # (steps + 1,) heel strikes, the first one starts the walk
+    touches_s: Floats  # (steps + 1,) times of heel strikes; the first one starts the walk
     step: NDArray[np.int64]  # (samples,) index of each sample's step
-    phase: Floats  # (samples,) share of the step's period that has passed, 0 to 1
+    phase: Floats  # (samples,) fraction of the step's period that has passed
     angles_rad: Floats  # (samples, 2) from the vertical; the leg that swings first comes first
     lengths_m: Floats | None = None  # (steps,)
-    touch_sum_rad: float = 0.0  # sum of the angles from the slope's normal at heel strikes, if slope or sensors are off
+    # sum of the angles from the slope's normal at heel strikes; not zero if slope or sensors are off
+    touch_sum_rad: float = 0.0
 
     @property
     def count(self) -> int:
@@ -54,7 +55,7 @@ class MeasuredAngles:
 def split_into_steps(
     time_s: Floats, angles_rad: Floats, touches_s: Floats, lengths_m: Floats | None = None
 ) -> MeasuredAngles:
-    """Assign samples of angles (samples, 2) to steps between heel strikes (steps + 1,); others are dropped."""
+    """Assign samples of angles (samples, 2) to steps between heel strikes (steps + 1,), dropping samples outside."""
     inside = (time_s >= touches_s[0]) & (time_s < touches_s[-1])
     time, angles = time_s[inside], angles_rad[inside]
     step = np.searchsorted(touches_s, time, "right") - 1

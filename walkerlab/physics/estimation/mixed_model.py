@@ -16,54 +16,55 @@ from numpy.typing import NDArray
 from walkerlab.physics.solvers.system import Floats
 
 ROUGHNESS_STARTS: Final = (1e-5, 1e-3, 1e-2)
-"""Shares of the leg length from which the search for the roughness starts."""
-ROUGHNESS_BOUNDS: Final = (1e-8, 0.2)  # shares of the leg length
+"""Fractions of the leg length from which the search for the roughness starts."""
+ROUGHNESS_BOUNDS: Final = (1e-8, 0.2)  # fractions of the leg length
 NOISE_RATIO: Final = 1.0
-"""Standard deviation of the logarithm by which relative noises of quantities differ.
+"""Prior standard deviation of the logarithm of the quantities' relative noises.
 
-Without it a floor can explain one quantity of a short walk exactly, and its noise goes to zero.
+Without this prior, the floor could explain one quantity of a short walk exactly, with a noise of zero.
 """
 NOISE_RANGE: Final = 1e6  # ratio of the largest standard deviation of a measurement to the smallest
-ROUNDING: Final = 1e-14  # of sums of products
-LOG_STEP: Final = 1e-4  # in derivatives of the restricted likelihood by logarithms
-LOST_INFORMATION: Final = 1e-13  # share of the largest eigenvalue of scaled information, below which it is rounding
+ROUNDING: Final = 1e-14  # relative rounding error of sums of products
+LOG_STEP: Final = 1e-4  # difference step of logarithms, in derivatives of the restricted likelihood
+# eigenvalues of scaled information below this fraction of the largest are rounding errors
+LOST_INFORMATION: Final = 1e-13
 
 
 class Noise(NamedTuple):
     """Standard deviations of the measurement by quantity, and of the floor's heights (m)."""
 
     measurement: Floats  # (quantities,)
-    roughness_m: Any  # a float; an array where `evaluate` takes several at once
+    roughness_m: Any  # a float, or an array if `evaluate` takes several at once
 
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """Measured minus predicted values, and how predictions change, about one walk."""
+    """Measured minus predicted values of a walk, and derivatives of the predicted values."""
 
-    residuals: Floats  # (values,) about the walk over even ground
-    J: Floats  # (values, unknowns) by the unknowns, scaled
-    G: Floats  # (values, heights) by the heights, 1/m
+    residuals: Floats  # (values,) relative to the walk over even ground
+    J: Floats  # (values, unknowns) derivatives by the scaled unknowns
+    G: Floats  # (values, heights) derivatives by the heights, 1/m
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
     prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of priors
     sizes: Floats  # (quantities,) typical size of each quantity
 
 
 class Evaluation(NamedTuple):
-    """Likelihoods and the most likely unknowns; with leading axes for several standard deviations."""
+    """Likelihoods and the most likely unknowns; several standard deviations add leading axes."""
 
     restricted: Any  # log-likelihood of the standard deviations, with their prior
     likelihood: Any  # log-likelihood of the data
     information: Floats  # (unknowns, unknowns)
-    move: Floats  # (unknowns,) that remains to the most likely unknowns
-    heights_m: Floats  # (heights,) most probable
-    squares: Any  # whitened sum of squares
+    move: Floats  # (unknowns,) step to the most likely unknowns
+    heights_m: Floats  # (heights,) most probable floor heights
+    squares: Any  # sum of squares of whitened residuals
 
 
 class Products(NamedTuple):
     """Sums of squares and products of [residual, J, G], by quantity."""
 
     sums: Floats  # (quantities, k, k)
-    counts: NDArray[np.int64]  # (quantities,)
+    counts: NDArray[np.int64]  # (quantities,) number of values
     prior: Floats  # (1 + unknowns, 1 + unknowns)
     priors: int
     unknowns: int
@@ -79,13 +80,13 @@ def products_of(data: Linearised) -> Products:
 
 
 def evaluate(products: Products, noise: Noise) -> Evaluation:
-    """Evaluate the likelihoods at given standard deviations, or at several: measurement (..., quantities)."""
+    """Evaluate the likelihoods at one set of standard deviations, or at several: measurement (..., quantities)."""
     deviations, rough = np.asarray(noise.measurement), np.asarray(noise.roughness_m)
     total = np.einsum("qij,...q->...ij", products.sums, deviations**-2.0)
     fixed = 1 + products.unknowns
     rho2 = (rough**2)[..., None, None]
     cross, random = total[..., :fixed, fixed:], total[..., fixed:, fixed:]
-    # On a very rough floor rounding of the products would make K singular.
+    # On a very rough floor, rounding errors of the products would make K singular.
     rounding = ROUNDING * np.trace(random, axis1=-2, axis2=-1)[..., None, None]
     K = (1.0 + rho2 * rounding) * np.eye(random.shape[-1]) + rho2 * random
     solved = rho2 * np.linalg.solve(K, cross.swapaxes(-1, -2))
@@ -107,7 +108,7 @@ def evaluate(products: Products, noise: Noise) -> Evaluation:
 
 
 def noise_at(logs: Floats, rough: bool) -> Noise:
-    """Return the standard deviations of logarithms (..., quantities), followed by the roughness's if there is one."""
+    """Return the standard deviations from their logarithms (..., quantities); if `rough`, the roughness comes last."""
     own = np.exp(logs)
     return Noise(own[..., :-1], own[..., -1]) if rough else Noise(own, np.zeros(own.shape[:-1]))
 
@@ -132,7 +133,7 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
         result = minimize(
             costs, logs, (rough,), "L-BFGS-B", jac=True, bounds=[*bounds, (low, high)] if rough else bounds
         )
-        # A roughness above 0 must be worth its number; even ground is the simpler explanation.
+        # Even ground is the simpler explanation, so it wins unless a roughness raises the likelihood.
         if -result.fun > most or (not rough and -result.fun > most - 1e-6):
             likeliest = noise_at(result.x, rough)
             best, most = Noise(likeliest.measurement, float(likeliest.roughness_m)), float(-result.fun)
@@ -140,7 +141,7 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
 
 
 class Whitening(NamedTuple):
-    """Turn values into independent ones of unit variance, with the covariance G G' roughness^2 + noise^2."""
+    """Transforms values of covariance G G' roughness^2 + noise^2 into independent values of unit variance."""
 
     scale: Floats  # (values,)
     U: Floats  # (values, heights)

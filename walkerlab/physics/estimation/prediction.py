@@ -23,24 +23,25 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
     GAIN: (1.0, 0.1),
     DELAY: (0.0, 0.05),
 }
-"""Properties of clock and sensors that may be estimated too: value if they are not, and typical change."""
-FELT: Final = 1e-3  # change of the next step by a change of the start, below which a direction of the start is lost
-LAST_INSTANT: Final = 1e-9  # share of a walk before its last heel strike that counts as after it
-START_SCALE: Final = 0.02  # typical change of the start, in coordinates of the section
-SETTLING_STEP: Final = 1e-4  # of section coordinates, in difference quotients of settled starts
-QUICK_STEP: Final = 1e-6  # of an unknown's scale, in difference quotients while searching
+"""Properties of clock and sensors that may be estimated: value if not estimated, and typical change."""
+# a direction of the start is dropped if a change along it has a smaller relative effect on the next step
+FELT: Final = 1e-3
+LAST_INSTANT: Final = 1e-9  # samples in this last fraction of a walk count as after its last heel strike
+START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
+SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
+QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 FORWARD: Final = ((0, -1.0), (1, 1.0))
-EXACT_STEP: Final = 1e-4  # in those of the result
+EXACT_STEP: Final = 1e-4  # step in an unknown's scale, for difference quotients of the result
 
 
 class WalkMap(Protocol):
-    """Walks of a family of walkers from the section; `step_map.StepMap` with values of several parameters."""
+    """Walks of a family of walkers from the section; like `step_map.StepMap`, but with several parameters."""
 
     def step(self, z: Floats, p: Any) -> MappedStep:
         """Take a step from z (d,), with its derivative."""
 
     def disturbed(self, z: Floats, p: Any, heights_m: Floats) -> DisturbedWalk:
-        """Walk from z (d,) over footholds (steps + 1,)."""
+        """Walk from z (d,) over foothold heights (steps + 1,) in m."""
 
     def settled(self, z: Floats, p: Any) -> Floats:
         """Return z (d,) with the stance foot at rest on the ground."""
@@ -49,26 +50,26 @@ class WalkMap(Protocol):
         """Return the legs' angles (times, 2) at times from the first heel strike, the first swing leg's first."""
 
     def varied(self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ...) -> VariedWalk | None:
-        """Differentiate both along columns (d + steps + 1, columns) of start and heights."""
+        """Differentiate the walk and its samples along columns (d + steps + 1, columns) of start and heights."""
 
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
     """Function from unknowns to predicted values.
 
-    The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each over its scale. Angles
-    at shares of each step are easy to fit from afar. Angles at their times do not depend on measured heel strikes;
-    periods then do not count as measured values.
+    The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each divided by its scale.
+    Fits of angles at fractions of each step (`in_phase`) converge from a poor first guess. Angles at their sample times
+    do not depend on the measured heel strikes; in that case periods are not counted as measured values.
     """
 
     walks: WalkMap
-    admits: Callable[[tuple[float, ...]], bool]  # whether parameters make a walker
+    admits: Callable[[tuple[float, ...]], bool]  # whether parameters give a valid walker
     scales: Floats  # (parameters,) typical changes
-    z: Floats  # (d,) start about which the start is sought
-    directions: Floats  # (d, starts) of the start, those that the next step feels
+    z: Floats  # (d,) section coordinates about which the start is searched for
+    directions: Floats  # (d, starts) directions of the start that affect the next step
     measured: MeasuredSteps | MeasuredAngles
     nuisances: tuple[str, ...] = ()
-    in_phase: bool = True  # angles at shares of each measured step rather than at their times
+    in_phase: bool = True  # whether angles are at fractions of each measured step rather than at their sample times
 
     @cached_property
     def steps(self) -> MeasuredSteps:
@@ -80,17 +81,17 @@ class Forecast:
 
     @property
     def heights(self) -> int:
-        """Number of footholds: in time, a step more than measured, in case predicted steps are shorter."""
+        """Number of footholds; one more for angles at sample times, in case predicted steps are shorter."""
         return self.steps.count + (1 if self.in_phase else 2)
 
     @cached_property
     def channels(self) -> dict[str, Floats]:
-        """Measured values (steps,) by quantity of the steps."""
+        """Measured values (steps,) by quantity, without angle samples."""
         return {name: values for name, values in self.steps.channels().items() if self.in_phase or name != STEP_PERIOD}
 
     @cached_property
     def values(self) -> Floats:
-        """Measured values (values,): channels of the steps, then angles."""
+        """Measured values (values,): quantities of the steps, then angle samples."""
         angles = [self.measured.angles_rad.ravel()] if isinstance(self.measured, MeasuredAngles) else []
         return np.concatenate([*self.channels.values(), *angles])
 
@@ -100,7 +101,7 @@ class Forecast:
 
     @cached_property
     def quantity(self) -> NDArray[np.int64]:
-        """Index (values,) of each value's quantity."""
+        """Index (values,) of the quantity of each value."""
         sizes = [self.steps.count] * len(self.channels)
         sizes += [self.values.size - sum(sizes)] if isinstance(self.measured, MeasuredAngles) else []
         return np.repeat(np.arange(len(sizes)), sizes)
@@ -120,7 +121,7 @@ class Forecast:
         return np.asarray(self.z + START_SCALE * self.directions @ u[first : first + self.directions.shape[1]])
 
     def predict(self, u: Floats, heights_m: Floats) -> Floats | None:
-        """Return the predicted values (values,); None where the walk ends early or the parameters make no walker."""
+        """Return the predicted values (values,); None if the walk ends early or there is no valid walker."""
         walk = self._walk(u, heights_m)
         if walk is None:
             return None
@@ -138,7 +139,7 @@ class Forecast:
 
     def differentiate(self, u: Floats, heights_m: Floats, exact: bool) -> Floats | None:
         """Return the derivatives (values, unknowns) by the unknowns; `exact` if they enter the result."""
-        # Those by parameters are difference quotients of exact walks; the others follow from tangent columns.
+        # Derivatives by parameters are difference quotients of exact walks; the others follow from tangent columns.
         none = np.zeros((heights_m.size, 0))
         columns = self._columns_along(u, heights_m, none)
         return None if columns is None else self._with_parameters(u, heights_m, columns, exact)
@@ -161,7 +162,7 @@ class Forecast:
         return walk if whole else None
 
     def _times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return the times (samples,) of the samples from the walk's first heel strike, and which are inside it."""
+        """Return the sample times (samples,) from the walk's first heel strike, and which are within the walk."""
         assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         touches, step = np.append(0.0, np.cumsum(walk.durations_s)), self.measured.step
         times = self._measured_times() / sensors[CLOCK]
@@ -171,7 +172,7 @@ class Forecast:
         return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
 
     def _measured_times(self) -> Floats:
-        """Return the times (samples,) of the samples by the measurement's clock, from its first heel strike."""
+        """Return the sample times (samples,) from the first measured heel strike, by the measurement's clock."""
         assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         touches, step = self.measured.touches_s, self.measured.step
         return np.asarray(touches[step] + self.measured.phase * np.diff(touches)[step] - touches[0])
@@ -212,7 +213,7 @@ class Forecast:
         return np.column_stack((np.concatenate(parts), *last))
 
     def _drift(self, durations: Floats) -> Floats:
-        """Return how the samples' times change with the steps' durations, (samples, columns)."""
+        """Return the changes (samples, columns) of the sample times caused by changes of the steps' durations."""
         assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         if not self.in_phase:
             return np.zeros((self.measured.step.size, durations.shape[1]))
@@ -221,7 +222,7 @@ class Forecast:
         return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
 
     def _with_parameters(self, u: Floats, heights_m: Floats, columns: Floats, exact: bool) -> Floats | None:
-        """Return the derivatives (values, unknowns): by parameters, then those of `columns` that belong to unknowns."""
+        """Return the derivatives (values, unknowns): by parameters, then the `columns` that belong to unknowns."""
         formula, step = (CENTRAL_4TH, EXACT_STEP) if exact else (FORWARD, QUICK_STEP)
         starts, own = self.directions.shape[1], []
         predict = cache(lambda place, offset: self.predict(u + offset * step * np.eye(u.size)[place], heights_m))
@@ -235,14 +236,14 @@ class Forecast:
 
 
 def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
-    """Return changes (d, starts) of the settled start with z (d,) along directions (d, starts)."""
+    """Return the derivatives (d, starts) of the settled start as z (d,) moves along directions (d, starts)."""
     h = SETTLING_STEP
     ends = [walks.settled(z + h * column, p) - walks.settled(z - h * column, p) for column in directions.T]
     return np.array(ends).reshape(-1, z.size).T / (2.0 * h)
 
 
 def felt_directions(walks: WalkMap, z: Floats, p: Any) -> Floats:
-    """Return the directions (d, starts) of the start near z (d,) that the next step feels."""
+    """Return the directions (d, starts) in which a change of the start z (d,) affects the next step."""
     DP = walks.step(walks.settled(z, p), p).DP
     _, sizes, rows = np.linalg.svd(DP @ settling_along(walks, z, p, np.eye(z.size)))
     return np.asarray(rows[sizes > FELT * max(1.0, sizes[0])].T)

@@ -12,7 +12,7 @@ Fit = Literal["fits", "misfit", "not-converged"]
 
 @dataclass(frozen=True)
 class Uncertain:
-    """A value with its standard error; None where the walk does not determine it."""
+    """A value with its standard error, which is None if the walk does not determine the value."""
 
     value: float
     standard_error: float | None
@@ -40,18 +40,18 @@ class Unidentifiable:
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """How well a walk determines the fitted parameters."""
+    """Information in a walk about the fitted parameters."""
 
     keys: tuple[str, ...]
-    correlations: Floats  # (parameters, parameters) of the estimates
-    # (parameters,) of the sensitivity to parameters over their scale, in standard deviations of the data; the start and
-    # the nuisances are free
+    correlations: Floats  # (parameters, parameters) correlations of the estimates
+    # (parameters,) singular values of the sensitivity to scaled parameters, in standard deviations of the data, while
+    # start and nuisances are free
     singular_values: Floats
-    directions: Floats  # (parameters, parameters) one row per singular value: shares of the parameters
-    covariance: Floats  # (parameters, parameters) in the parameters' units, on determined directions
+    directions: Floats  # (parameters, parameters) one row per singular value: components of the scaled parameters
+    covariance: Floats  # (parameters, parameters) in the parameters' units, along determined directions
     scales: Floats  # (parameters,) typical changes, in the parameters' units
     freedom: float  # degrees of freedom of Student's t for the errors
-    # share of each measured quantity in the information, averaged over determined directions
+    # fraction of the information due to each measured quantity, averaged over determined directions
     contributions: dict[str, float]
 
 
@@ -80,7 +80,7 @@ class Identification:
     not_identifiable: tuple[Unidentifiable, ...]
     information: Information
     process: dict[str, float | bool | None]  # roughness_m, standard_error, at_bound
-    measurement: dict[str, float]  # standard deviation by quantity
+    measurement: dict[str, float]  # standard deviation of each quantity
     steps: int
     rms_residual: dict[str, float]
     chi_square_per_dof: float
@@ -88,6 +88,6 @@ class Identification:
     models: tuple[ModelFit, ...]
     tables: tuple[StepTable, ...]
     fitted: Fitted = field(repr=False)
-    walk: DisturbedWalk = field(repr=False)  # over the most probable floor
-    sensors: dict[str, float]  # properties of clock and sensors, as `prediction.NUISANCES`
-    nuisances: dict[str, Uncertain]  # the estimated ones among them
+    walk: DisturbedWalk = field(repr=False)  # walk over the most probable floor
+    sensors: dict[str, float]  # properties of clock and sensors, named as in `prediction.NUISANCES`
+    nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors

@@ -1,7 +1,7 @@
 """Attractors of a step map over a parameter, and their largest Lyapunov exponents.
 
 The largest Lyapunov exponent is the mean logarithmic growth per step of a tangent vector. Its uncertainty, at least
-1/steps, is the standard error of means over blocks of several correlation times; a walk with too few is repeated.
+1/steps, is the standard error of means over blocks of several correlation times; walks with too few are continued.
 
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """
@@ -20,23 +20,26 @@ from walkerlab.physics.orbits.step_map import Cycle, StepMap
 from walkerlab.physics.solvers.system import Floats
 
 MAX_PERIOD = 48  # steps; longer cycles count as aperiodic
-REPEAT_DISTANCE = 1e-5  # distance below which points are equal
-# distance of points that still converge, and their ratio of distances, last to first third
+REPEAT_DISTANCE = 1e-5  # points closer than this count as equal
+# largest distance between points a period apart in a walk that still converges, and largest ratio of these distances in
+# its last third to those in its first
 NEAR_REPEAT, MAX_APPROACH_RATIO = 1e-3, 0.8
-GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a share of the largest coordinate
-MAX_BLOCKS, MIN_BLOCKS, BLOCK_LENGTH = 64, 10, 5.0  # numbers for one walk; length in correlation times
-MAX_WALKS = 8  # per exponent
-MAX_DRIFT = 4.0  # difference of a walk's halves, in standard errors of the whole, i.e. two of their own
+GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a fraction of the largest coordinate
+MAX_BLOCKS, MIN_BLOCKS, BLOCK_LENGTH = 64, 10, 5.0  # blocks per walk; length of a block in correlation times
+MAX_WALKS = 8  # walks per exponent
+# largest difference between the means of a walk's halves, in standard errors of the whole walk's mean; the standard
+# error of the difference is twice as large
+MAX_DRIFT = 4.0
 SUBSTEPS = 8
 LOSS_HALVINGS = 6
-MAX_CLOSE_RETURNS = 4  # per period
+MAX_CLOSE_RETURNS = 4  # seeds per period
 
 
 @dataclass(frozen=True, eq=False)
 class Attractor:
     value: float
     period: int  # steps after which it repeats; 0 if aperiodic
-    periods_s: Floats  # (steps,) durations of steps on it
+    periods_s: Floats  # (steps,) durations of its steps
     angles: Floats  # (steps,) rad, as in `MappedStep`
     last: Floats  # (d,) a point on it
 
@@ -49,7 +52,7 @@ class Lyapunov:
 
 
 def may_diverge(exponents: Sequence[Lyapunov], value: float) -> bool:
-    """Whether neighbours may diverge at a value: false if the nearest measured exponents are not positive."""
+    """Whether neighbouring walks may diverge at a value: false if the nearest measured exponents are not positive."""
     below = [exponent for exponent in exponents if exponent.value <= value][-1:]
     above = [exponent for exponent in exponents if exponent.value >= value][:1]
     return not exponents or any(exponent.exponent > exponent.uncertainty for exponent in (*below, *above))
@@ -57,15 +60,15 @@ def may_diverge(exponents: Sequence[Lyapunov], value: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class AttractorBranch:
-    """Attractors at successive values of the parameter, until the walk fails."""
+    """Attractors at successive values of the parameter, up to the value at which the walk fails."""
 
     found: tuple[Attractor, ...] = ()
-    lost_at: float | None = None  # first value at which the walk failed; None if it never did
+    lost_at: float | None = None  # first value at which the walk failed; None if it never failed
     reason: str = ""  # outcome of the failed walk
 
 
 def find_period(points: Floats) -> int:
-    """Return after how many steps points (steps, d) repeat or converge to a cycle; 0 if they do neither."""
+    """Return the number of steps after which points (steps, d) repeat or converge to a cycle, or 0 if they never do."""
     for period in range(1, min(MAX_PERIOD, points.shape[0] // 2) + 1):
         apart = np.max(np.abs(points[period:] - points[:-period]), axis=1)
         third = apart.size // 3
@@ -76,7 +79,7 @@ def find_period(points: Floats) -> int:
 
 
 def settle(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Attractor | Outcome:
-    """Return the attractor of a walk from z, or the outcome if it fails within `transient + steps` steps."""
+    """Return the attractor that a walk from z reaches, or its outcome if it fails within `transient + steps` steps."""
     walk = step_map.iterate(z, value, transient + steps, None)
     if walk.outcome is not Outcome.WALKED:
         return walk.outcome
@@ -92,8 +95,8 @@ def sweep_attractor(
     steps: int,
     advance: Callable[[], None] = lambda: None,
 ) -> AttractorBranch:
-    """Follow the attractor that contains z at the first value from value to value, until it is lost."""
-    # Halving narrows the value at which it is lost, so that it does not depend on the grid of values.
+    """Follow the attractor reached from z over successive values of the parameter until it is lost."""
+    # Bisection locates the value at which the attractor is lost, so that it does not depend on the grid of values.
     attractors: list[Attractor] = []
     for value in values:
         settled = settle(step_map, z, float(value), transient, steps)
@@ -126,9 +129,9 @@ def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, steps: int) ->
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
-    """Return the largest Lyapunov exponent of the attractor of a walk from z; None if the walk fails."""
+    """Return the largest Lyapunov exponent of the attractor reached from z; None if the walk fails."""
     # Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
-    # tangent grows is therefore pushed off the gait, and one whose halves differ is continued.
+    # tangent grows is therefore pushed off the gait, and a walk whose halves differ in mean growth is continued.
     for _ in range(MAX_WALKS):
         walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
         if walk.outcome is not Outcome.WALKED:
@@ -149,8 +152,8 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
 
 
 def independent_blocks(series: Floats) -> int:
-    """Count the blocks of several correlation times in a series (n,)."""
-    # The correlation time sums the autocorrelation over all lags before the first that is not positive.
+    """Count the blocks of BLOCK_LENGTH correlation times that fit into a series (n,)."""
+    # The correlation time is the sum of the autocorrelation over all lags before the first non-positive value.
     off = series - series.mean()
     spectrum = np.abs(np.fft.rfft(off, 2 * off.size)) ** 2
     correlation = np.fft.irfft(spectrum)[: off.size]
@@ -165,13 +168,13 @@ def standard_error(series: Floats, blocks: int) -> float:
 
 
 def feigenbaum_ratios(flips: list[float]) -> list[float]:
-    """Return ratios of successive distances between the flips of a cascade; they tend to 4.669."""
+    """Return the ratios of successive distances between the flips of a cascade; they tend to 4.669."""
     gaps = np.diff(np.array(flips))
     return [float(gap / next_gap) for gap, next_gap in pairwise(gaps)]
 
 
 def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
-    """Find points that nearly repeat after given periods in a walk of `steps` steps, as seeds of unstable gaits."""
+    """Walk on an attractor and return points that nearly repeat after one of `periods`, as seeds of unstable gaits."""
     walk = step_map.iterate(attractor.last, attractor.value, steps, None)
     points, seeds = walk.points, []
     for period in periods:
@@ -188,9 +191,9 @@ def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int
 def settle_elsewhere(
     step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
 ) -> list[Seed]:
-    """Find other periodic gaits that walks from scattered starts near an attractor settle on.
+    """Find periodic gaits other than the attractor that walks from scattered starts near it settle on.
 
-    spread  standard deviation of the starts' coordinates, as a share of the largest coordinate
+    spread  standard deviation of the starts' coordinates, as a fraction of the largest coordinate
     """
     seeds: list[Seed] = []
     periods = {attractor.period}

@@ -1,7 +1,7 @@
-"""Basins of attraction of the rigid walker: the attractor that each start reaches, in how many steps, or how it fails.
+"""Basins of attraction of the rigid walker: which attractor each start reaches, in how many steps, or how it fails.
 
-All walks are of the unit walker, on the section just after heel strike, z = (theta_2, dtheta_1, dtheta_2). A walk has
-reached an attractor once it is within a distance from which, as tested, every walk returns to it.
+All walks use the unit walker and start on the section just after heel strike, z = (theta_2, dtheta_1, dtheta_2). A walk
+counts as having reached an attractor once it is within a distance from which every test walk returned to it.
 """
 
 from collections.abc import Sequence
@@ -20,36 +20,36 @@ from walkerlab.physics.orbits.rigid_map import RigidStepper, state_on_section, s
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, Integers
 
-RTOL, ATOL = 1e-6, 1e-8  # of the walks in a basin: errors of 1e-7 per step
-CYCLE_RTOL, CYCLE_ATOL = 1e-11, 1e-13  # of the walks that give attractors
+RTOL, ATOL = 1e-6, 1e-8  # tolerances of walks in a basin; they cause errors of 1e-7 per step
+CYCLE_RTOL, CYCLE_ATOL = 1e-11, 1e-13  # tolerances of walks that determine attractors
 SECTION_SIZE = 3
-UNREACHED = -1  # instead of an attractor's index
+UNREACHED = -1  # attractor index of a walk that reaches no attractor
 MAX_CYCLE_PERIOD = 32  # steps; longer cycles count as aperiodic
-CYCLE_DISTANCE = 1e-7  # distance below which states are equal
-SETTLING_STEPS = 2_000  # before walks are checked
-FIRST_STARTS = 64  # starts that walk this long before any attractor is known
-RESETTLING_STEPS = 400  # at tight tolerances, continuing the first walks
-RETURN_STEPS = 1_000  # in which walks near an attractor must come ten times closer
-MAX_SETTLED_WALKS = 32  # settled walks to follow further
+CYCLE_DISTANCE = 1e-7  # states closer than this count as equal
+SETTLING_STEPS = 2_000  # steps before a walk is checked for a cycle
+FIRST_STARTS = 64  # starts that walk SETTLING_STEPS before any attractor is known
+RESETTLING_STEPS = 400  # further steps of settled walks, at tight tolerances
+RETURN_STEPS = 1_000  # steps within which a walk near an attractor must come ten times closer to it
+MAX_SETTLED_WALKS = 32  # maximum number of settled walks that are continued
 CAPTURE = 1e-3  # largest distance at which an attractor counts as reached
 NARROWING, NARROWINGS = 0.25, 6
-STARTS_PER_POINT = 24  # of an attractor, which must all return to it
-# steps between checks for capture; right-hand sides for these
+STARTS_PER_POINT = 24  # test walks started around each point of an attractor; all must return to it
+# steps between checks for capture; limit of right-hand sides per step
 STEPS_PER_LOOK, BATCH_BUDGET = 16, 4_000_000
 
-# A unit walker: two straight legs walk all starts in lanes, other walkers one start at a time.
+# Unit walker. Walkers with two straight legs walk all starts at once, in lanes; other walkers one start at a time.
 Walker = TwoLegs | RigidModel
 
 
 class Capture(NamedTuple):
-    """An observer that ends walks near an attractor, or after their maximum number of steps."""
+    """Observer that ends a walk near an attractor or after `most` steps."""
 
     points: Any  # (m, 3) points of attractors
-    owner: Any  # (m,) index of each point's attractor
-    reach: Any  # (m,) squared distance of capture
-    most: int  # steps
-    attractor: Any  # (n,) output: index or UNREACHED
-    last: Any  # (n, 3) output: last point of each walk
+    owner: Any  # (m,) index of the attractor of each point
+    reach: Any  # (m,) squared capture distance of each point
+    most: int  # maximum number of steps
+    attractor: Any  # (n,) output: index of the attractor reached, or UNREACHED
+    last: Any  # (n, 3) output: last section point of each walk
 
 
 @record_strike.case(Capture)
@@ -66,8 +66,8 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
-    points: Floats  # (period, 3) on the section in the order of a walk, beginning with the smallest angle
-    reach: float  # distance from which all walks return to it; zero if none was found
+    points: Floats  # (period, 3) section points in walking order, starting with the smallest angle
+    reach: float  # distance from which all test walks return to it; zero if there is none
 
     @property
     def period(self) -> int:
@@ -82,7 +82,7 @@ class Attractors:
     aperiodic: bool = False  # whether some walks continue without repeating
 
     def capture(self, n: int, most: int, share: float = 1.0) -> Capture:
-        """Return an observer of n walks of at most `most` steps; `share` scales the distances of capture."""
+        """Return an observer for n walks of at most `most` steps; `share` scales the capture distances."""
         points = np.concatenate([np.zeros((0, SECTION_SIZE)), *(cycle.points for cycle in self.cycles)])
         owner = np.repeat(np.arange(len(self.cycles)), [cycle.period for cycle in self.cycles])
         reach = np.array([(share * self.cycles[index].reach) ** 2 for index in owner])
@@ -91,7 +91,7 @@ class Attractors:
 
 @dataclass(frozen=True, eq=False)
 class WalkEnds:
-    """Ends of walks, (n,) each: outcome, attractor or UNREACHED, and the number of steps."""
+    """Outcomes of n walks, attractors reached (or UNREACHED) and numbers of steps, (n,) each."""
 
     outcome: Integers
     attractor: Integers
@@ -100,7 +100,7 @@ class WalkEnds:
 
 @dataclass(frozen=True, eq=False)
 class Arrivals(WalkEnds):
-    last: Floats  # (n, 3)
+    last: Floats  # (n, 3) last section point of each walk
 
 
 def walk_to_attractor(
@@ -111,7 +111,7 @@ def walk_to_attractor(
     share: float = 1.0,
     tolerances: tuple[float, float] = (RTOL, ATOL),
 ) -> Arrivals:
-    """Walk from section coordinates z (n, 3) to an attractor, a failure, or `most` steps."""
+    """Walk from section coordinates z (n, 3) until each walk reaches an attractor, fails, or has taken `most` steps."""
     fates: Fates = new_fates(len(z))
     capture = attractors.capture(len(z), most, share)
     if isinstance(walker, RigidModel):
@@ -124,7 +124,7 @@ def walk_to_attractor(
 def walk_one_by_one(
     walker: RigidModel, capture: Capture, starts: Floats, fates: Fates, tolerances: tuple[float, float]
 ) -> None:
-    """Do the same as `walk_lanes` for any walker, checking for capture after each batch of steps."""
+    """Walk from one start after another, for any walker, and check for capture after each batch of steps."""
     shooting, section = RigidStepper(walker, Tolerances("dop853", *tolerances, BATCH_BUDGET)), strike_section(walker)
     for number, start in enumerate(starts):
         z, steps = start, 0
@@ -146,8 +146,8 @@ def walk_one_by_one(
 
 
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
-    """Find the attractors of the unit walker's walks from section coordinates `starts` (n, 3)."""
-    # The first starts walk the full length; later ones only if they do not reach an attractor known by then.
+    """Find the attractors that the unit walker reaches from section coordinates `starts` (n, 3)."""
+    # The first starts walk the full length; later ones only if they reach none of the attractors known by then.
 
     def with_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
         generator = np.random.default_rng(seed)
@@ -163,7 +163,7 @@ def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
 
 
 def find_cycles(walker: Walker, starts: Floats, attractors: Attractors) -> tuple[list[Floats], bool]:
-    """Return the new cycles that walks settle on, and whether any walk settles on none."""
+    """Return the cycles other than `attractors` that walks settle on, and whether any walk stays aperiodic."""
     tight = (CYCLE_RTOL, CYCLE_ATOL)
     rough = walk_to_attractor(walker, attractors, starts, SETTLING_STEPS)
     elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == UNREACHED))
@@ -187,7 +187,7 @@ def order_cycles(cycles: Sequence[Floats]) -> list[Floats]:
 
 
 def cycle_through(walker: Walker, point: Floats) -> Floats | None:
-    """Return the cycle (period, 3) of a walk from a point (3,), smallest angle first; None if aperiodic."""
+    """Return the cycle (period, 3) of a walk from a point (3,), smallest angle first; None if aperiodic or failed."""
     orbit = [point]
     for _ in range(MAX_CYCLE_PERIOD):
         step = walk_to_attractor(walker, Attractors(), orbit[-1][None, :], 1, tolerances=(CYCLE_RTOL, CYCLE_ATOL))
@@ -205,8 +205,8 @@ def same_cycle(first: Floats, second: Floats) -> bool:
 
 
 def find_reach(walker: Walker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
-    """Return a distance from a cycle within which walks from all directions returned to it, or zero."""
-    # It is well below the distance to other cycles.
+    """Return a distance from a cycle within which test walks from all directions return to it, or zero."""
+    # The distance is at most a quarter of the gap to the nearest other cycle.
     foreign = [cycle for cycle in cycles if cycle is not points]
     gap = min((float(np.linalg.norm(p - cycle, axis=1).min()) for cycle in foreign for p in points), default=np.inf)
     reach = min(CAPTURE, 0.25 * gap)
@@ -224,13 +224,13 @@ def find_reach(walker: Walker, points: Floats, cycles: Sequence[Floats], generat
 
 @dataclass(frozen=True)
 class Window:
-    """A grid of starts over some coordinates of the section, SI units."""
+    """Grid of starts over some of the section coordinates, SI units."""
 
     axes: tuple[int, ...]  # indices into (theta_2, dtheta_1, dtheta_2)
     lower: tuple[float, ...]  # lower bound along each axis
     upper: tuple[float, ...]  # upper bound along each axis
-    cells: tuple[int, ...]  # number along each axis
-    rest: tuple[float, ...]  # (3,) the section's coordinates, replaced along the axes
+    cells: tuple[int, ...]  # number of cells along each axis
+    rest: tuple[float, ...]  # (3,) section coordinates; the coordinates in `axes` are replaced
 
     @property
     def size(self) -> int:
@@ -243,9 +243,9 @@ class Window:
         return self.lower[axis] + width * middles
 
     def starts(self, cells: Integers, inside: Floats | None = None) -> Floats:
-        """Return section coordinates (n, 3) of cells by flat index, the last axis fastest.
+        """Return section coordinates (n, 3) of the cells with these flat indices, last axis fastest.
 
-        inside  (n, axes) position within each cell, from -1/2 to 1/2; centres by default
+        inside  (n, axes) position within each cell, in cell widths from -1/2 to 1/2; cell centres by default
         """
         z = np.tile(np.array(self.rest), (len(cells), 1))
         for place, (axis, index) in enumerate(zip(self.axes, np.unravel_index(cells, self.cells), strict=True)):
@@ -262,7 +262,7 @@ class Window:
 
 
 def edge_cells(classes: NDArray[Any]) -> Integers:
-    """Return the flat indices of cells that have a neighbour of another class along an axis."""
+    """Return the flat indices of the cells with a neighbour of another class along some axis."""
     from scipy import ndimage  # only needed here
 
     neighbours = ndimage.generate_binary_structure(classes.ndim, 1)
@@ -271,6 +271,6 @@ def edge_cells(classes: NDArray[Any]) -> Integers:
 
 
 def subcell_centres(refine: int, axes: int) -> Floats:
-    """Return the centres (refine^axes, axes) of a cell's subcells, from -1/2 to 1/2."""
+    """Return the centres (refine^axes, axes) of a cell's subcells, in cell widths from the cell's centre."""
     middles = (np.arange(refine) + 0.5) / refine - 0.5
     return np.stack(np.meshgrid(*[middles] * axes, indexing="ij"), axis=-1).reshape(-1, axes)

@@ -2,7 +2,7 @@
 
 Test functions of the derivative DP of n steps: det(DP - 1) for a fold, det(DP + 1) for a flip, and for a torus
 det(DP ^ DP - 1), where the bialternate product DP ^ DP acts on pairs of directions and has products of pairs of
-multipliers as eigenvalues. Each is smooth along a branch, so fast root finders converge.
+multipliers as eigenvalues. All are smooth along a branch, so that fast root finders converge.
 
 Source: Kuznetsov, Elements of applied bifurcation theory, sections 5.4 (normal form of the flip), 10.2 and 10.3.
 """
@@ -21,14 +21,14 @@ from walkerlab.physics.solvers.system import Floats
 
 Kind = Literal["fold", "flip", "torus"]
 BIFURCATION_KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
-NORMAL_FORM_STEP = 1e-3  # step of the normal form's differences; coordinates are of magnitude one
+NORMAL_FORM_STEP = 1e-3  # difference step for the normal form; coordinates are of magnitude one
 FORM_REFINEMENTS = 4
-FIRST_MULTIPLIER_DROP = 0.2  # by which the multiplier of a new branch's first point is below 1
+FIRST_MULTIPLIER_DROP = 0.2  # 1 minus the multiplier at the first point of a new branch
 PAIR_TOLERANCE = 1e-4  # distance from the unit circle within which multipliers form a critical pair
 
 
 class GaitEquations:
-    """P^n(z) - z = 0 over x = (z, p / scale)."""
+    """Gait equations P^n(z) - z = 0 in the unknowns x = (z, p / scale)."""
 
     def __init__(self, step_map: StepMap, period: int, scale: float) -> None:
         self.step_map, self.period, self.scale = step_map, period, scale
@@ -43,7 +43,7 @@ class GaitEquations:
 
 
 def on_pairs(DP: Floats) -> Floats:
-    """Return the action of DP (d, d) on pairs of directions, a square matrix of size d (d - 1) / 2."""
+    """Return the bialternate product of DP (d, d) with itself, a square matrix of size d (d - 1) / 2."""
     first, second = np.triu_indices(DP.shape[0], 1)
     straight = DP[np.ix_(first, first)] * DP[np.ix_(second, second)]
     crossed = DP[np.ix_(first, second)] * DP[np.ix_(second, first)]
@@ -58,10 +58,10 @@ def critical_value(kind: Kind, DP: Floats) -> float:
 @dataclass(frozen=True)
 class Bifurcation:
     kind: Kind
-    value: float  # of the parameter
+    value: float  # value of the parameter
     multiplier: complex
     point: CurvePoint[Cycle]
-    segment: Segment[Cycle] = field(repr=False)  # of the branch
+    segment: Segment[Cycle] = field(repr=False)  # segment of the branch that contains it
 
     @property
     def gait(self) -> Cycle:
@@ -93,9 +93,9 @@ def locate_bifurcation(segment: Segment[Cycle], kind: Kind, scale: float) -> Bif
 
 @dataclass(frozen=True)
 class FlipForm:
-    """The flip on its centre manifold: xi -> -(1 + rate s) xi + cubic xi^3, s the branch's arclength."""
+    """Normal form of a flip, xi -> -(1 + rate s) xi + cubic xi^3, at arclength s along the branch from the flip."""
 
-    direction: Floats  # (d,) eigenvector to -1, of unit length
+    direction: Floats  # (d,) unit eigenvector of the multiplier -1
     adjoint: Floats  # (d,) left eigenvector, adjoint . direction = 1
     bend: Floats  # (d,) second-order part of the centre manifold: z = z* + xi direction + xi^2 bend
     cubic: float
@@ -113,7 +113,7 @@ def eigenvector(A: Floats, value: float) -> Floats:
 
 
 def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
-    """Compute the normal form at a flip by differences of exact steps; None if a probe fails."""
+    """Compute the normal form at a flip from differences of exact steps; None if a probe fails."""
     A = flip.point.evaluated.data.DP
     v, w = eigenvector(A, -1.0), eigenvector(A.T, -1.0)
     w = w / (w @ v)
@@ -123,7 +123,7 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
     passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
     if len(passing) < 2:
         return None
-    rate = (passing[0] - passing[1]) / (2.0 * gap)  # at which the multiplier crosses -1 along the branch
+    rate = (passing[0] - passing[1]) / (2.0 * gap)  # minus the derivative by s of the multiplier that crosses -1
     form, probe = None, NORMAL_FORM_STEP
     for _ in range(FORM_REFINEMENTS):
         terms = _cubic(equations, flip, v, w, probe)
@@ -162,7 +162,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 
 
 def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
-    """Predict the doubled branch near a flip: a point x (d + 1,), the normal of a plane for `correct`, an amplitude."""
+    """Predict a point x (d + 1,) of the doubled branch near a flip; also return a plane's normal and the amplitude."""
     xi = share * form.amplitude
     s = form.cubic * xi * xi / form.rate
     guess = flip.point.x + s * flip.point.tangent

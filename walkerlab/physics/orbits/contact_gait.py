@@ -1,6 +1,6 @@
-"""Search for the contact model's own gait: walk from a rigid start to the section, then Newton's method.
+"""Search for the contact model's own gait: walk from a rigid start to the section, then apply Newton's method.
 
-If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to the actual one.
+If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to actual ground.
 """
 
 import math
@@ -23,12 +23,12 @@ from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
-WARM_UP_STEPS = (4, 2, 0)  # steps to walk before Newton's method
-SEARCH_STEP_BUDGET = 40_000  # right-hand sides
+WARM_UP_STEPS = (4, 2, 0)  # numbers of steps to walk before Newton's method, tried in turn
+SEARCH_STEP_BUDGET = 40_000  # right-hand sides per step
 CONTACT_EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
-# factors between nearly rigid ground and the actual one
+# factors from the actual to nearly rigid ground: stiffness rises, friction velocities fall
 MAX_STIFFENING, MAX_CREEP_FACTOR = 100.0, 30.0
-# fractions of the way from nearly rigid to actual ground
+# strides from nearly rigid ground (0) to the actual ground (1)
 FIRST_STRIDE, RIGIDITY_STRIDES = 0.25, Strides(1.0, 0.02, 2)
 
 
@@ -40,7 +40,7 @@ class GaitAnswer:
 
 
 def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """Find the contact gait near a free state with both feet on the ground; without one, say why and advise."""
+    """Search for the contact gait near a free walker's state with both feet on the ground; say why if there is none."""
     excluded = why_no_gait(walker)
     if excluded:
         return GaitAnswer(None, *excluded)
@@ -58,7 +58,7 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
 
 
 def why_no_gait(walker: ContactWalker) -> tuple[str, str] | None:
-    """Return why conservation of momentum and energy exclude a gait on this ground, and advice; None if they do not."""
+    """Return reason and advice if conservation of momentum or energy excludes a gait on this ground; else None."""
     if walker.slope <= 0.0 and not walker.driven:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
     friction, required = walker.friction.largest, abs(math.tan(walker.slope))
@@ -79,7 +79,7 @@ def why_no_gait(walker: ContactWalker) -> tuple[str, str] | None:
 def section_points(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State
 ) -> Iterator[tuple[int, Floats]]:
-    """Yield points of the section on a walk from the start, each with its number of steps."""
+    """Walk from the start and yield points of the section, each with the number of steps walked."""
     for steps in WARM_UP_STEPS:
         walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
         observer = new_observer(walker, walk_state, start)
@@ -107,8 +107,8 @@ def solve_gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | st
 
 
 def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
-    """Return the walker with stiffness, damping and friction velocities of the ground scaled by these factors."""
-    # The penetration of full damping shrinks with the static penetration, so that the damping ratio is unchanged.
+    """Return the walker with the ground's stiffness, damping and friction velocities multiplied by these factors."""
+    # The full-damping penetration shrinks like the static penetration, so that the damping ratio is unchanged.
     normal = walker.normal
     changed = normal._replace(
         stiffness=normal.stiffness * stiffness,
@@ -119,7 +119,7 @@ def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, cr
 
 
 def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
-    """Return the walker on ground of a rigidity from 0, its own, to 1, nearly rigid."""
+    """Return the walker on ground of a rigidity between 0 (its own ground) and 1 (nearly rigid)."""
     stiffer = MAX_STIFFENING**rigidity
     return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), MAX_CREEP_FACTOR**-rigidity)
 

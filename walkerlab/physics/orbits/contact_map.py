@@ -1,9 +1,9 @@
 """Step map of the contact model, on a section where no foot is touching down or lifting off.
 
-On the section the swing foot passes the stance foot, after the fast transients of touch-down have decayed. Coordinates,
-ordered by the legs' roles: height of the centre of mass, angles of the legs' bodies except the uppermost of the swing
-leg, which the section determines, velocity along and normal to the slope, and the rates of all bodies that turn
-independently; six for two straight legs. The stance knee is locked, the swing knee free.
+On the section the swing foot passes the stance foot; the fast transients of touchdown have decayed by then. The
+coordinates, ordered by the legs' roles, are the height of the centre of mass, the angles of the bodies except the swing
+leg's uppermost one (which the section determines), the velocity along and normal to the slope, and the rates of all
+bodies that turn independently: six for two straight legs. The stance knee is locked, the swing knee free.
 
 One step maps the section to itself with the legs' roles exchanged.
 """
@@ -54,28 +54,31 @@ from walkerlab.physics.orbits.step_map import (
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
-# indices into the state: position along the slope, height, bodies' angles; velocities follow in the same order
+# indices into the state of the position along the slope, the height and the first body's angle; velocities follow in
+# the same order
 ALONG, HEIGHT, ANGLES = 0, 1, 2
 NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True)
 class SectionStep(MappedStep):
-    slip_m: float  # net, from touch-down to lift-off: the landing foot's so far plus the other foot's from here on
-    rolling_m: float  # likewise
-    dissipated_J: Floats  # (5,) by damping, friction, edges, knee strikes and knee stops
+    # net slip over a whole stance: the landing foot's until the section, plus the trailing foot's from the section on
+    slip_m: float
+    rolling_m: float  # rolling distance, summed in the same way
+    dissipated_J: Floats  # (5,) losses to damping, friction, pad edges, knee strikes and knee stops
     driven: DrivenWork
-    work: NDArray[np.int64]  # right-hand sides, accepted, rejected, Jacobians
+    work: NDArray[np.int64]  # counts of right-hand sides, accepted steps, rejected steps and Jacobians
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Bodies that turn independently, the swing leg's first; the shank below the locked stance knee does not."""
+    """Return the bodies that turn independently, the swing leg's first; the locked stance shank is not among them."""
     locked = walker.whole.knees[stance, 0] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
 def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Bodies whose angles are coordinates; a latched compliant stop gives the stance knee an angle of its own."""
+    """Return the bodies whose angles are coordinates, the swing leg's first."""
+    # A latched compliant stop gives the stance shank an angle of its own.
     free = turning_bodies(walker, stance)[1:]
     if walker.kneed and not isinstance(walker.stop, IdealLock):
         return (*free, int(walker.whole.knees[stance, 0]))
@@ -83,7 +86,7 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
 
 
 def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
-    """Fill in the angles (n), or changes of angles, of coupled bodies that are not `fixed`."""
+    """Set the angles (n,), or changes of angles, of coupled bodies that are not `fixed`; return `angles`."""
     form, n = walker.whole, angles.size
     shank, thigh = form.knees[stance]
     if walker.kneed and shank not in fixed:
@@ -95,14 +98,14 @@ def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tu
 
 
 def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
-    """Return how far foot 0 is ahead of foot 1 (m), and the derivatives by the bodies' angles (n)."""
+    """Return the distance (m) of foot 0 ahead of foot 1, and its derivatives (n,) by the bodies' angles."""
     s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
     x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
     return float(c @ x - s @ y), -(s * x + c * y)
 
 
 def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
-    """Return the walker's state at section coordinates, standing on leg `stance` at along = 0."""
+    """Return the walker's state at section coordinates z, standing on leg `stance`, at position 0 along the slope."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     state = np.zeros(4 + 2 * n)
@@ -126,7 +129,7 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
 
 
 def stand(walker: ContactWalker, z: Floats, stance: int) -> Floats:
-    """Return section coordinates with the stance foot at rest, as deep in the ground as the weight presses it."""
+    """Return section coordinates moved so that the stance foot rests on the ground at its static penetration."""
     foot = feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
     law, weight = walker.normal, walker.mass * walker.gravity_down
     depth = resting_foot(weight, walker.mass, law.stiffness, law.exponent, law.damping).depth
@@ -145,7 +148,7 @@ def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
 
 
 def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats:
-    """Derivative (4 + 2 n, coordinates) of `state_on_section` at the state that it returned."""
+    """Return the derivative (4 + 2 n, coordinates) of `state_on_section` by z, at a state that it returned."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
@@ -168,7 +171,7 @@ def step_from_section(
     """Walk from section to section on pads of pitch `pitch_m`; REJECTED if a push-off lasts beyond the section."""
     stance, laid = STANCE_FOOT, ground
     start = state_on_section(walker, z, stance)
-    if ground.terrain.has_pads:  # with the standing foot in the middle of a pad
+    if ground.terrain.has_pads:  # the stance foot stands in the middle of a pad
         foothold = feet_motion(walker.whole, start)[stance].along
         laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
     walk_state = walk_state_on_section(walker, laid, start, 2)
@@ -213,7 +216,7 @@ def step_from_section(
 def walk_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
 ) -> DisturbedWalk:
-    """Walk from the section over heights (steps + 1,) in m; at the first touch a push (N s) acts on the hip."""
+    """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
     start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
     laid = over_footholds(ground, heights)
     walk_state = walk_state_on_section(walker, laid, start, steps + 1)
@@ -240,7 +243,7 @@ def walk_from_section(
 
 
 def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
-    """Return the angles (steps,) from the vertical of straight legs that touch this far ahead and up (m)."""
+    """Return the angles (steps,) from the vertical of straight legs that touch down this far ahead and up (m)."""
     apart = 0.5 * np.hypot(along, up) / leg_length
     return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
@@ -248,7 +251,7 @@ def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Fl
 def legs_sampled_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats
 ) -> Floats:
-    """Sample angles (times, 2) on `walk_from_section`, the leg that swings second first; times are from the section."""
+    """Sample angles (times, 2) in `walk_from_section`, first stance leg first; times (s) count from the section."""
     start = state_on_section(walker, z, STANCE_FOOT)
     laid = over_footholds(ground, heights)
     walk_state = walk_state_on_section(walker, laid, start, heights.size)
@@ -269,7 +272,7 @@ def shorten(walk_state: WalkState, steps: int) -> WalkState:
 
 
 def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
-    """Apply an impulse (N s) at the hip along the slope to a state of the free walker."""
+    """Return a state of the free walker just after an impulse (N s) at the hip along the slope."""
     form, new = system.form, np.array(state)
     y = to_form(form, new)
     n, half = int(form.bodies), int(form.places + form.bodies)
@@ -287,7 +290,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
 
 
 def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:
-    """Return the walk state for `steps` touch-downs: one foot stands, and the other swings past it."""
+    """Return the walk state that belongs to a start on the section, with room for `steps` touchdowns."""
     stance, swing = STANCE_FOOT, 1 - STANCE_FOOT
     walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
     feet = feet_motion(walker.whole, start)
@@ -311,15 +314,15 @@ class WalkerOnGround:
 class ContactMap(StepMap):
     """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
 
-    Families are followed on ground that a foot can touch only ahead of the stance foot, so that straight legs may scuff
-    as between pads. `watch` reports where pads of the gait's own step length would trip the foot.
+    For pads, families are followed on ground that feet can touch only ahead of the stance foot, so that straight legs
+    may scuff. `watch` reports whether pads of the gait's own step length would trip the swing foot.
     """
 
     monitors = (
         Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
         Monitor("tripped", "1", "whether pads of its own step length trip the swing foot", 0.5),
     )
-    probe = 1e-6  # stiff ground yields by less than 0.01 mm
+    probe = 1e-6  # small compared with the penetration of stiff ground, which is below 0.01 mm
 
     def __init__(
         self,
@@ -329,7 +332,7 @@ class ContactMap(StepMap):
         step_length_m: float,
         like: WalkerOnGround,
     ) -> None:
-        """Prepare a family's map; `walker_at` returns None where a value makes no walker, `like` sets the units."""
+        """Prepare a family's map; `walker_at` returns None for values without a valid walker, `like` sets the units."""
         self._at = lru_cache(CACHE_SIZE)(walker_at)
         self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
         self._on_pads = like.ground.terrain.has_pads
@@ -374,7 +377,7 @@ class ContactMap(StepMap):
         return np.array([slip, tripped])
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk over footholds (m) from the touch-down after z, where a push is applied."""
+        """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
         site = self._at(p)
         assert site is not None, "what is disturbed has a gait"
         ground = site.ground._replace(terrain=self._terrain(site))
@@ -410,7 +413,7 @@ class ContactMap(StepMap):
 
 
 class OwnPads(Stepper):
-    """Stepper of a walker on compliant ground, in SI, whose pads are re-laid for the length of the last step."""
+    """Stepper (SI) of a walker on compliant ground that sets the pitch of the pads to the length of the last step."""
 
     def __init__(
         self, walker_at: Callable[[float], ContactWalker], ground: JudgedGround, tolerances: Tolerances, pitch_m: float

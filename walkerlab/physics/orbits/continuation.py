@@ -1,8 +1,8 @@
-"""Continuation of solutions over a parameter: from value to value, or along their curve through its folds.
+"""Continuation of solutions in a parameter: from value to value, or along the solution curve and through its folds.
 
-Both predict the next solution and correct it by Newton's method. From value to value the predictor is a polynomial
-through the last solutions. A curve is the set of solutions of `m` equations in `m + 1` unknowns: the predictor follows
-the tangent and the corrector stays on the plane normal to it, so that a fold is a regular point.
+Both methods predict the next solution and correct it by Newton's method. From value to value the predictor is a
+polynomial through the last solutions. A curve is the set of solutions of `m` equations in `m + 1` unknowns: the
+predictor follows the tangent and the corrector stays on the plane normal to it, so that a fold is a regular point.
 
 Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems (1977); Kuznetsov, Elements of
 applied bifurcation theory, chapter 10.
@@ -27,13 +27,13 @@ from walkerlab.physics.orbits.newton import (
 from walkerlab.physics.solvers.system import Floats
 
 FEW_CORRECTIONS = 3
-ROOT_RESOLUTION = 1e-14  # of arclength
-# (abscissa, solution) pairs, latest last.
+ROOT_RESOLUTION = 1e-14  # absolute, in arclength
+# (abscissa, solution) pairs, latest last
 Points = tuple[tuple[float, Floats], ...]
 
 
 class Strides(NamedTuple):
-    """Limits of the stride over the parameter, and how many points the predictor uses."""
+    """Limits of the stride in the parameter, and the number of points that the predictor uses."""
 
     widest: float
     narrowest: float
@@ -41,7 +41,7 @@ class Strides(NamedTuple):
 
 
 class FollowerState(NamedTuple):
-    """How far a solution has been followed, and the state from which it continues."""
+    """Value up to which a solution has been followed, the next stride, and the last points."""
 
     value: float
     stride: float
@@ -49,7 +49,7 @@ class FollowerState(NamedTuple):
 
 
 class Follower:
-    """Follows a solution over a rising parameter; earlier progress is cached."""
+    """Follows a solution as the parameter rises, and caches its progress."""
 
     def __init__(
         self,
@@ -58,14 +58,14 @@ class Follower:
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Begin with `first`; `solve` returns the solution (m,) near a prediction, smooth in `abscissa`, or None."""
+        """Start from `first`; `solve` returns the solution (m,) near a prediction, smooth in `abscissa`, or None."""
         self._solve, self._strides, self._abscissa, self._states = solve, strides, abscissa, [first]
 
     def to(self, target: float) -> FollowerState:
-        """Follow the solution to the parameter's value `target`, or to where it is lost."""
-        # Strides do not depend on the target until the last, so the cached ones serve every target.
+        """Follow the solution to the parameter value `target`, or until it is lost."""
+        # Only the last stride depends on the target, so the cached strides serve every target.
         state = self._states[0]
-        for state in self._states:  # grows during the loop
+        for state in self._states:  # the list grows during the loop
             following = state.value + state.stride
             if following >= target or state.stride < self._strides.narrowest:
                 break
@@ -98,7 +98,7 @@ def interpolate(points: Points, x: float) -> Floats:
 @dataclass(frozen=True)
 class CurvePoint(Generic[Data]):
     x: Floats
-    tangent: Floats  # of unit length
+    tangent: Floats  # unit vector
     evaluated: Evaluated[Data]
     corrections: int
 
@@ -106,7 +106,7 @@ class CurvePoint(Generic[Data]):
 def correct(
     equations: Equations[Data], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_NEWTON_EVALUATIONS
 ) -> CurvePoint[Data] | NotConverged:
-    """Solve for the point of a curve on the plane through `guess` with that normal."""
+    """Solve for the point of a curve on the plane through `guess` with this `normal`."""
 
     def on_plane(x: Floats) -> Evaluated[Data]:
         evaluated = equations(x)
@@ -125,11 +125,11 @@ def correct(
 
 @dataclass(frozen=True)
 class StepControl:
-    first: float = 0.01  # arclength, also of the next two
-    shortest: float = 1e-8
-    longest: float = 0.05
-    turn: float = 0.97  # cosine of the largest angle between tangents of neighbours
-    tolerance: float = 1e-12  # on the equations
+    first: float = 0.01  # arclength of the first step
+    shortest: float = 1e-8  # arclength
+    longest: float = 0.05  # arclength
+    turn: float = 0.97  # cosine of the largest angle between the tangents of neighbouring points
+    tolerance: float = 1e-12  # largest residual of the equations
 
 
 def step_along(
@@ -140,7 +140,7 @@ def step_along(
     acceptable: Callable[[CurvePoint[Data]], bool] = lambda _: True,
     before: CurvePoint[Data] | None = None,
 ) -> tuple[CurvePoint[Data], float] | NotConverged:
-    """Find the next `acceptable` point of a curve and the length of the step after it; `before` gives the curvature."""
+    """Find the next `acceptable` point of a curve and the next step length; `before` serves to predict curvature."""
     lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
     if before is not None:
@@ -161,7 +161,7 @@ def step_along(
 
 @dataclass(frozen=True)
 class Segment(Generic[Data]):
-    """The curve between two neighbours, as a function of the distance along the first one's tangent."""
+    """Curve between two neighbouring points, as a function of the distance along the first point's tangent."""
 
     equations: Equations[Data]
     first: CurvePoint[Data]
@@ -185,7 +185,7 @@ class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an erro
 
 def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], float]) -> CurvePoint[Data] | None:
     """Return the point of a segment where `measure` changes sign, by Brent's method; None if the curve is lost."""
-    # Imported late: only curves need it.
+    # imported late, because only curves need it
     from scipy.optimize import brentq
 
     points: dict[float, CurvePoint[Data]] = {0.0: segment.first, segment.length: segment.second}

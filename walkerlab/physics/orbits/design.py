@@ -1,7 +1,7 @@
 """Minimum or maximum of a gait quantity over walker parameters, with bounds on other quantities.
 
-SciPy's SLSQP on parameters scaled to their bounds, with exact gradients, from several starts. Where there is no gait
-the function rises with distance from the last point that had one, so that the search avoids the gap.
+SciPy's SLSQP searches parameters scaled to their bounds, with exact gradients and from several starts. If there is no
+gait, the function rises with the distance from the last point that had one, so that the search avoids the gap.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 
 from walkerlab.physics.solvers.system import Floats
 
-PRECISION = 1e-9  # of the quantity, relative to its initial value
+PRECISION = 1e-9  # change of the quantity at convergence, relative to its initial value
 MAX_DESIGN_ITERATIONS = 60
-BOUND_TOLERANCE = 1e-6  # of the range
-SAME_OPTIMUM = 1e-4  # of the range, between ends of searches at one optimum
-PENALTY_SLOPE = 10.0  # where there is no gait, in initial values per range
+BOUND_TOLERANCE = 1e-6  # distance from a bound, as a fraction of the range
+SAME_OPTIMUM = 1e-4  # searches that end closer than this fraction of the range found the same optimum
+PENALTY_SLOPE = 10.0  # penalty if there is no gait, in initial values per squared range
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,12 @@ class Point:
 
 @dataclass(frozen=True)
 class DesignProblem:
-    quantity: str  # to minimise, or to maximise with `sign` -1
+    quantity: str  # quantity to minimise, or to maximise if `sign` is -1
     sign: float
     lower: Floats  # (variables,) bounds
     upper: Floats  # (variables,) bounds
     keep: Mapping[str, tuple[float, float]]  # bounds on other quantities
-    evaluate: Callable[[Floats], Point | None]  # evaluate the gait at parameters (variables,), or None
+    evaluate: Callable[[Floats], Point | None]  # returns the gait's quantities at parameters (variables,), or None
 
 
 @dataclass
@@ -107,7 +107,7 @@ def is_feasible(problem: DesignProblem, point: Point) -> bool:
 def search_from_starts(
     problem: DesignProblem, own: Floats, starts: int, seed: int, search: Searcher | None = None
 ) -> list[DesignSearch]:
-    """Search from the walker's own parameters and from random ones; the best feasible search comes first."""
+    """Search from the walker's own parameters and from random ones; return successful searches, best feasible first."""
     search = search or (lambda _, start: minimise(problem, start))
     random_starts = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (starts - 1, own.size))
     all_starts = (np.clip(own, problem.lower, problem.upper), *random_starts)

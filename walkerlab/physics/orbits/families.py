@@ -1,7 +1,7 @@
 """Families of gaits over a parameter: branches, their bifurcations, and the cascades beyond their flips.
 
 A branch is followed from a gait in both directions until it leaves the span or is lost. At each flip the branch of
-twice the period is entered along the eigenvector to -1, at the amplitude given by the flip's normal form.
+twice the period is entered along the eigenvector of the multiplier -1, at an amplitude from the flip's normal form.
 """
 
 from collections.abc import Callable, Iterable
@@ -28,16 +28,16 @@ from walkerlab.physics.orbits.newton import Effort, NotConverged
 from walkerlab.physics.orbits.step_map import Cycle, Monitor, StepMap, gait_near
 from walkerlab.physics.solvers.system import Floats
 
-SAME_STATE = 1e-6  # distance below which states are equal
-AMPLITUDE_HALVINGS = 12  # when entering a doubled branch
-MAX_MULTIPLIER_CHANGE = 0.6  # between neighbours, for multipliers near the unit circle
-CRITICAL_RANGE = 1.6  # magnitudes up to this, or its inverse, are near the unit circle
-SEED_EVALUATIONS = 20  # of Newton's method
+SAME_STATE = 1e-6  # states closer than this count as equal
+AMPLITUDE_HALVINGS = 12  # halvings of the amplitude when entering a doubled branch
+MAX_MULTIPLIER_CHANGE = 0.6  # between neighbouring points, for multipliers near the unit circle
+CRITICAL_RANGE = 1.6  # multipliers are near the unit circle if their magnitude or its inverse is below this
+SEED_EVALUATIONS = 20  # evaluations in Newton's method from a seed
 CLOSED_LOOP = "comes round to where it began"
 NO_WALKER = "no walker has the parameter's next value"
 END_OF_SPAN = "end of the span"
-EDGE_TOLERANCE = 1e-12  # relative to the span
-# per branch; growth of a disturbance over a cycle, beyond which gaits cannot be resolved
+EDGE_TOLERANCE = 1e-12  # relative to the size of the span
+# points per branch; growth of a disturbance over a cycle beyond which gaits cannot be resolved
 MAX_BRANCH_POINTS, MAX_CYCLE_GROWTH = 400, 1e4
 
 
@@ -68,7 +68,7 @@ class BranchEnd:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Value on a branch at which a monitored assumption begins or ceases to hold."""
+    """Value on a branch at which a monitored quantity crosses its limit."""
 
     monitor: Monitor
     value: float
@@ -93,7 +93,7 @@ class GaitBranch:
     @property
     def stable_ranges(self) -> tuple[tuple[float, float], ...]:
         stretches: list[list[float]] = []
-        values = [self.ends[0].value]  # of the current stable stretch
+        values = [self.ends[0].value]  # values on the current stable stretch
         stable = self.points[0].stable
         for gait, following in pairwise(self.points):
             if gait.stable:
@@ -116,7 +116,7 @@ class GaitBranch:
 
     @property
     def flipped_outside(self) -> bool:
-        """Whether the whole branch lies beyond a flip that is not on it: one multiplier below -1 throughout."""
+        """Whether the whole branch lies beyond a flip outside the span, so that one multiplier stays below -1."""
         on_it = any(bifurcation.kind == "flip" for bifurcation in self.bifurcations)
         return not on_it and critical_value("flip", self.points[0].DP) < 0.0
 
@@ -140,7 +140,7 @@ class BranchFollower:
     def family(
         self, seeds: Iterable[Seed], periods: int, previous: tuple[GaitBranch, ...] = ()
     ) -> tuple[GaitBranch, ...]:
-        """Return `previous`, other branches through the seeds, and cascades of up to `periods` steps beyond flips."""
+        """Return `previous`, new branches through the seeds, and cascades beyond flips, up to period `periods`."""
         branches = list(previous)
         for seed in seeds:
             start = self.solve_at(seed.z, seed.value, seed.steps)
@@ -162,10 +162,10 @@ class BranchFollower:
                     (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
                     (*reversed(behind.crossings), *branch_ahead.crossings),
                 )
-            # a known branch has no points between its flip and its first gait, so `lies_on` may miss it
+            # `lies_on` misses gaits between a known branch's flip and its first gait, so check the other way round, too
             if not any(self.lies_on(branch_ahead, branch.points[0]) for branch in like):
                 branches.append(branch_ahead)
-        for branch in branches:  # grows during the loop
+        for branch in branches:  # the list grows during the loop
             if 2 * branch.period <= periods and branch not in previous:
                 branches.extend(self.follow_doubled(branch, branches))
         return tuple(close_on_flips(branch, branches) for branch in branches)
@@ -207,8 +207,8 @@ class BranchFollower:
         return branches
 
     def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
-        """Return the first gait of twice the period, at the normal form's amplitude; None if it is lost."""
-        # its tangent points away from the flip: the halves of the cycle move apart along it
+        """Return the first gait of twice the period, at the normal form's amplitude; None if Newton's method fails."""
+        # the tangent must point away from the flip, where the halves of the cycle move apart
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
             point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
@@ -259,7 +259,7 @@ class BranchFollower:
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
     def multiplier_check(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
-        """Return a check that multipliers near the unit circle moved little, so that no two crossings are missed."""
+        """Return a check that multipliers near the unit circle move little, so that no pair of crossings is missed."""
         critical = [m for m in last.evaluated.data.multipliers if 1.0 / CRITICAL_RANGE < abs(m) < CRITICAL_RANGE]
 
         def near(point: CurvePoint[Cycle]) -> bool:
@@ -272,7 +272,7 @@ class BranchFollower:
         self, equations: GaitEquations, last: CurvePoint[Cycle], step: float, before: CurvePoint[Cycle] | None
     ) -> tuple[CurvePoint[Cycle], float, BranchEnd | None] | BranchEnd:
         """Return the next point, step length and, if reached, the branch's end; only the end if no point follows."""
-        # A step that leaves the span is cut at its edge, since beyond it there may be no walker.
+        # A step out of the span is cut at its edge, because there may be no walker beyond.
         ahead, acceptable = last.x + step * last.tangent, self.multiplier_check(last)
         edge = self.span.nearest(equations.value(ahead))
         if edge != equations.value(ahead):
@@ -294,7 +294,7 @@ class BranchFollower:
         return at_edge, step, BranchEnd(self.span.nearest(value), END_OF_SPAN)
 
     def at_edge(self, equations: GaitEquations, last: CurvePoint[Cycle], beyond: Floats) -> CurvePoint[Cycle] | None:
-        """Solve for the gait at the edge of the span, on the way from `last` to a point (d + 1,) beyond."""
+        """Solve for the gait at the edge of the span, between `last` and a point `beyond` (d + 1,), or return None."""
         start, value = equations.value(last.x), equations.value(beyond)
         edge = self.span.nearest(value)
         guess = last.x + (edge - start) / (value - start) * (beyond - last.x)
@@ -311,7 +311,7 @@ class BranchFollower:
 
 
 def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float) -> bool:
-    """Whether a gait lies between two neighbours on a curve whose tangent turns by less than arccos `turn`."""
+    """Whether a gait lies on the segment between two neighbours and its tangent turns by less than arccos(`turn`)."""
     first = segment.first
     along = float(first.tangent @ (gait.x - first.x))
     if not 0.0 < along <= segment.length or gait.tangent @ first.tangent < turn:
@@ -325,12 +325,12 @@ def steps_word(n: int) -> str:
 
 
 def half_cycle_difference(gait: Cycle) -> Floats:
-    """Return the difference between a gait's states half a cycle apart; zero for a gait of half as many steps."""
+    """Return the difference between a gait's states half a cycle apart; zero if it repeats after half its steps."""
     return np.asarray(gait.steps[len(gait.steps) // 2 - 1].z - gait.z)
 
 
 def halves_meet(last: Cycle, gait: Cycle) -> bool:
-    """Whether a branch has reached the gait of half as many steps: the cycle's halves coincide or have swapped."""
+    """Whether a branch has reached the gait of half the period: the cycle's halves coincide or have swapped."""
     parted = half_cycle_difference(gait)
     return bool(np.abs(parted).max() < SAME_STATE or half_cycle_difference(last) @ parted < 0.0)
 

@@ -1,4 +1,4 @@
-"""Search for all families of one model over a span: branches with cascades, attractors, chaos, and a plane's curves."""
+"""Search for all gait families of one model over a span: branches, cascades, attractors, chaos, bifurcation curves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,10 +30,10 @@ from walkerlab.physics.orbits.two_parameters import (
 )
 from walkerlab.physics.solvers.system import Floats
 
-BEFORE_FLIP = 0.02  # of the span: the attractor is followed from this far before the first flip
-# parameter values, periods to search for, length of the walks
+BEFORE_FLIP = 0.02  # the attractor is followed from this far before the first flip, as a fraction of the span
+# number of parameter values, periods to search for, steps per walk
 OTHER_GAIT_VALUES, OTHER_PERIODS, CLOSE_RETURN_STEPS = 12, (3, 5, 6), 4000
-# at each value: number, standard deviation, and steps to settle
+# scattered starts at each value: number, standard deviation (see `settle_elsewhere`), and steps to settle
 SCATTERED, SCATTER_WIDTH, SCATTER_STEPS = 40, 0.1, 400
 CURVE_POINTS = 120
 RIGID, CONTACT = "rigid", "contact"
@@ -47,19 +47,19 @@ class Listener(Protocol):
 
 @dataclass(frozen=True)
 class Thoroughness:
-    values: int  # of the parameter at which to look for attractors
-    transient: int  # steps before reaching an attractor
+    values: int  # number of parameter values at which to look for attractors
+    transient: int  # steps to reach an attractor
     samples: int  # steps on the attractor
-    exponents: int  # values at which to measure the Lyapunov exponent
-    averaged: int  # steps to average it over
-    branch_control: StepControl  # along branches
-    curve_control: StepControl  # along curves of bifurcations
+    exponents: int  # number of values at which to measure the Lyapunov exponent
+    averaged: int  # steps over which to average the exponent
+    branch_control: StepControl  # step control along branches
+    curve_control: StepControl  # step control along curves of bifurcations
     periods: int  # maximum period of gaits
-    curve_periods: int  # maximum period of gaits whose bifurcations are followed over a plane
-    other_gaits: bool  # whether to search for gaits of other periods and for the regions of a plane
+    curve_periods: int  # maximum period of gaits whose bifurcations are followed over the plane
+    other_gaits: bool  # whether to search for gaits of other periods and to find the regions of the plane
 
 
-# The tolerance matches the contact model's derivatives, accurate to about 1e-8.
+# The tolerance suits the contact model's derivatives, which are accurate to about 1e-8.
 CURVES_ON_GROUND = StepControl(first=0.03, shortest=1e-4, longest=0.1, turn=0.95, tolerance=1e-8)
 THOROUGHNESS = {
     RIGID: Thoroughness(240, 500, 96, 16, 1500, StepControl(), CURVE_CONTROL, 64, 4, other_gaits=True),
@@ -74,20 +74,20 @@ NO_ATTRACTORS = AttractorBranch()
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Results for one model; without a map if there was no gait to begin from."""
+    """Search results for one model; `step_map` is None if there was no gait to start from."""
 
     model: str
     step_map: StepMap | None
     branches: tuple[GaitBranch, ...] = ()
     attractors: AttractorBranch = NO_ATTRACTORS
     exponents: tuple[Lyapunov, ...] = ()
-    curves: tuple[BifurcationCurve, ...] = ()  # of bifurcations, over the plane of two parameters
-    regions: Regions | None = None  # attractors over that plane
+    curves: tuple[BifurcationCurve, ...] = ()  # bifurcation curves over the plane of two parameters
+    regions: Regions | None = None  # periods of attractors over that plane
 
 
 @dataclass(frozen=True)
 class FamilySearch:
-    """A search for all gaits of a model over a span, with up to `periods` steps and `points` points per branch."""
+    """Search for all gaits of a model over a span, up to `periods` steps, with at most `points` points per branch."""
 
     model: str
     step_map: StepMap
@@ -115,7 +115,7 @@ class FamilySearch:
         return Family(self.model, self.step_map, self.follower.family(self.seeds, self.periods))
 
     def family(self, generator: np.random.Generator) -> Family:
-        """Run the whole search; `generator`: of scattered starts."""
+        """Run the whole search; `generator` draws the scattered starts."""
         results = self.branches()
         if self.periods > 1:
             results = self.add_attractors(results)
@@ -124,8 +124,8 @@ class FamilySearch:
         return results if self.plane is None else self.add_plane(results, self.plane)
 
     def add_attractors(self, family: Family) -> Family:
-        """Add the attractors beyond the first flip of a stable branch, and their exponents."""
-        # They are followed from just before that flip or, if it lies outside the span, from an end of the span.
+        """Add the attractors beyond the first flip of a stable branch, and their Lyapunov exponents."""
+        # They are followed from just before that flip or, if all flips lie outside the span, from an end of the span.
         span, how = self.span, self.thoroughness
         flipping = first_flip(family.branches)
         if flipping is not None:
@@ -156,8 +156,8 @@ class FamilySearch:
         return replace(family, attractors=attractors, exponents=measured)
 
     def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
-        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span; return the attractor of the smallest value."""
-        # At an end of the branch a walk leaves the gait for the attractor, whose close returns are the seeds.
+        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span; return the attractor at the smallest value."""
+        # From an end of the branch a walk leaves the gait for the attractor; points that nearly repeat are the seeds.
         how = self.thoroughness
         self.announce("gaits of {model} beyond flips outside the span")
         ends = [
@@ -205,7 +205,7 @@ class FamilySearch:
 
 
 def first_flip(branches: Sequence[GaitBranch]) -> tuple[float, Floats] | None:
-    """Return the smallest value at which a period-1 gait flips, and the stable gait nearest to it."""
+    """Return the smallest value at which a period-1 gait flips, and z (d,) of the stable gait nearest to it."""
     flips = [
         (bifurcation.value, branch) for branch in branches if branch.period == 1
         for bifurcation in branch.bifurcations if bifurcation.kind == "flip"

@@ -1,4 +1,4 @@
-"""Search for the periodic gaits of a rigid walker; each gait is solved to rounding and measured.
+"""Search for the periodic gaits of a rigid walker; each gait is solved to rounding error and measured.
 
 The two gaits of small-slope theory are followed to the walker's slope, and the step map is solved from random starts,
 as in the paper (section 3.3). If a driven walker still has no gait, gaits of the passive walker are followed as the
@@ -38,51 +38,51 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
 RANDOM_START = "random start"
-# rad, half the angle between the legs; a smaller one means standing, on level ground or from a random start
+# rad, half the angle between the legs; on level ground or from a random start, a smaller one counts as standing
 SMALLEST_ANGLE = 1e-5
-ANGLE_NOISE = 1e-3  # relative to the angle between the legs at heel strike; samples do not resolve less
-SAME_GAIT = 1e-5  # relative distance below which states are the same gait
-# of steps during the search; gaits are solved with EXACT_STEPS
+ANGLE_NOISE = 1e-3  # relative to the angle between the legs at heel strike; samples do not resolve smaller angles
+SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
+# tolerances of steps during the search; gaits are solved with EXACT_STEPS
 SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
-# target, and limit for an acceptable gait: on a steep slope rounding is larger
+# target residual, and largest residual of an acceptable gait; rounding errors are larger on steep slopes
 SOLVED_RESIDUAL, MAX_RESIDUAL = 1e-14, 1e-11
-MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # of Newton's method
-# following from a vanishing slope
-SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # of the logarithm of the slope's cube root
+MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
+# following a gait from a vanishing slope
+SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
 FOLLOWING_TOLERANCE = 1e-6  # relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
-# maximum distance from the prediction; beyond it the gait belongs to another branch
+# largest relative distance from the prediction; beyond it the gait belongs to another branch
 MAX_STATE_JUMP, MAX_PERIOD_JUMP = 0.05, 0.02
-MAX_RETREATS = 5  # halvings of the seed's amplitude, whose error shrinks with the amplitude's square
-# angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank whose knee was
-# free at heel strike
+MAX_RETREATS = 5  # halvings of the seed's amplitude; the seed's error shrinks with the square of the amplitude
+# random starts: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank
+# whose knee was free at heel strike
 MIN_START, MAX_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
 START_RANGES = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)"
 
 
 @dataclass(frozen=True)
 class RigidGait:
-    """A gait and the quantities of one of its steps, SI units."""
+    """A gait with the quantities of one of its steps, SI units."""
 
     state: State  # just after the heel strike
     period: float  # s
     step_length: float  # m
     multipliers: tuple[complex, ...]  # eigenvalues of the step map's derivative, largest first
-    residual: float  # rad, largest component of P(x) - x, velocities times sqrt(L/g), from a separate step
-    energy: float  # J, time mean over the step, relative to the stance foot
-    energy_drift: float  # J, maximum minus minimum
+    residual: float  # rad, largest component of P(x) - x of a separate step, velocities times sqrt(L/g)
+    energy: float  # J, mean over the duration of the step, with heights from the stance foot
+    energy_drift: float  # J, maximum minus minimum energy
     min_normal_force: float  # N
     max_friction_ratio: float | None  # None if the ground never pushes
     max_scuff_depth: float  # m
-    min_normal_impulse: float  # N s, of the ground in heel and knee strikes
+    min_normal_impulse: float  # N s, from the ground at heel and knee strikes
     max_impulse_ratio: float | None  # None if the ground never pushes
-    trailing_foot_rises: bool  # after the heel strike
+    trailing_foot_rises: bool  # whether it rises just after the heel strike
     knee_strike: float | None  # s; None for legs without knees
     work: dict[str, float]  # J per step, by source
     cost_of_transport: float  # work divided by weight times distance
     froude: float  # speed over sqrt(g L)
     swings: int = 1  # how often the swing leg passes the stance leg in a step
-    feet_meet: bool = False  # on the ground in mid-swing
+    feet_meet: bool = False  # whether the feet meet on the ground in mid-swing
     found_by: tuple[str, ...] = ()  # the searches that led to it
     z: tuple[float, ...] = ()  # section coordinates of the unit walker
 
@@ -115,7 +115,7 @@ class RigidGait:
 
 def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     """Whether the swing foot comes down exactly at the stance foot, in states (samples, 2 n) with straight legs."""
-    # The step map is discontinuous there: any further ahead, the foot would strike.
+    # The step map is discontinuous at such a gait: if the foot came down any further ahead, it would strike.
     over, ahead = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE]), swing[:, SWING] - swing[:, STANCE]
     down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
     where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
@@ -157,28 +157,28 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
 
 @dataclass(frozen=True)
 class SearchSettings:
-    random_starts: int = 100  # starting values to draw
-    further_starts: int = 1000  # more to draw if no gait is found
+    random_starts: int = 100  # number of random starts
+    further_starts: int = 1000  # number of additional random starts if no gait is found
 
 
 SEED_SOURCE = "followed from a vanishing slope"
-PASSIVE_SLOPES = (0.02, 0.05)  # rad, slopes on which to search for passive gaits to follow to a driven one
+PASSIVE_SLOPES = (0.02, 0.05)  # rad, slopes of passive gaits that are followed to a driven gait
 DRIVE_SOURCE = f"followed from passive gaits as a last resort (slopes of {', '.join(map(str, PASSIVE_SLOPES))} rad)"
 
 
 @dataclass(frozen=True)
 class GaitSearch:
-    gaits: tuple[RigidGait, ...]  # every period-1 gait, by period
+    gaits: tuple[RigidGait, ...]  # all period-1 gaits found, sorted by period
     chosen: int | None  # index of the gait to walk; None if no gait is physical
-    reason: str  # for the choice, or why no gait was found
+    reason: str  # why this gait was chosen, or why no gait was found
     random_hits: tuple[int, ...] = ()  # for each gait, the number of random starts that led to it
-    random_starts: int = 0  # number drawn
-    lost: tuple[str, ...] = ()  # why gaits that were followed did not reach this walker
-    followed: str = SEED_SOURCE  # where they were followed from
+    random_starts: int = 0  # number of random starts
+    lost: tuple[str, ...] = ()  # why followed gaits did not reach this walker
+    followed: str = SEED_SOURCE  # where the gaits were followed from
 
     @property
     def method(self) -> str:
-        """Describe the search; it may miss a very unstable gait."""
+        """Description of the search, which may miss a very unstable gait."""
         starts = f"{self.random_starts} random starts ({START_RANGES}, steps of at most {LONGEST_SWING:g} sqrt(L/g))"
         return f"{self.followed}, and by Newton's method from {starts}"
 
@@ -214,15 +214,15 @@ MAX_DRIVE_POINTS = 60
 
 
 class SlopeBranch:
-    """A gait as a function of the slope: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and T over s^2, s = phi^(1/3)."""
+    """A gait over the slope phi: y = (theta_2 + phi, dtheta_1, dtheta_2) / s and period T, where s = phi^(1/3)."""
 
-    # Both gaits of the small-slope theory are smooth in s^2, so polynomials through the last points predict the next.
+    # Both gaits of small-slope theory are smooth in s^2, so a polynomial through the last points predicts the next one.
 
     def __init__(self, step_map: Stepper, seed: SmallSlopeSeed) -> None:
         self.step_map, self.seed = step_map, seed
 
     def follow(self, slope: float) -> tuple[float, Floats | None]:
-        """Return how far (rad) the gait can be followed towards `slope` > 0, and z (3,) there; None if it is lost."""
+        """Follow the gait to `slope` > 0 (rad); return the slope reached and z (3,), None if the gait is lost."""
         s = float(np.cbrt(slope))
         follower = self.seed_follower if s > np.cbrt(self.seed.slope) else self.start_follower(s)
         if follower is None:
@@ -237,7 +237,7 @@ class SlopeBranch:
         return self.start_follower(float(np.cbrt(self.seed.slope)))
 
     def start_follower(self, s: float) -> Follower | None:
-        """Return a follower from the gait at s or, if the seed is too inaccurate there, closer to the limit."""
+        """Return a follower from the gait at s, or at a smaller s if the seed is too inaccurate; None if all fail."""
         seed, s_seed = self.seed, float(np.cbrt(self.seed.slope))
         limit = (0.0, np.array([*seed.limit, seed.period]))
         rough = (limit, (s_seed**2, scale_gait(s_seed, seed.z, seed.period)))
@@ -271,7 +271,7 @@ def scale_gait(s: float, z: Floats, period: float) -> Floats:
 
 @lru_cache(maxsize=16)
 def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
-    """Return the gaits of small-slope theory, cached for all slopes of one walker; `walker` on level ground."""
+    """Return the branches of the small-slope gaits of a walker on level ground; cached, since they serve all slopes."""
     looking = over_slope(walker, SEARCH_TOLERANCES)
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
@@ -281,7 +281,7 @@ def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
 
 
 def with_partial_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
-    """Return the walker with a share of its drive, on a slope (rad) that tends to its own; passive for a share of 0."""
+    """Return the walker with a fraction `share` of its drive, on a slope (rad) interpolated from `slope` to its own."""
     parts = {name: share * walker[name] for name in ("laws", "push_off")}
     return on_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
 
@@ -314,7 +314,7 @@ class Search:
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
 
     def follow_drive(self, generator: np.random.Generator, starts: int) -> None:
-        # Imported late: only needed if other searches fail.
+        # imported late, because it is needed only if other searches fail
         from walkerlab.physics.orbits.families import BranchFollower, Seed, ValueSpan
 
         goal = self.walker
@@ -354,7 +354,7 @@ class Search:
         return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
-        """Solve for the gait near z to rounding and add it to the results; return whether it was found."""
+        """Solve for the gait near z to rounding error and record it; return whether a gait was found."""
         if self.record_hit(z, by):
             return True
         effort = Effort(SOLVED_RESIDUAL, MAX_GAIT_EVALUATIONS, SHORTEST_MOVE, rounding=MAX_RESIDUAL / SOLVED_RESIDUAL)
@@ -370,7 +370,7 @@ class Search:
         return True
 
     def record_hit(self, z: Floats, by: str) -> bool:
-        """Whether z is a gait that was found before; if so, record the search that found it again."""
+        """Return whether z is a known gait; if so, record that this search found it again."""
         for record in self.records:
             if np.abs(record.cycle.z - z).max() < SAME_GAIT * np.abs(z).max():
                 record.by.append(by)
@@ -390,8 +390,8 @@ class Search:
 
 
 def preference(gait: RigidGait) -> tuple[bool, int, float]:
-    """Sort key, smallest for the gait to walk: stable, without back-and-forth swings, fastest decay."""
-    # A leg that swings back passes its foot through the ground, which the model ignores.
+    """Return a sort key, smallest for the gait to walk: stable, fewest swings, then fastest decay of disturbances."""
+    # If a leg swings back, its foot passes through the ground, which the model ignores.
     return not gait.stable, gait.swings, gait.spectral_radius
 
 

@@ -1,9 +1,9 @@
 """Derivatives of gait quantities with respect to a walker parameter, by the implicit function theorem.
 
-With z the section's coordinates and P the step map, dz/dp = (I - A)^-1 dP/dp; every quantity of the gait then changes
-along (dz/dp, 1). Derivatives by p are difference quotients of exact steps along this direction; that of a multiplier
-follows from A's by its left and right eigenvectors. The difference between two step sizes estimates the error, and the
-step is halved while that reduces errors that are not yet small.
+With section coordinates z and the derivative A of the step map P, dz/dp = (I - A)^-1 dP/dp, and every quantity of the
+gait changes along (dz/dp, 1). Derivatives by p are difference quotients of exact steps along this direction; the
+derivative of a multiplier follows from A's and from its left and right eigenvectors. The difference between two step
+sizes estimates the error, and the step is halved as long as this reduces errors that are not yet small.
 """
 
 from __future__ import annotations
@@ -21,9 +21,8 @@ from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
 from walkerlab.physics.orbits.step_map import MappedStep, multipliers_of
 from walkerlab.physics.solvers.system import Floats
 
-# Differentiable quantities with units.
-#
-# The norms are of the step period for a floor drop; the scaled one is in pendulum times per leg length of the walker.
+# Differentiable quantities with units. The norms describe how the step period responds to a floor drop; the scaled norm
+# is in the walker's pendulum times per leg length.
 GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "period_s": "s",
     "step_length_m": "m",
@@ -33,18 +32,18 @@ GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-STEP_QUANTITY_COUNT = 3  # the first ones, which a single step gives
-MIN_EIGENVECTOR_PRODUCT = 1e-6  # |l' r| of the largest multiplier's eigenvectors, below which multipliers coincide
+STEP_QUANTITY_COUNT = 3  # the first ones, which follow from a single step
+MIN_EIGENVECTOR_PRODUCT = 1e-6  # multipliers coincide if |l' r| of the largest one's eigenvectors is below this
 STEP_FACTOR = 1.5  # step of a difference quotient, in fifth roots of the relative tolerance
-APPROACH_STEPS = (1e-4, 1e-2)  # shares of that, to find the direction of the family
-STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # shares of that, tried in turn
+APPROACH_STEPS = (1e-4, 1e-2)  # multiples of that step, to find the direction of the family
+STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # multiples of that step, tried in turn
 SMALL_ERROR = 1e-3  # relative error that needs no smaller step
 LOST_ERROR = 0.1  # relative error above which a derivative is lost in rounding
 
 
 @dataclass(frozen=True)
 class Gradient:
-    """A derivative; `why` states why it is missing, or that rounding dominates it."""
+    """Derivative and its error; `why` explains a missing derivative, or warns that rounding dominates it."""
 
     value: float | None
     error: float | None
@@ -60,7 +59,7 @@ class Gradient:
 
 def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
     """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails."""
-    # quantities that a single step does not give cost more steps, hence `selection`
+    # only the quantities in `selection`, because those that need more than a single step are expensive
     step = gait.step_map.step(gait.z, gait.p)
     if step.outcome is not Outcome.WALKED:
         return None
@@ -77,7 +76,7 @@ def step_quantities(step: MappedStep) -> tuple[float, float, float]:
 
 
 def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
-    """Return the norm of the step period for a floor drop, in SI and scaled; None for an unstable gait."""
+    """Return the gait sensitivity norm of the step period for a floor drop, in s/m and scaled; None if unstable."""
     answer = response(gait, "floor-drop")
     if answer is None:
         return None
@@ -90,7 +89,7 @@ def transport_cost(gait: GaitOnMap) -> tuple[float] | None:
     return None if cost is None else (cost,)
 
 
-# Functions for quantities that a single step does not give, by the names of their values.
+# Functions for quantities that need more than a single step, by the names of the values that they return.
 WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[float, ...] | None]]] = {
     ("gait_sensitivity_norm", "gait_sensitivity_norm_scaled"): sensitivity_norms,
     ("cost_of_transport",): transport_cost,
@@ -136,9 +135,9 @@ class Derivatives(NamedTuple):
 
 
 def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
-    """Return the derivative of the gait's z (d,) by the parameter, from steps near z along a guess of it."""
-    # On compliant ground a step from z itself would not do for a walker of other dimensions: its foot would be in the
-    # air, or deep in the ground.
+    """Return the derivative (d,) of the gait's z by the parameter, from steps near z along a guess of it, or None."""
+    # On compliant ground a step from z itself fails if the parameter changes the walker's dimensions: its foot would be
+    # in the air or deep in the ground.
 
     def step_from(off: float) -> Floats | None:
         step = gait.step_map.step(gait.z + off * guess, gait.p + off, derived=False)

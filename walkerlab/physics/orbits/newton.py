@@ -11,7 +11,7 @@ from walkerlab.physics.solvers.system import Floats
 
 Data = TypeVar("Data")
 MAX_NEWTON_EVALUATIONS = 8
-# residuals up to this many tolerances are rounding if a move does not halve them
+# residuals up to this many tolerances count as rounding errors if a move does not halve them
 ROUNDING_FACTOR = 100.0
 
 
@@ -23,11 +23,11 @@ class Evaluated(NamedTuple, Generic[Data]):
 
     @property
     def residual(self) -> float:
-        """Largest component of the value; infinite without a value."""
+        """Largest absolute component of the value; infinite if there is no value."""
         return max(map(abs, self.value.tolist())) if self.outcome is Outcome.WALKED else np.inf
 
 
-# m equations with their derivative at x, in m unknowns for a point, m + 1 for a curve.
+# m equations and their derivative at x, with m unknowns for a point and m + 1 for a curve
 Equations = Callable[[Floats], Evaluated[Data]]
 
 
@@ -40,22 +40,22 @@ class Solution(Generic[Data]):
 
 @dataclass(frozen=True)
 class NotConverged:
-    outcome: Outcome | None  # WALKED if the equations could be evaluated; None where the parameter makes no walker
+    outcome: Outcome | None  # WALKED if the equations could be evaluated; None if the parameter gives no valid walker
     singular: bool = False  # whether the Jacobian was singular, i.e. a multiplier is 1
 
 
 class Effort(NamedTuple):
-    """Accuracy of a solution and the limits of its search."""
+    """Required accuracy of a solution, and limits of the search for it."""
 
-    tolerance: float  # on the residual
-    most: int = MAX_NEWTON_EVALUATIONS  # evaluations of the equations
-    shortest: float = 1.0  # share of a move below which it is not halved
-    growth: float = 1.0  # ratio of residuals from which on a move is halved
-    rounding: float = ROUNDING_FACTOR  # see there
+    tolerance: float  # largest residual of a solution
+    most: int = MAX_NEWTON_EVALUATIONS  # maximum number of evaluations
+    shortest: float = 1.0  # fraction of a move at which it is no longer halved
+    growth: float = 1.0  # a move is halved if it multiplies the residual by this or more
+    rounding: float = ROUNDING_FACTOR  # see ROUNDING_FACTOR
 
 
 def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
-    """Solve m equations from a guess (m,); return the solution, or the outcome with which they failed."""
+    """Solve m equations from a guess (m,); return the solution or, on failure, the outcome of the equations."""
     tolerance, most, shortest, growth, rounding = effort
     x, current, corrections, evaluations = guess, equations(guess), 0, 1
     residual = current.residual
@@ -82,5 +82,5 @@ def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solutio
         x, current, residual, corrections = x + share * move, ahead, remaining, corrections + 1
     if current.outcome is Outcome.WALKED:
         return Solution(x, current, corrections)
-    # a move to parameters without a walker does not condemn the guess
+    # if only a later move led to parameters without a valid walker, the guess itself has one
     return NotConverged(Outcome.WALKED if current.outcome is None and corrections else current.outcome)

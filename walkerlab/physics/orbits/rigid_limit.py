@@ -1,7 +1,7 @@
 """Convergence of the contact model to the rigid one as parameters of its contact approach the rigid limit.
 
-The parameters are stiffness k, damping c and stiction velocity v_s. The penetration d_max of full damping shrinks with
-the static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if all three vary.
+The parameters are stiffness k, damping c and stiction velocity v_s. The full-damping penetration d_max shrinks with the
+static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if all three vary.
 """
 
 import math
@@ -32,18 +32,18 @@ from walkerlab.physics.solvers.system import Floats, State
 
 METHOD, LIMIT_BUDGET = "radau5", 50_000_000
 GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
-# of timed walks, and of walks that measure their numerical error
+# tolerances of timed walks, and of walks that check their numerical error
 WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10
-ABSOLUTE_FACTOR = 0.01  # absolute over relative tolerance
+ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
 TIMED_WALKS = 3
 SERIES_EFFORT = CONTACT_EFFORT._replace(most=30)
-# of sqrt(d / g), d the static penetration: a push-off this short ends while the other foot is still landing
+# duration over sqrt(d / g) with static penetration d: so short a push-off ends while the other foot is still landing
 PUSH_OFF_FACTOR = 0.1
 
 
 class ContactFactors(NamedTuple):
     series: str
-    rigidity: float  # 1 for the config's contact, growing towards the limit
+    rigidity: float  # 1 for the config's contact, rising towards the limit
     stiffness: float
     damping: float
     stiction: float
@@ -53,7 +53,8 @@ ALL_SERIES, ALL_POINT_SERIES = "all", "all, point foot"
 STICTION_SERIES, STIFFNESS_SERIES = "stiction velocity", "stiffness"
 DAMPING_SERIES, NORMAL_SERIES = "damping", "stiffness and damping"
 HALF_DECADES = math.sqrt(10.0)
-# Number of settings, ratio of rigidity between neighbours, and exponents of rigidity in the three factors.
+# Number of settings, ratio of successive rigidities, and the powers of rigidity by which stiffness, damping and
+# stiction velocity are multiplied.
 SERIES_SETTINGS = {
     ALL_SERIES: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
     ALL_POINT_SERIES: (9, HALF_DECADES, (1.0, 0.5, -1.0)),
@@ -65,14 +66,14 @@ SERIES_SETTINGS = {
 
 
 def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
-    """Return contact settings from the config's towards the rigid limit, every `every`-th of them."""
+    """Return every `every`-th contact setting of a series, from the config's towards the rigid limit."""
     count, ratio, powers = SERIES_SETTINGS[name]
     rigidities = [ratio**step for step in range(0, count, every)]
     return [ContactFactors(name, rigidity, *(rigidity**power for power in powers)) for rigidity in rigidities]
 
 
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """Return the walker on the ground of a setting, with a brief push-off in series towards the rigid limit."""
+    """Return the walker on the ground of a setting; if the series varies all parameters, its push-off is brief."""
     # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
@@ -86,20 +87,21 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
 class Distance:
     """Differences of a setting's gait and walk from the rigid ones, with their numerical errors."""
 
-    # Quantities of the walk are None where no walk is compared.
+    # Quantities of the walk are None if no walk is compared.
 
     setting: ContactFactors
-    period: float
-    length: float
-    slip: float
-    period_error: float
-    length_error: float
-    numerical_period: float  # s, change of the period at a ten times tighter tolerance
+    period: float  # s
+    length: float  # m
+    slip: float  # m
+    period_error: float  # s, difference from the rigid gait
+    length_error: float  # m, difference from the rigid gait
+    numerical_period: float  # s, change of the period when the tolerance is ten times tighter
     angle: float | None = None  # rad, maximum difference between impacts, at equal phase
-    velocity: float | None = None  # rad/s, the same
+    velocity: float | None = None  # rad/s, maximum difference between impacts, at equal phase
     raw_angle: float | None = None  # rad, maximum difference at equal time
-    raw_velocity: float | None = None
-    numerical_time: float | None = None  # s, change of the last touch-down's time at a hundred times tighter tolerance
+    raw_velocity: float | None = None  # rad/s, maximum difference at equal time
+    # s, change of the last touchdown's time when the tolerance is a hundred times tighter
+    numerical_time: float | None = None
     evaluations: int | None = None
     wall_s: float | None = None  # s, processor time of the walk, minimum of several
 
@@ -112,15 +114,15 @@ class Limit:
     period_s: float
     length_m: float
     motion: Motion
-    steps: int  # of the walk
-    sampling: float  # s
+    steps: int  # steps of the walk
+    sampling: float  # s between samples
     every: int = 1  # use every n-th setting of a series
 
     def series(
         self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
     ) -> list[Distance]:
-        """Return the distances along a series, until a gait is lost, of whole walks as well if they have a `start`."""
-        # each gait is solved for from the one before
+        """Return the distances along a series until a gait is lost; with a `start`, compare walks as well."""
+        # each gait is the guess for the next
         distances: list[Distance] = []
         for setting in series_settings(name, self.every):
             changed = apply_setting(walker, setting)
@@ -142,7 +144,7 @@ class Limit:
         return distances
 
     def gait(self, walker: ContactWalker, near: Cycle, tolerance: float) -> Cycle | None:
-        """Solve for the gait on this ground near that of another setting; None if it fails."""
+        """Solve for the gait of this walker near the gait of another setting; None if it fails."""
         pads = OwnPads(lambda _: walker, self.ground, solver_settings(tolerance), near.step.length_m)
         solution = gait_near(pads, near.z, 0.0, SERIES_EFFORT)
         return solution if isinstance(solution, Cycle) else None
@@ -180,7 +182,7 @@ class Limit:
 
 
 def leg_motion(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
-    """Return angles and angular velocities (samples, leg) of the legs; for kneed legs, of the thighs."""
+    """Return angles (rad) and angular velocities (rad/s), (samples, 2) each, of the legs (the thighs of kneed legs)."""
     upper, half = walker.legs[:, 0], states.shape[1] // 2
     return states[:, 2 + upper], states[:, half + 2 + upper]
 
@@ -190,7 +192,7 @@ def solver_settings(tolerance: float) -> Tolerances:
 
 
 def observed_orders(distances: list[Distance]) -> list[float]:
-    """Return the order of convergence of the period from each three successive settings."""
+    """Return the observed orders of convergence of the period, one from each three successive settings."""
     if len(distances) < 3:
         return []
     ratio = distances[1].setting.rigidity / distances[0].setting.rigidity
@@ -202,7 +204,7 @@ def observed_orders(distances: list[Distance]) -> list[float]:
 
 @dataclass(frozen=True)
 class Extrapolation:
-    """Extrapolated limit of the period, and the difference between the last two estimates (s)."""
+    """Extrapolated limit of the period (s), and the difference between the last two estimates (s)."""
 
     period: float
     uncertainty: float
@@ -210,7 +212,7 @@ class Extrapolation:
 
 def extrapolate(distances: list[Distance]) -> Extrapolation | None:
     """Extrapolate the period by Aitken's method from the last resolved settings; None if they do not converge."""
-    # Settings from the first change of the period below its numerical error on are ignored.
+    # Settings are ignored from the first one whose change of the period is below its numerical error.
     periods = np.array([distance.period for distance in distances])
     errors = np.array([distance.numerical_period for distance in distances])
     unresolved = np.flatnonzero(np.abs(np.diff(periods)) <= errors[1:])

@@ -53,23 +53,22 @@ from walkerlab.physics.solvers.system import Floats, Integers, State
 
 WalkerAt = Callable[[float], RigidModel | None]
 STEP_WALKED = int(Outcome.WALKED)
-# Scale of the variational columns. They are exactly linear and need fewer digits than the state.
-#
-# With an absolute tolerance of a tenth of the relative one they keep about three digits less, which halves the steps.
+# Scale of the variational columns. They are exactly linear and need fewer digits than the state. With an absolute
+# tolerance of a tenth of the relative one they keep about three digits fewer, which halves the number of solver steps.
 TANGENT_SCALE = 2.0**-13
 SECTION_NAMES = ("theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank")
 EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
-LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # for attractors
+LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # tolerances for attractors
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
-STEPS_PER_BATCH = 8  # with one derivative
-METHODS_AT_ONCE = 4  # kept for numbers of tangent columns
-SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter 'step' is standing, also a fixed point
+STEPS_PER_BATCH = 8  # steps per derivative of a long walk
+METHODS_AT_ONCE = 4  # solver methods kept, one for each number of tangent columns
+SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is a fixed point as well
 # Newton's method from random starts
-MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; share of a move below which it is not halved
+MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
 NO_RESIDUAL, NEAR_RESIDUAL = 1e300, 1e-6
-# to a known gait; share of it left after a move with that gait's derivative
+# largest distance from a known gait, and largest fraction of it left after a move with that gait's derivative
 RECOGNITION_DISTANCE, RECOGNITION_RESIDUAL = 0.1, 0.1
-# instead of the index of a known gait
+# results other than the index of a known gait
 NEW_GAIT, NO_GAIT = -1, -2
 
 
@@ -84,7 +83,7 @@ class StrikeSection(NamedTuple):
 
 @lru_cache(CACHE_SIZE)
 def strike_section(walker: RigidModel) -> StrikeSection:
-    """Return the section of a walker (its legs are straight there)."""
+    """Return the section of a walker just after heel strike, where its legs are straight."""
     straight, at_strike, d = walker.E[STRAIGHT], walker.E[AT_STRIKE], int(walker.coordinates)
     n, places = len(straight), walker.section[:d]
     origin, basis = np.zeros(2 * n), np.zeros((d, 2 * n))
@@ -114,26 +113,26 @@ def coordinates_of(walker: RigidModel, y: Any) -> Floats:
 
 
 class Steps(NamedTuple):
-    """Completed steps from a point of the section."""
+    """Steps completed from a point of the section."""
 
-    outcome: Outcome  # of the last step attempted
-    time: Floats  # (steps,) of the heel strikes, in units of the walker
-    z: Floats  # (steps, d) section coordinates after each
+    outcome: Outcome  # outcome of the last step attempted
+    time: Floats  # (steps,) times of the heel strikes, in units of the walker
+    z: Floats  # (steps, d) section coordinates after each step
     DP: Floats  # (steps, d, d) derivatives with respect to the start; empty unless requested
-    strikes: HeelStrikes  # the heel strikes
+    strikes: HeelStrikes
 
 
 class Memory(NamedTuple):
-    varied: Any  # method for the equations with a variational column for each coordinate
+    varied: Any  # solver method for the equations with a variational column for each coordinate
     finder: CrossingFinder
     observer: Observer
     y: Any  # (2 n (1 + d),) the state with its variational columns
-    strikes: HeelStrikes  # of one step
+    strikes: HeelStrikes  # heel strikes of one step
     pivots: Any  # (d,)
 
 
 class RigidStepper(local):
-    """Step map of walkers of one kind, with the memory to evaluate it; each thread has its own."""
+    """Step map of walkers of one kind, with working memory of its own in each thread."""
 
     def __init__(self, like: RigidModel, tolerances: Tolerances) -> None:
         size, d = len(like.zero_state), int(like.coordinates)
@@ -162,8 +161,8 @@ class RigidStepper(local):
     ) -> Steps:
         """Walk from z (d,), with the derivative unless `derived` is false, which saves a third of the work.
 
-        floor  rises and nearest landing, see HeelStrikes, in units of the walker; even ground by default
-        start  (2 n,) state off the section to walk from instead, without a derivative
+        floor  rises and nearest landing (see HeelStrikes), in units of the walker; even ground by default
+        start  (2 n,) state off the section to walk from instead of z, without a derivative
         """
         memory = self.memory
         method = memory.varied if derived else self.plain
@@ -192,7 +191,7 @@ class RigidStepper(local):
         floor: tuple[Floats, float],
         observer: Observer,
     ) -> tuple[Outcome, HeelStrikes, int]:
-        """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which rises change by `lift`."""
+        """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which the rises change by `lift`."""
         method, (rises, nearest) = self.with_columns(len(columns)), floor
         y = np.concatenate((start, columns.ravel()))
         self._reset(method, rises.size - 1)
@@ -202,11 +201,11 @@ class RigidStepper(local):
         return Outcome(status), strikes, completed
 
     def solve_starts(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
-        """Run Newton's method from starts (starts, d), overwritten with the last states tried.
+        """Run Newton's method from starts (starts, d), overwritten with the last points tried.
 
-        gaits  known gaits, as state (d,) and derivative (d, d) of the step map
+        gaits  known gaits, as section coordinates (d,) and derivative (d, d) of the step map
 
-        Returns (starts,) the index of the known gait that each converges to, NEW_GAIT for another solution, or NO_GAIT.
+        Returns for each start (starts,) the index of the known gait reached, NEW_GAIT for another solution, or NO_GAIT.
         """
         d = starts.shape[1]
         z, DP = np.zeros((len(gaits), d)), np.zeros((len(gaits), d, d))
@@ -221,7 +220,7 @@ class KnownGaits(NamedTuple):
     """Gaits that the search recognises without solving for them again."""
 
     z: Any  # (gaits, d)
-    inverse: Any  # (gaits, d, d) of I - DP there
+    inverse: Any  # (gaits, d, d) inverse of I - DP
 
 
 @kernel
@@ -232,7 +231,7 @@ def solve_from_starts(section: StrikeSection, memory: Memory, gaits: KnownGaits,
 
 @kernel_part
 def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
-    """Run Newton's method from z (d,), overwritten with the last state tried.
+    """Run Newton's method from z (d,), overwritten with the last point tried.
 
     A move is halved until it reduces the residual. A start that reaches no heel strike, or stands still, is given up. A
     known gait is recognised if it is close and one move with its derivative removes most of the distance.
@@ -299,7 +298,7 @@ class RigidMap(StepMap):
     probe = 2e-5
 
     def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare a family's map; `walker_at` returns None where a value makes no walker, `like` is any one of them."""
+        """Prepare a family's map; `walker_at` returns None for values without a valid walker, `like` is any of them."""
 
         @lru_cache(CACHE_SIZE)
         def unit_at(p: float) -> SimilarWalker | None:
@@ -342,7 +341,7 @@ class RigidMap(StepMap):
         return np.array(extremes) * (units.force, 1.0, units.length)
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk from z over footholds (m), after a push just after the heel strike at z."""
+        """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
         unit = self._unit_at(p)
         assert unit is not None, "what is disturbed makes a walker"
         walker, units, start = unit.walker, unit.units, np.array(state_on_section(unit.walker, z))
@@ -371,7 +370,7 @@ class RigidMap(StepMap):
     def varied(
         self, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats = NO_TIMES
     ) -> VariedWalk | None:
-        """Walk with tangent columns: variational equations in swings, saltation at strikes."""
+        """Differentiate a walk by tangent columns: variational equations in swings, saltation at strikes."""
         unit = self._unit_at(p)
         if unit is None:
             return None
@@ -431,7 +430,7 @@ class RigidMap(StepMap):
         return changed
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
-        """Walk at moderate accuracy: on a chaotic attractor errors grow whatever the tolerance."""
+        """Walk at moderate accuracy, since on a chaotic attractor errors grow whatever the tolerance."""
         unit, none = self._unit_at(p), np.zeros(0)
         if unit is None:
             return Iterates(Outcome.REJECTED, np.zeros((0, z.size)), none, none, none)
@@ -458,7 +457,7 @@ class RigidMap(StepMap):
 
 
 def by_leg(angles: Floats, steps: Integers) -> Floats:
-    """Order angles (samples, ..., 2) of swing and stance leg by leg, the first swing leg's first."""
+    """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
     swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
     return np.where(swaps, angles[..., ::-1], angles)
 
@@ -472,13 +471,13 @@ class SimilarWalker(NamedTuple):
     apart: float  # rad, minus the sum of the legs' angles with both feet on the slope
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
-        """Return rises and nearest landing of a walk from z over footholds (m), in units of the walker."""
+        """Return rises and nearest landing of a walk from z over foothold heights (m), in units of the walker."""
         rises = np.diff(heights_m, prepend=heights_m[0]) / self.units.length
         return rises, SHORTEST_LANDING * self.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
 
     def step_length(self, before: float, after: float) -> float:
-        """Return the length of a step from the stance leg's angles just after its first and last heel strike."""
-        behind = 0.0  # distance from the old stance foot to the landing foot
+        """Return a step's length from the stance leg's angles (rad) just after the strikes at its start and end."""
+        behind = 0.0  # along the slope, from the landing foot to the old stance foot
         for start, turning, x, y in self.feet:
             psi = start + after * turning
             behind += math.cos(psi) * x - math.sin(psi) * y

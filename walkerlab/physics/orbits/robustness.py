@@ -1,11 +1,11 @@
 """Robustness of a gait: sensitivity to a floor drop and a push, the largest survivable ones, and rough ground.
 
-Gait sensitivity norm: with z the section's coordinates after a step and e an indicator of it, minus the gait's,
+Gait sensitivity norm: with z the section coordinates after a step and e an indicator of it, both minus the gait's,
 
     z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
 
-for a disturbance d of one step. A drop leaves the even section for two steps; the first terms of the sum are therefore
-difference quotients of exact walks, and the even section's derivative gives the rest.
+for a disturbance d of one step. A drop takes the state off the section of even ground for two steps; the first terms of
+the sum are therefore difference quotients of exact walks, and the derivative on even ground gives the rest.
 
 Source: Hobbelen and Wisse, A disturbance rejection measure for limit cycle walkers: the gait sensitivity norm, IEEE
 Transactions on Robotics 23 (2007).
@@ -29,7 +29,7 @@ from walkerlab.physics.solvers.system import Floats
 Disturbance = Literal["floor-drop", "hip-push"]
 DISTURBANCES: tuple[Disturbance, ...] = ("floor-drop", "hip-push")
 INDICATORS = ("step_period", "step_length", "speed")
-DIRECT_STEPS = 2  # steps with difference quotients
+DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks
 CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
 FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
 # Offsets and weights of fourth-order formulas for a first derivative.
@@ -40,7 +40,7 @@ MAX_DISTURBANCE = 0.5  # in units of the disturbance
 
 
 class GaitOnMap(NamedTuple):
-    """A gait of one step: its step map and parameter, section coordinates, the derivative there, and its units."""
+    """A period-1 gait on its step map: parameter p, section coordinates z, derivative A, and the walker's units."""
 
     step_map: StepMap
     p: float
@@ -54,7 +54,7 @@ class GaitOnMap(NamedTuple):
 
 
 def derivative(function: Callable[[float], Floats | None], step: float) -> Floats | None:
-    """Differentiate a function at 0 to fourth order; one-sided if one side has no value, None if neither has."""
+    """Differentiate a function at 0 to fourth order, from one side if the other lacks values; None if both do."""
     for formula in FORMULAS:
         values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
         if len(values) == len(formula):
@@ -65,11 +65,11 @@ def derivative(function: Callable[[float], Floats | None], step: float) -> Float
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
     """Return norms (indicators,) of e' = C z + D d, z' = A z + B d; None for an unstable gait.
 
-    A (d, d), B (d,), C (indicators, d); D (steps, indicators) of the steps before the section's derivative applies.
+    A (d, d), B (d,), C (indicators, d); D (steps, indicators) holds the responses of the first steps.
     """
     if np.abs(multipliers_of(A)).max() >= 1.0:
         return None
-    # sum of z z' over all steps: X = A X A' + B B'
+    # X, the sum of z z' over all steps, satisfies X = A X A' + B B'
     d = len(B)
     summed = np.linalg.solve(np.eye(d * d) - np.kron(A, A), np.outer(B, B).ravel()).reshape(d, d)
     later = np.einsum("ij,jk,ik->i", C, summed, C)
@@ -78,11 +78,11 @@ def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | Non
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Responses of period, length and speed to a disturbance, SI: (3,) each."""
+    """Responses of step period, step length and speed to a disturbance, (3,) each, SI units."""
 
     norm: Floats
-    direct: Floats  # of the disturbed step itself
-    error: Floats  # of the norm, from two step sizes
+    direct: Floats  # response of the disturbed step itself
+    error: Floats  # error of the norm, estimated from two step sizes
 
 
 def indicators(walk: DisturbedWalk) -> Floats:
@@ -90,20 +90,20 @@ def indicators(walk: DisturbedWalk) -> Floats:
 
 
 def walk_disturbed(gait: GaitOnMap, disturbance: Disturbance, size: float, steps: int) -> DisturbedWalk:
-    """Walk from the gait with a disturbed first step: a drop (m) that persists, or a push (N s)."""
+    """Walk from the gait with a disturbed first step: a lasting drop (m) of the floor, or a push (N s)."""
     if disturbance == "hip-push":
         return gait.step_map.disturbed(gait.z, gait.p, np.zeros(steps + 1), size)
     return gait.step_map.disturbed(gait.z, gait.p, np.append(0.0, np.full(steps, -size)))
 
 
 def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None:
-    """Return the norms of a gait for a disturbance; None if it is unstable, or neighbouring steps fail."""
+    """Return a gait's sensitivity to a disturbance; None if the gait is unstable or neighbouring steps fail."""
     fine, coarse = (response(gait, disturbance, times) for times in (1.0, 2.0))
     return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return the norms and the response of the disturbed step, by differences of `times` the usual step size."""
+    """Return norms and response of the disturbed step, by differences of `times` the usual step size, or None."""
     d, h = gait.z.size, times * gait.step_map.probe
 
     def after(size: float) -> Floats | None:
@@ -124,7 +124,7 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
 
 
 def largest_survived(stands: Callable[[float], bool], unit: float) -> float:
-    """Return the largest disturbance up to which all smaller ones are survived, to half of a disturbance's `unit`."""
+    """Return the size up to which every disturbance is survived, at most MAX_DISTURBANCE times `unit`."""
     steps = round(MAX_DISTURBANCE / SEARCH_GRID)
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
     if low == steps:
@@ -144,17 +144,17 @@ def largest_disturbance(gait: GaitOnMap, disturbance: Disturbance, sign: float, 
 
 
 def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
-    """Count the steps of a walk from the gait over normally distributed heights, at most `most`."""
+    """Count the steps of a walk from the gait over normally distributed heights, stopping at `most` steps."""
     return int(gait.step_map.disturbed(gait.z, gait.p, rough_heights(roughness_m, seed, most)).durations_s.size)
 
 
 @dataclass(frozen=True)
 class RoughWalks:
-    mean_steps: float  # as far as the sample allows
-    standard_error: float | None  # as far as the sample allows
+    mean_steps: float  # mean number of steps, or a lower bound of it, depending on `method`
+    standard_error: float | None  # None if it cannot be estimated
     walks: int
     capped: int  # walks that reached the maximum number of steps
-    # the mean of all walks; steps over failures; steps if no walk failed
+    # mean over all walks; total steps per failure; total steps if no walk failed
     method: Literal["all-failed", "censored", "lower-bound"]
 
 

@@ -1,7 +1,7 @@
-"""Starts with scaled angular velocities: how far they may change, and the smallest change that walks.
+"""Starts with scaled angular velocities: how far the velocities may change, and the smallest change that walks.
 
-In the paper both velocities were raised by hand until the contact model walked. Here a start is a pair of factors
-(s_1, s_2) on the velocities of swing and stance leg; (1, 1) is the unchanged rigid start.
+In the paper both velocities were raised by hand until the contact model walked. In this module a start is a pair of
+factors (s_1, s_2) on the velocities of swing and stance leg; (1, 1) is the unchanged rigid start.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from walkerlab.physics.solvers.system import Floats, Integers, State
 
 START_TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
 RIGID_TOLERANCES = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
-SETTLED_SHARE = 0.02  # of the gait's period and step length
-MARGIN_STEP = 0.02  # spacing of factors until one fails
+SETTLED_SHARE = 0.02  # largest deviation from the gait, as a fraction of its period and step length
+MARGIN_STEP = 0.02  # spacing of factors until a walk fails
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.0, 4.0
 MARGIN_HALVINGS = 14
-ZOOMS, ZOOM_CELLS = 4, 4  # successively finer grids around the best start, and cells to either side
+ZOOMS, ZOOM_CELLS = 4, 4  # number of successively finer grids around the best start, and of their cells to either side
 ZOOM_OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
 
 
@@ -52,7 +52,7 @@ class ScaledStarts:
     ground: JudgedGround
     place: State  # (2 + n) position and angles of the start
     by_swing: State  # (2 + n) velocities due to the swing leg's angular velocity
-    by_stance: State  # (2 + n) velocities due to the stance leg's
+    by_stance: State  # (2 + n) velocities due to the stance leg's angular velocity
     steps: int
     gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if not required
     tolerances: Tolerances = START_TOLERANCES
@@ -70,7 +70,7 @@ class ScaledStarts:
         return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
     def settling_steps(self, walk: ContactWalkResult) -> int | None:
-        """Return the steps after which all periods and lengths match the gait; None if the last do not."""
+        """Return the number of steps after which all periods and lengths match the gait; None if the last do not."""
         if self.gait is None:
             return None
         period, length = self.gait
@@ -100,9 +100,9 @@ def scaled_starts(
 
 @dataclass(frozen=True)
 class Margin:
-    name: str  # velocities that are scaled, down or up
-    factor: float  # last one that walks
-    fails: StartTrial | None  # first failure beyond; None up to the limit
+    name: str  # scaled velocities and direction of the change
+    factor: float  # last factor at which the start walks
+    fails: StartTrial | None  # first failure beyond `factor`; None if the start walks up to the limit
 
 
 SCALING_DIRECTIONS = (
@@ -122,7 +122,7 @@ def margins(
     largest: float = LARGEST_FACTOR,
 ) -> list[Margin]:
     """Find how far the velocities of a start that walks may be scaled, alone and together, up to `largest`."""
-    # Factors are `step` apart until one fails; then the last interval is halved.
+    # Factors are `step` apart until one fails; then the last interval is bisected.
     results = []
     for name, *direction in SCALING_DIRECTIONS:
         sign = 1.0 if max(direction) > 0.0 else -1.0
@@ -154,10 +154,10 @@ class Adjustment:
 def smallest_change(
     starts: ScaledStarts, quick: ScaledStarts, candidates: np.ndarray, cell: tuple[float, float]
 ) -> Adjustment | None:
-    """Find the walking start nearest to (1, 1), on successively finer grids around the nearest of a map's.
+    """Find the walking start nearest to (1, 1), on successively finer grids around the nearest candidate that walks.
 
-    `candidates` (n, 2) are factors that walk on the map, `cell` apart. The `quick` starts have the map's tolerances,
-    and `starts` the config's, which the result satisfies.
+    `candidates` (n, 2) are factors that walk on a map, `cell` apart. The `quick` starts have the map's tolerances, and
+    `starts` the config's; the result walks with both.
     """
     order = np.argsort(np.hypot(*(candidates - 1.0).T), kind="stable")
     for swing, stance in candidates[order]:
@@ -181,7 +181,7 @@ def smallest_change(
 
 @dataclass(frozen=True)
 class StartMap:
-    """Results over factors of both velocities; rows are factors of the stance leg."""
+    """Results of walks over factors on both velocities; rows are factors on the stance leg's."""
 
     swing: Floats  # (columns,) factors on the swing leg's velocity
     stance: Floats  # (rows,) factors on the stance leg's velocity
@@ -205,7 +205,7 @@ def contact_row(starts: ScaledStarts, swing: Floats, stance: float) -> Integers:
 
 
 def rigid_map(walker: RigidModel, state: State, swing: Floats, stance: Floats, steps: int) -> StartMap:
-    """Compute the same map for the rigid model; where its ground would have to pull, the outcome is `lifted-off`."""
+    """Compute the map of starts of the rigid model; if its ground would have to pull, the outcome is `lifted-off`."""
 
     def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
         walk = take_walk(walker, RIGID_TOLERANCES, with_scaled_rates(walker, state, factor_1, factor_2), steps)

@@ -1,4 +1,4 @@
-"""Similarity: every walker is a walker of unit leg length, mass and gravity, measured in its own units.
+"""Similarity: every walker has unit leg length, mass and gravity when measured in its own units.
 
 Searches use the unit walker, so that starting ranges, tolerances and thresholds suit all walkers.
 """
@@ -30,7 +30,7 @@ class Units(NamedTuple):
         return self.mass * self.length / self.time
 
     def of(self, unit: str) -> float:
-        """Return the SI value of a unit named as in the config, 1 for pure numbers. Raises KeyError for other units."""
+        """Return the walker's own unit, in SI, for a unit named as in the config. Raises KeyError for other units."""
         inertia, damping = self.mass * self.length**2, self.energy * self.time
         basic = {"": 1.0, "1": 1.0, "m": self.length, "kg": self.mass, "s": self.time}
         derived = {"kg m^2": inertia, "N s": self.impulse, "N m": self.energy}

@@ -3,15 +3,15 @@
 At small angles the swing phase is linear, D(0) ddq = diag(-m b g, K g) q, with one oscillating and one growing mode,
 and the heel strike is a constant linear map. Two kinds of period-1 motion remain as the slope phi goes to zero.
 
-Long period: the step is symmetric about mid-swing, and both legs turn at the same rate at heel strike, which to leading
-order changes nothing. The energy it does lose, M (L omega alpha)^2 / 2 at an angle alpha between the legs, equals the
-descent of a step, M g L alpha phi; omega is proportional to alpha, hence phi = kappa alpha^3.
+Long period: the step is symmetric about mid-swing, and both legs turn at the same rate at heel strike, so that to
+leading order the impact changes nothing. Its energy loss, M (L omega alpha)^2 / 2 at an angle alpha between the legs,
+equals the energy from a step's descent, M g L alpha phi; omega is proportional to alpha, hence phi = kappa alpha^3.
 
 Short period: the swing foot comes down while still moving forward, and the whole motion is proportional to phi. The
-factor grows without bound as the feet's mass vanishes; then this gait also grows as the cube root of phi.
+factor grows without bound as the feet's mass vanishes; in that limit this gait also grows as the cube root of phi.
 
 Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
-Eng. 120 (1998), section 4 and appendix, here with legs that have mass.
+Eng. 120 (1998), section 4 and appendix; in this module the legs have mass.
 """
 
 import math
@@ -33,12 +33,12 @@ from walkerlab.physics.mechanics.rigid_model import (
 from walkerlab.physics.solvers.system import Floats, State
 
 LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
-SCAN = 400  # samples to bracket roots with
-LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding
-LONG_AMPLITUDE = 0.05  # angle between the legs at which the long-period seed is good to a percent
+SCAN = 400  # number of samples that bracket a root
+LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding errors
+LONG_AMPLITUDE = 0.05  # rad, angle between the legs at which the long-period seed is accurate to a percent
 SHORT_AMPLITUDE = 0.002
-MAX_GROWTH = 30.0  # growth exponent of a fall over half a step, beyond which no digit of the start is left
-# linear in (z, 1) on a slope of one radian: the state, z itself, and theta_1 + theta_2
+MAX_GROWTH = 30.0  # largest growth exponent of a fall over half a step; beyond it no digit of the start is left
+# linear maps on a slope of one radian: (z, 1) to the state, (z, 1) to z, and the state to theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 SECTION_ROWS = np.eye(3, 4)
 FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
@@ -54,10 +54,10 @@ class SmallSlopeSeed(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """The linear swing phase: ddq = V diag(-swing^2, fall^2) V^-1 q."""
+    """Modes of the linear swing phase: ddq = V diag(-swing^2, fall^2) V^-1 q."""
 
-    swing: float  # rad/s, of the oscillating mode
-    fall: float  # 1/s, of the growing mode
+    swing: float  # rad/s, frequency of the oscillating mode
+    fall: float  # 1/s, rate of the growing mode
     V: Floats  # (2, 2), one mode per column, oscillating first
 
 
@@ -72,7 +72,8 @@ def linear_modes(walker: RigidModel) -> Modes | None:
     half = 0.5 * (K[0, 0] * M[1, 1] + K[1, 1] * M[0, 0]) - K[0, 1] * M[0, 1]
     if not last < 0.0 < first:
         return None
-    root = half + math.copysign(math.sqrt(half * half - first * last), half)  # times first, without cancellation
+    # root of the polynomial times `first`, without cancellation
+    root = half + math.copysign(math.sqrt(half * half - first * last), half)
     oscillating, growing = sorted((root / first, last / root))
     swinging, falling = K - oscillating * M, K - growing * M
     V = np.array([[swinging[1, 1], -falling[0, 1]], [-swinging[0, 1], falling[0, 0]]])
@@ -80,7 +81,7 @@ def linear_modes(walker: RigidModel) -> Modes | None:
 
 
 def leg_columns(walker: RigidModel) -> Floats:
-    """Return the angles (n, 2) of all bodies for a unit angle of the swing leg, and of the stance leg."""
+    """Return the angles (n, 2) of all bodies for unit angles of the swing leg and the stance leg, one column each."""
     return np.array([apply_couplings(walker, STRAIGHT, unit) for unit in np.eye(len(walker.arm_x))[:2]]).T
 
 
@@ -105,7 +106,7 @@ def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
     at_end = np.array([math.sin(modes.swing * half) / modes.swing, math.sinh(modes.fall * half) / modes.fall])
     rates_at_end = np.array([math.cos(modes.swing * half), math.cosh(modes.fall * half)])
     total = modes.V[0] + modes.V[1]
-    # weights of the modes, from both feet on the slope at the end, scaled to a unit angle between the legs
+    # weights of the modes: at the end both feet are on the slope, with a unit angle between the legs
     weights = np.array([total[1] * at_end[1], -total[0] * at_end[0]])
     weights /= (modes.V[0] - modes.V[1]) @ (weights * at_end)
     omega = float((modes.V @ (weights * rates_at_end)).mean())
@@ -113,7 +114,7 @@ def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
 
 
 def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
-    """Return the gait at LONG_AMPLITUDE from theta_2 + phi, dtheta_1 and dtheta_2 per unit angle between the legs."""
+    """Return the gait at LONG_AMPLITUDE from theta_2 + phi, dtheta_1, dtheta_2 for a unit angle between the legs."""
     kappa = slope_for_loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
     z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
@@ -122,8 +123,8 @@ def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: flo
 
 @np.errstate(divide="raise", invalid="raise")
 def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
-    """Return the slope that balances the heel strike's loss, divided by the cube of the angle between the legs."""
-    # In the limit the gait ends a step as it began, with both legs at the same rates.
+    """Return slope / angle^3 for the slope that balances the heel strike's loss; the angle is that between the legs."""
+    # In the limit the gait ends a step as it began it, with both legs at the same rates.
     flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
     omega = angle * float(per_angle[2])
     before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
@@ -158,7 +159,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> SmallSlopeSeed | None:
-    """Return the gait of period below `longest` (s) proportional to the slope, or None."""
+    """Return the gait that is proportional to the slope, with a period below `longest` (s), or None."""
     try:
         conditions = step_conditions(walker, modes)
         period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
@@ -178,9 +179,9 @@ def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> Small
 
 
 def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floats]:
-    """Linearise one step on a slope of one radian as matrices (..., 4, 4) on (z, 1), a function of durations t (s)."""
-    # Three rows require that z repeats after t, one that both feet are down. A solution exists where the determinant
-    # vanishes.
+    """Return the linearised conditions on a step on a slope of one radian: matrices (..., 4, 4) for durations t (s)."""
+    # The matrices act on (z, 1). Three rows require that z repeats after t, one that both feet are down. A solution
+    # exists if the determinant vanishes.
     flat, n = on_slope(walker, 0.0), len(walker.arm_x)
     swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
     strike = np.zeros((3, 4))  # the heel strike at vanishing angles, including the exchange of roles
@@ -200,7 +201,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
     def conditions(t: Floats) -> Floats:
         sine, cosine = np.sin(swing * t), np.cos(swing * t)
         growing, grown = np.sinh(fall * t), np.cosh(fall * t)
-        flow = np.empty((*t.shape, 4, 4))  # from a state to the one t later
+        flow = np.empty((*t.shape, 4, 4))  # maps a state to the state t later
         flow[..., :2, :2] = flow[..., 2:, 2:] = combine_modes(cosine, grown)
         flow[..., :2, 2:] = combine_modes(sine / swing, growing / fall)
         flow[..., 2:, :2] = combine_modes(-swing * sine, fall * growing)

@@ -1,4 +1,4 @@
-"""Step map of a walker from section to section over one parameter, and its gaits, for either model.
+"""Step map of a walker from section to section, as a function of one parameter, and its gaits, for either model.
 
 `rigid_map.RigidMap` is the rigid model; `contact_map.ContactMap` is a walker on compliant ground. A period-n gait is a
 fixed point of n steps, `walk_steps`, whose derivative is the product of the steps' derivatives.
@@ -20,16 +20,16 @@ from walkerlab.physics.orbits.newton import Effort, Evaluated, NotConverged, new
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
 
-PARAMETER_STEP = 1e-3  # of the parameter, in difference formulas
-CACHE_SIZE = 4096  # per step map
+PARAMETER_STEP = 1e-3  # relative step of the parameter in difference formulas
+CACHE_SIZE = 4096  # walkers cached per step map
 CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 # Offsets and weights of second-order formulas for a first derivative.
 FORWARD_2ND: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
-identity = lru_cache(np.eye)  # shared: never written to
+identity = lru_cache(np.eye)  # shared, so never written to
 no_values = partial(np.zeros, 0)
 NO_TIMES = np.zeros(0)
-VARIATION = 1e-6  # of section coordinates, and m of heights, in differences of walks
-INSTANT_S = 1e-6  # s, in rates of samples
+VARIATION = 1e-6  # difference step of section coordinates, and of heights (m)
+INSTANT_S = 1e-6  # s, difference step for the rates of samples
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class MappedStep:
     DP: Floats  # (d, d) derivative with respect to the start, if requested
     period_s: float
     length_m: float  # distance walked
-    angle: float  # rad, stance leg just after the step's heel strike
+    angle: float  # rad, angle of the stance leg just after the step's heel strike
     strike_s: float  # time of that heel strike, from the start of the step
 
 
@@ -69,50 +69,50 @@ class DisturbedWalk:
     outcome: Outcome  # WALKED if every step was completed
     durations_s: Floats  # (steps,) between heel strikes
     lengths_m: Floats  # (steps,) distances
-    angles_rad: Floats  # (steps,) stance leg just after each heel strike, from the vertical
+    angles_rad: Floats  # (steps,) angle of the stance leg from the vertical, just after each heel strike
     z: Floats  # (d,) last point on the section
 
 
 @dataclass(frozen=True, eq=False)
 class VariedWalk:
-    """Derivatives of a walk from the section along columns; those of samples are at fixed times."""
+    """Derivatives of a walk from the section along columns of start and heights; times of samples are fixed."""
 
     durations_s: Floats  # (steps, columns)
     lengths_m: Floats  # (steps, columns)
     angles_rad: Floats  # (steps, columns), as in `DisturbedWalk`
-    rates: Floats  # (times, 2) rad/s of the legs themselves, as in `StepMap.sampled`
-    samples_rad: Floats  # (times, columns, 2) of the legs' angles
+    rates: Floats  # (times, 2) angular velocities of the legs (rad/s), ordered as in `StepMap.sampled`
+    samples_rad: Floats  # (times, columns, 2) derivatives of the legs' angles, in the same order
 
 
 class Stepper(Protocol):
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """Take a step from z (d,) at parameter p, with its derivative; the outcome is None where p makes no walker."""
+        """Take a step from z (d,) at parameter p, with its derivative; outcome None if p gives no valid walker."""
 
 
 class StepMap(Stepper, Protocol):
-    """A walker's step from section to section, with everything that following its families needs."""
+    """Step of a walker from section to section, with the derivatives and limits that continuation needs."""
 
-    names: tuple[str, ...]  # section coordinates, all of magnitude one
+    names: tuple[str, ...]  # names of the section coordinates, which are all of magnitude one
     monitors: tuple[Monitor, ...]  # quantities that `watch` measures
     scale: float  # magnitude of significant changes of the parameter
     tolerances: Tolerances  # solver settings of a step
-    probe: float  # disturbance, in units of the walker, small enough for a linear response
+    probe: float  # size of a disturbance with a linear response, in units of the walker
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """Return the worst value of each monitor (monitors,) over some steps."""
+        """Return the worst value of each monitor (monitors,) over `steps` steps from z."""
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk from z (d,) over heights (steps + 1,), the present first, after a push at the hip along the slope."""
+        """Walk from z (d,) over heights (steps + 1,), current foothold first, after a hip push along the slope."""
 
     def settled(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
         """Return z (d,) with the stance foot at rest on the ground."""
-        # How deep a foot stands in compliant ground depends on the parameters; from another depth it would bounce.
+        # The depth at which a foot stands in compliant ground depends on the parameters; from another it would bounce.
         return z
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        """Sample the legs' angles (times, 2) from the vertical on the walk of `disturbed`, the first swing leg's first.
+        """Sample the legs' angles (times, 2) from the vertical in the walk of `disturbed`, the first swing leg's first.
 
-        times_s  rising, from the first heel strike to before the last
+        times_s  increasing times from the first heel strike on, all before the last heel strike
         """
 
     def varied(
@@ -120,7 +120,7 @@ class StepMap(Stepper, Protocol):
     ) -> VariedWalk | None:
         """Differentiate `disturbed` and its samples along columns (d + steps + 1, columns) of z and heights (m).
 
-        Models without tangent columns take difference quotients. None if the walk or a neighbouring one ends early.
+        Takes difference quotients unless overridden. Returns None if the walk or a neighbouring one ends early.
         """
         columns = [differentiate_along(self, z, p, heights_m, column, times_s) for column in along.T]
         if not columns or any(column is None for column in columns):
@@ -181,7 +181,7 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[
 def differentiate_along(
     step_map: StepMap, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats
 ) -> tuple[Floats, ...] | None:
-    """Differentiate durations, lengths and angles (steps,) and samples (times, 2) along a column; None if walks end."""
+    """Differentiate step quantities (steps,) and samples (times, 2) along a column of z and heights, or return None."""
     ends, h = [], VARIATION / np.abs(along).max()
     for offset, weight in CENTRAL_2ND:
         moved, heights = z + offset * h * along[: z.size], heights_m + offset * h * along[z.size :]
@@ -202,8 +202,8 @@ def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
 class Cycle:
     """Consecutive steps; for a gait they return to their start."""
 
-    outcome: Outcome | None  # of the last step
-    value: float  # of the parameter
+    outcome: Outcome | None  # outcome of the last step
+    value: float  # value of the parameter
     z: Floats  # (d,) start
     steps: tuple[MappedStep, ...]  # completed steps
     DP: Floats  # (d, d) derivative of the end by z
@@ -211,7 +211,7 @@ class Cycle:
     monitors: Floats = field(default_factory=no_values)  # worst values over the steps; only on a branch
 
     def mismatch(self) -> Evaluated[Cycle]:
-        """Return P^n(z) - z, which a gait makes zero, with its derivative by z."""
+        """Return P^n(z) - z, which is zero for a gait, with its derivative by z."""
         off = self.steps[-1].z - self.z if self.outcome is Outcome.WALKED else self.z
         return Evaluated(self.outcome, off, self.DP - identity(self.z.size), self)
 
@@ -265,7 +265,7 @@ def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
 
 
 def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
-    """Return the cycle with its derivative by the parameter, or with the outcome of a neighbouring step that fails."""
+    """Return the cycle with its derivative by the parameter, or with the outcome of a neighbouring step that failed."""
     position, Dp = cycle.z, 0.0 * cycle.z
     for step in cycle.steps:
         outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value)

@@ -30,20 +30,20 @@ from walkerlab.physics.solvers.system import Floats, Integers
 # finite-difference step for the test function; unknowns are of magnitude one
 DIFFERENCE_STEP = 1e-5
 CURVE_CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, tolerance=1e-11)
-CACHED_MAPS = 256  # of values of the second parameter
+CACHED_MAPS = 256  # maps cached, one for each value of the second parameter
 PLANE_CELLS = (72, 36)
-ALL_FAILED = -1  # every walk fails
-TRANSIENT_STEPS, KEPT_STEPS = 400, 96  # steps
-CELL_EFFORT = Effort(1e-12, SEED_EVALUATIONS)  # of cells
+ALL_FAILED = -1  # period of a cell in which every walk fails
+TRANSIENT_STEPS, KEPT_STEPS = 400, 96  # steps that are dropped, and steps that are examined
+CELL_EFFORT = Effort(1e-12, SEED_EVALUATIONS)  # accuracy of a cell's gait
 UNSTABLE_OFFSET = 1e-3  # offset from an unstable gait; coordinates are of magnitude one
 
 
-# Step map over the first parameter as a function of the second; None where the value makes no walker.
+# Step map over the first parameter as a function of the second; None if there is no valid walker.
 MapAt = Callable[[float], StepMap | None]
 
 
 class Plane(NamedTuple):
-    """A second parameter: step maps over the first by its values, the span to cover, and the family's own value."""
+    """Second parameter of a family: its step maps over the first, its span, and its value in the family itself."""
 
     map_at: MapAt
     span: ValueSpan
@@ -51,7 +51,7 @@ class Plane(NamedTuple):
 
 
 def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]) -> Equations[Cycle | None]:
-    """Return P^n(z) - z = 0 and a test function over x = (z, first / its scale, second / its scale)."""
+    """Return the equations P^n(z) = z and test function = 0 in the unknowns x = (z, first / scale, second / scale)."""
     maps = lru_cache(CACHED_MAPS)(map_at)
 
     def gait(x: Floats) -> Evaluated[Cycle] | None:
@@ -144,7 +144,7 @@ class Regions:
     period: Integers  # (n, m) steps after which the attractor repeats; 0 if never, ALL_FAILED if every walk fails
 
 
-# Period-1 gaits, cell by cell.
+# Period-1 gait of each cell in a row, and a point on the section for each; None if there is none.
 Row = list[Cycle | None]
 Points = list[Floats | None]
 
@@ -169,7 +169,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Return for each value a period-1 gait interpolated from the branches, preferring stable ones."""
+    """Interpolate a period-1 gait from the branches at each value, preferring stable gaits; None if there is none."""
     gaits, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:
@@ -201,14 +201,14 @@ def correct_row(step_map: StepMap, values: Floats, before: Points) -> Row:
 
 
 def settle_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
-    """Return the periods of a row's attractors and a point on each; `before` holds the previous row's points."""
+    """Return the periods of a row's attractors and a point on each; `before` holds the points of the previous row."""
     periods, points = np.full(len(values), ALL_FAILED, np.int64), list[Floats | None]()
     for index, gait in enumerate(gaits):
         if gait is not None and gait.stable:
             periods[index] = 1
             points.append(gait.z)
             continue
-        # on the attractors of neighbours, and next to the cell's unstable gait in its direction of growth
+        # start on the attractors of neighbouring cells, then near the cell's unstable gait, in its direction of growth
         off_gait = None if gait is None else gait.z + UNSTABLE_OFFSET * eigenvector(gait.DP, gait.multipliers[0].real)
         point, starts = None, (points[index - 1] if index else None, before[index], off_gait)
         for start in (start for start in starts if start is not None):
