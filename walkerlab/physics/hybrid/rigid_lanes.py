@@ -282,7 +282,7 @@ def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -
         return FELL
     if strike <= 1.0:
         rows[ARRIVALS, lane], rows[STEP_BEFORE, lane] = 1.0, rows[NEXT_STEP, lane]
-        rows[NEXT_STEP, lane] = max(strike * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP)
+        rows[NEXT_STEP, lane] = max(strike * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP * walker.pendulum_time)
         return GOES_ON
     if rows[TIME_LEFT, lane] <= rows[TRIED_STEP, lane]:
         return NO_HEEL_STRIKE
