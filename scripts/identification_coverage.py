@@ -8,8 +8,11 @@ whose 95 % region holds the truth, with the binomial error of that share; and fo
 error over the spread of the estimates.
 """
 
-import math
 import os
+
+# Matrices are small: threads that share one would wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import math
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor

@@ -28,6 +28,7 @@ from walkerlab.errors import WalkerlabError
 from walkerlab.physics.kernel_cache import cache_root
 from walkerlab.pipeline.interrupts import raise_on
 
+ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 PATIENCE_S = 5.0
 """Time that a worker has to end before it is killed."""
 START = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,6 +19,7 @@ from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSt
 from walkerlab.physics.estimation.mixed_model import evaluate, products_of
 from walkerlab.physics.estimation.prediction import DELAY, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
+from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
@@ -69,17 +70,18 @@ class ConfigFamily:
         self.config = config
         self.parameters = [parameter_of(key, config) for key in keys]
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
-        self.at = lru_cache(CONFIGS_AT_ONCE)(self._at)
-        self.admits = lru_cache(CONFIGS_AT_ONCE)(self._admits)
+        self.at = lru_cache(CONFIGS_AT_ONCE)(partial(config_with, config, self.parameters))
+        self.rigid_walker = lru_cache(CONFIGS_AT_ONCE)(self._rigid_walker)
 
-    def _at(self, values: Values) -> ContactConfig | None:
-        return config_with(self.config, self.parameters, values)
-
-    def _admits(self, values: Values) -> bool:
+    def _rigid_walker(self, values: Values) -> RigidModel | None:
+        config = self.at(values)
         try:
-            return self.at(values) is not None and rigid_walker(self.at(values)) is not None  # type: ignore[arg-type]
+            return None if config is None else rigid_walker(config)
         except ConfigError:
-            return False
+            return None
+
+    def admits(self, values: Values) -> bool:
+        return self.rigid_walker(values) is not None
 
     def over(self, make: Callable[[ContactConfig], Any]) -> Callable[[Any], Any]:
         def at_values(values: Values) -> Any:
@@ -96,7 +98,7 @@ def step_map_of(model: str, family: ConfigFamily, length_m: float) -> StepMap:
     """Return a model's step map as a function of the family's parameter values."""
     config = family.config
     if model == RIGID:
-        return RigidMap(family.over(rigid_walker), 1.0, rigid_walker(config))
+        return RigidMap(family.rigid_walker, 1.0, rigid_walker(config))
     from walkerlab.physics.orbits.contact_map import ContactMap
     from walkerlab.scene.contact import contact_scene
 

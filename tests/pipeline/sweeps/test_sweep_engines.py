@@ -14,8 +14,9 @@ import pytest
 from process_table import THERE, is_alive, processes_below
 
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline.sweeps.engines import ENGINES, ONE_THREAD, JobExecutor, Order, engine_named, one_thread_each
+from walkerlab.pipeline.sweeps.engines import ENGINES, JobExecutor, Order, engine_named, one_thread_each
 from walkerlab.pipeline.work import Spread
+from walkerlab.pipeline.workers import ONE_THREAD
 
 LOCAL = ENGINES["local"]
 

@@ -114,7 +114,7 @@ def noise_at(logs: Floats, rough: bool) -> Noise:
 
 
 def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True) -> Noise:
-    """Maximise the restricted likelihood over standard deviations above `floors`; `anew` tries several roughnesses."""
+    """Maximise the restricted likelihood over standard deviations above `floors`; `anew` tries several starts."""
     from scipy.optimize import minimize
 
     def costs(logs: Floats, rough: bool) -> tuple[float, Floats]:
@@ -127,7 +127,7 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
     bounds = [(math.log(floor), math.log(floor * NOISE_RANGE)) for floor in floors]
     middle = np.maximum(start.measurement, 2.0 * floors)
     near = start.roughness_m / leg_length_m
-    for share in (*(ROUGHNESS_STARTS if anew or near == 0.0 else (near,)), 0.0):
+    for share in (*ROUGHNESS_STARTS, 0.0) if anew or near <= ROUGHNESS_STARTS[0] else (near,):
         rough = share > 0.0
         logs = np.log(np.append(middle, share * leg_length_m)) if rough else np.log(middle)
         result = minimize(

@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.workers import WorkerPool
+from walkerlab.pipeline.workers import ONE_THREAD, WorkerPool
 
 GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
-ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)

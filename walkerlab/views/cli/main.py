@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 import walkerlab
 from walkerlab.pipeline.graph import PIPELINE, STRIDES, Graph, Stage
+from walkerlab.pipeline.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
 from walkerlab.views.cli import runs as whole_runs
 from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
@@ -23,6 +24,9 @@ def main() -> None:
     # Loaded modules stay until the command ends; searching them for garbage again and again would take longer than a
     # warm search for gaits.
     gc.set_threshold(300_000, 50, 100)
+    # All matrices are small: threads that share one would wait for each other longer than they compute.
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
     atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
