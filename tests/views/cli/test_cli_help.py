@@ -1,4 +1,5 @@
 import json
+import os
 import subprocess
 import sys
 
@@ -8,8 +9,9 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.config.fields import block_of, words_of
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE, STAGES
+from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Option, Stage
 from walkerlab.pipeline.store.provenance import git_commit
+from walkerlab.pipeline.workers import ONE_THREAD
 from walkerlab.views.cli.main import program
 
 HEAVY = (
@@ -169,9 +171,31 @@ def test_an_option_that_is_no_key_is_told_as_any_other():
     assert "--set" not in done.output
 
 
+def test_a_flag_may_have_a_hyphen():
+    option = Option("--from-step", "strides", "N", "First step.", int)
+    graph = Graph(Stage("settle", "stages.settle", "Settle.", None, options=(option,)))
+    done = CliRunner().invoke(program(graph), ["settle", "--help"])
+    assert done.exit_code == 0
+    assert "--from-step" in done.output
+
+
 def test_an_option_that_runs_another_stage_names_one_with_the_options_that_need_it():
     redirects = [(stage, option) for stage in STAGES for option in stage.options if option.runs]
     assert [(stage.name, option.flag, option.runs) for stage, option in redirects] == [("identify", "--plan", "plan")]
     for stage, option in redirects:
         needing = {other.flag for other in stage.options if option.flag in other.needs}
         assert needing <= {other.flag for other in PIPELINE[option.runs].options}
+
+
+def test_matrices_are_small_and_computed_in_one_thread_unless_the_user_says_otherwise():
+    show = """
+import os
+from walkerlab.views.cli import main
+main.program = lambda: lambda: None
+main.main()
+print(os.environ["OPENBLAS_NUM_THREADS"])
+"""
+    for own, threads in ({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2"):
+        rest = {name: value for name, value in os.environ.items() if name not in ONE_THREAD}
+        done = subprocess.run([sys.executable, "-c", show], env=rest | own, capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == threads

@@ -11,9 +11,9 @@ Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
 Contact model (`contact_loop`)
     modes         forms of the tree (`ground/walker`): the first stance foot hinged or free, each knee locked or not;
                   in every form a foot has ground or not, and a knee is RELEASED, BENT, STOPPING or LOCKED
-    each foot     HEIGHT: touch, which ends a step if the foot is far enough ahead, or lift; LEFT_EDGE, RIGHT_EDGE: the
+    each foot     HEIGHT: touch (`touch` decides whether it ends the step) or lift; LEFT_EDGE, RIGHT_EDGE: the
                   foot crosses an edge of a pad; RELEASE, FULL_DAMPING, FRICTION_SWITCHES: switching points of the
-                  force law, where integration steps end and nothing else happens; VERTICAL_VELOCITY: the leading foot
+                  force law, where solver steps end and nothing else happens; VERTICAL_VELOCITY: the leading foot
                   stops sinking in, and the trailing knee is released
     walker        PASSING: the feet pass each other, and each may gain or lose its ground; FALL: the hip is too low:
                   fell; SLIDE: the stance foot slid too far: slid
@@ -27,7 +27,7 @@ Contact model (`contact_loop`)
 | `endings` | codes by which kernels of both models report the end of a walk |
 | `contact_events`, `contact_crossings` | the events; event functions along a step, and their first zero |
 | `contact_state` | the walk state apart from coordinates: stance, contacts, signs of the event functions |
-| `contact_loop` | integration steps, and the search for the time of an event |
+| `contact_loop` | solver steps, and the search for the time of an event |
 | `contact_transitions`, `contact_jumps` | effects of events on the walk state, and on velocities, energy and tangent |
 | `contact_record`, `contact_tangent` | samples and energy balance; the derivative with respect to the start |
 | `contact_result` | a whole walk in all its forms, and its result |

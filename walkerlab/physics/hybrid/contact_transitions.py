@@ -205,7 +205,7 @@ def touch(
     t: float,
     y: Any,
 ) -> int:
-    """Handle a foot that comes down on the ground; returns an outcome if the walk ends, otherwise GOES_ON."""
+    """Decide whether a touch ends the step; returns an outcome if the walk ends, otherwise GOES_ON."""
     # The step ends if the swing foot comes down far enough ahead, on a pad other than the one it left. A swing foot
     # that comes down on the pad it left, but far from where it stood, scuffs: it has tripped over the pad.
     stance = walk_state.progress.stance

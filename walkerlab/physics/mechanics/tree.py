@@ -75,7 +75,7 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
     @property
     def hip(self) -> Floats:
-        """Parameters (3,) of the SpringDamper between the legs."""
+        """Parameters (LAW_NUMBERS,) of the SpringDamper between the legs."""
         numbers: Floats = self.laws[HIP_ROW]
         return numbers
 

@@ -278,7 +278,8 @@ def command(
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         typed = name or function.__name__
-        names = {f"set_{option.flag[2:]}": option for option in sets}  # `from` cannot be a parameter's name
+        # Flags such as --from cannot be names of parameters.
+        names = {f"set_{place}": option for place, option in enumerate(sets)}
 
         def run(**arguments: Any) -> None:
             values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
