@@ -258,7 +258,7 @@ def _keys_of_another_kind(
 
 
 def _elsewhere(name: str, exactly: bool) -> str:
-    """Return the path of a key with a similar name (`exactly`: the same name) in any block; empty if there is none."""
+    """Return the path of a key with a similar name (`exactly`: the same name) in any block, or an empty text."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")

@@ -71,7 +71,7 @@ def export_model(
 
 
 def law_named(text: str) -> Law:
-    """Return the ADAMS contact law of this name; raises ConfigError if there is none."""
+    """Return the ADAMS contact law of this name; raises ConfigError for an unknown name."""
     for law in CONTACT_LAWS:
         if text == law:
             return law

@@ -146,7 +146,7 @@ def without_last_delimiters(lines: list[str]) -> list[str]:
 def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
     """Find the line number of the header and the delimiter: the first row of names followed by as many numbers.
 
-    A table of one column is recognised only if there is none of several columns.
+    A table of one column is recognised only if no table has several columns.
     """
     several = [(number, delimiter) for number in range(len(lines[:HEADER_LINES])) for delimiter in DELIMITERS]
     for fewest in (2, 1):

@@ -12,7 +12,7 @@ LOSS_ENTRIES, SUPPLY_ENTRIES = slice(DAMPING_LOSS, PUSH_OFF), slice(PUSH_OFF, TO
 class Loss(NamedTuple):
     key: str  # name of the loss in results
     where: str  # text that completes 'energy is lost ...'
-    variable: str  # name of the variable that holds the loss over time; empty if there is none
+    variable: str  # name of the variable that holds the loss over time; empty if no variable does
     meaning: str  # description of the variable
     cause: str  # label in figures
     colour: str

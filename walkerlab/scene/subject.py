@@ -66,7 +66,7 @@ def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
 def find_model_gait(
     model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]
 ) -> ModelUnderTest:
-    """Return a model with its gait, for the contact model on ground without pads; raises NoAnswer if there is none.
+    """Return a model with its gait, for the contact model on ground without pads; raises NoAnswer if it has no gait.
 
     gait  summary of `fixedpoint`
     note  receives a message about each difference from the config's scene

@@ -78,7 +78,7 @@ def second_end(trial: Trial) -> End:
 
 
 def compass_of(trial: Trial) -> RigidWalker | None:
-    """Return the Appendix A walker of a rigid trial, or None if there is none or heyoka is not installed."""
+    """Return the Appendix A walker of a rigid trial, or None if the trial has no compass or heyoka is not installed."""
     return trial.compass if isinstance(trial, RigidTrial) and taylor_reference.is_installed() else None
 
 

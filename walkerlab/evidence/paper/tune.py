@@ -136,7 +136,7 @@ class TuneRun:
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
-        """Return the smallest change of the velocities with which the contact model walks; None if there is none."""
+        """Return the smallest change of the velocities with which the contact model walks; None if it never walks."""
         cells = self.contact_map
         if self.as_it_stands.walks:
             return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)

@@ -43,7 +43,7 @@ class FitProblem:
     forecast: Forecast
     leg_length_m: float
     start: tuple[float, ...]  # initial values of the parameters, in their units
-    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite if there is none
+    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite where unbounded
     # (value, standard deviation) of parameters with prior knowledge, by index, in their units
     priors: dict[int, tuple[float, float]] = field(default_factory=dict)
     loss: Loss = "linear"

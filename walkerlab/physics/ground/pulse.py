@@ -23,7 +23,7 @@ def pulse_force(system: OnGround, t: float) -> float:
 
 @kernel_part
 def pulse_left(system: OnGround, t: float) -> float:
-    """Return the remaining duration (s) of the current pulse; 0 if there is none."""
+    """Return the remaining duration (s) of the current pulse; 0 if no pulse acts."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     return max(0.0, system.progress.last_touch + system.form.push_off_duration - t)

@@ -67,7 +67,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
     points: Floats  # (period, 3) section points in walking order, starting with the smallest angle
-    reach: float  # distance from which all test walks return to it; zero if there is none
+    reach: float  # distance from which all test walks return to it; zero if some walks leave from any distance
 
     @property
     def period(self) -> int:

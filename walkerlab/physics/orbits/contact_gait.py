@@ -40,7 +40,7 @@ class GaitAnswer:
 
 
 def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """Search for the contact gait near a free walker's state with both feet on the ground; say why if there is none."""
+    """Search for the contact gait near a free walker's state with both feet on the ground; say why it fails."""
     excluded = why_no_gait(walker)
     if excluded:
         return GaitAnswer(None, *excluded)

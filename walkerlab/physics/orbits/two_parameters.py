@@ -144,7 +144,7 @@ class Regions:
     period: Integers  # (n, m) steps after which the attractor repeats; 0 if never, ALL_FAILED if every walk fails
 
 
-# Period-1 gait of each cell in a row, and a point on the section for each; None if there is none.
+# Period-1 gait of each cell in a row, and a point on the section for each; None if the cell has no gait.
 Row = list[Cycle | None]
 Points = list[Floats | None]
 
@@ -169,7 +169,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Interpolate a period-1 gait from the branches at each value, preferring stable gaits; None if there is none."""
+    """Interpolate a period-1 gait from the branches at each value, preferring stable ones; None if no branch has one."""
     gaits, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:

@@ -235,7 +235,7 @@ def gaussian(window: Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell; empty if there is none."""
+    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell; empty if no cell fails."""
     # the distance is accurate to the size of a cell
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:

@@ -120,7 +120,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
 
 
 def mean_of(values: Floats) -> float | None:
-    """Return the mean over steps; None if there are none."""
+    """Return the mean over steps; None if no step was completed."""
     return float(np.mean(values)) if values.size else None
 
 

@@ -262,7 +262,7 @@ def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
-    """Return the lowest flip at which a one-step gait loses stability; None if there is none."""
+    """Return the lowest flip at which a one-step gait loses stability; None if no gait loses it."""
     flips = [
         flip.value
         for branch in branches

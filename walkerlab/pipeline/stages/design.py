@@ -173,7 +173,7 @@ class Gaits:
         self.z = find_model_gait(design.model, config, gait, progress.note).z
 
     def gait_at(self, x: Floats) -> Point | None:
-        """Return the gait at parameter values (parameters,); None if there is none or the config rejects the values."""
+        """Return the gait at parameter values (parameters,); None without a gait or if the config rejects them."""
         self.counts[0] += 1
         self.progress.advance()
         changed = config_with(self.config, self.parameters, x.tolist())

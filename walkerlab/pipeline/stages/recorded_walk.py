@@ -60,7 +60,7 @@ def read_walk(block: RecordedFile) -> RecordedWalk:
 
 
 def read_artifact(path: Path) -> Recording:
-    """Read the trajectory of a walk that a run has stored; raises ConfigError if there is none."""
+    """Read the trajectory of a walk that a run has stored; raises ConfigError if it stored no trajectory."""
     try:
         groups = artifact.read(path).groups
     except FileNotFoundError:

@@ -12,7 +12,7 @@ from walkerlab.pipeline.store.runfolder import RunFolder
 
 
 def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """Find the file and result for a key in another run folder; None if there is none. Damaged files are ignored."""
+    """Find the file and result for a key in another run folder; None if no folder has it. Damaged files are ignored."""
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:

@@ -130,7 +130,7 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
 
 
 def find_item(folder: RunFolder, name: str) -> Illustration | Table:
-    """Find a figure or table by name; if there is none, ConfigError with a list of the run's items."""
+    """Find a figure or table by name; ConfigError, with the names of all items, for an unknown one."""
     # Imported here: tables of the paper's values need no drawing code.
     from walkerlab.views.figures.registry import FIGURES
 

@@ -25,7 +25,7 @@ class Results:
 
     @property
     def departures(self) -> Sequence[str] | None:
-        """Differences between this scene and the paper's; empty if there are none, None if not compared."""
+        """Differences between this scene and the paper's; empty if both are equal, None if not compared."""
         departures: Sequence[str] | None = self.summary("compare").get("departures")
         return departures
 

@@ -203,7 +203,7 @@ def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth
 
 
 def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float | None) -> float | None:
-    """Return the largest step (s) up to which all runs have three correct digits, or None if there is none."""
+    """Return the largest step (s) up to which all runs have three correct digits, or None if no step size has."""
     good = None
     if target is None:
         return None
