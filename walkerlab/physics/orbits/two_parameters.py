@@ -122,7 +122,7 @@ def trace_curve(
             return np.array(values), BranchEnd(float(values[-1][1]), "end of the plane")
         values.append(value)
         before, last = last, solved
-    return np.array(values), BranchEnd(float(values[-1][1]), f"{points} points are used up")
+    return np.array(values), BranchEnd(float(values[-1][1]), f"the limit of {points} points is reached")
 
 
 def clip_to_plane(inside: Floats, outside: Floats, spans: tuple[ValueSpan, ValueSpan]) -> Floats:
