@@ -89,8 +89,8 @@ class Blob(NamedTuple):
 def test_a_type_without_a_body_is_refused_in_one_line_that_names_it(call):
     with pytest.raises(TypeError) as said:
         call(Blob(1.0))
-    assert str(said.value) == "area has no body for Blob: register one with @area.case(...)"
-    with pytest.raises(TypeError, match=r"^area has no body for .*[Tt]uple.*: register one"):
+    assert str(said.value) == "area has no case for Blob: register one with @area.case(...)"
+    with pytest.raises(TypeError, match=r"^area has no case for .*[Tt]uple.*: register one"):
         call((1.0, 2.0))
 
 

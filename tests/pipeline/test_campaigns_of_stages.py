@@ -45,7 +45,7 @@ def test_what_is_there_is_neither_lost_nor_made_anew(toy):
 def test_a_page_without_it_says_how_to_make_it_and_is_made_anew_once_it_is_there(toy):
     toy.execute("page")
     assert (
-        "<p>census: it was not asked for; `walkerlab survey --full` computes it</p>"
+        "<p>census: it was not requested; `walkerlab survey --full` computes it</p>"
         in (toy.runs / "paper" / "report.html").read_text()
     )
     toy.execute("survey", full=True)

@@ -125,7 +125,7 @@ def test_pads_at_the_rigid_step_length_need_the_gait_whatever_the_start():
 
 
 def test_two_stages_of_one_name_are_refused():
-    with pytest.raises(ValueError, match="one name"):
+    with pytest.raises(ValueError, match="the same name"):
         Graph(Stage("a", "m", "", object), Stage("a", "n", "", object))
 
 

@@ -13,7 +13,7 @@ from walkerlab.pipeline.resolve import resolve
     ("old", "new", "said"),
     [
         ("centre_m: [0.0, -0.325]", "centre_m: [0.0, -0.3]", "the two legs differ"),
-        ("child: thigh 1", "child: shank 1", "no hinge joins the legs"),
+        ("child: thigh 1", "child: shank 1", "are not hinged together"),
     ],
 )
 def test_parts_that_make_no_walker_are_refused_with_their_place(tmp_path, old, new, said):

@@ -77,7 +77,7 @@ def test_an_incomplete_law_is_told_in_words_when_a_scene_is_made(monkeypatch):
         contact_scene(load().config, 0.3714)
     assert str(said.value) == (
         "the friction law Wordless ('coulomb') is incomplete: it lacks sliding_from, with_creep, in_words, "
-        "a body @friction_coefficient.case(Wordless)."
+        "a case @friction_coefficient.case(Wordless)."
     )
 
 
@@ -91,13 +91,13 @@ def test_an_incomplete_law_is_refused_before_anything_runs(stage, monkeypatch, t
 
 def test_a_law_that_counts_its_formulas_must_also_tell_where_they_change(own, monkeypatch):
     monkeypatch.setitem(friction.switching_count._bodies, Regularised, lambda law: 2)
-    with pytest.raises(ConfigError, match=r"lacks a body @sample_switching\.case\(Regularised\)\.$"):
+    with pytest.raises(ConfigError, match=r"lacks a case @sample_switching\.case\(Regularised\)\.$"):
         contact_scene(load().config, 0.3714)
 
 
 def test_a_law_without_a_body_is_told_in_words_by_compiled_code(own):
     wordless = replace(own, walker=own.walker._replace(friction=Wordless(0.5)))
-    with pytest.raises(TypeError, match=r"^friction_coefficient has no body for Wordless: "):
+    with pytest.raises(TypeError, match=r"^friction_coefficient has no case for Wordless: "):
         wordless.walk(start_state(own, START), 1, Tolerances("radau5", 1e-7, 1e-9, 1000))
 
 
@@ -126,7 +126,7 @@ def test_the_laws_differ_in_words():
     said = [friction_law(Contact(friction=word)).in_words() for word in FRICTION_LAWS]
     assert len(set(said)) == len(said)
     assert said[0] == (
-        "Coulomb friction as ADAMS has it, with a coefficient of 0.9 at a slip of 0.1 m/s and 0.7 from 1 m/s on"
+        "ADAMS's Coulomb friction, with a coefficient of 0.9 at a slip velocity of 0.1 m/s and 0.7 above 1 m/s"
     )
 
 

@@ -85,7 +85,7 @@ if BLAS not in sys.modules:
 if absent:
     warnings.warn(
         f"numba {numba.__version__} lacks {', '.join(absent)}: compiling takes longer and is not reported. Results are "
-        "the same; a version of numba that pyproject.toml allows compiles faster.",
+        "the same; compiling is faster with a numba version allowed by pyproject.toml.",
         RuntimeWarning,
         stacklevel=2,
     )

@@ -86,9 +86,9 @@ def _first_usable(candidates: tuple[Path, ...]) -> Path:
     else:
         folder = Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
     if folder != candidates[0]:
-        lost = "" if folder in candidates else ", which later processes do not find"
-        message = f"{candidates[0]} cannot be written into: compiled code is kept in {folder}{lost}"
-        warnings.warn(f"{message}. WALKERLAB_CACHE chooses another folder.", CacheWarning, stacklevel=3)
+        lost = "" if folder in candidates else ", where later processes do not find it"
+        message = f"{candidates[0]} is not writable: compiled code is kept in {folder}{lost}"
+        warnings.warn(f"{message}. Set WALKERLAB_CACHE to choose another folder.", CacheWarning, stacklevel=3)
     return folder
 
 

@@ -141,7 +141,7 @@ class ByType:
         if body is None:
             name = chosen.__name__ if hasattr(chosen, "_fields") else label
             # numba passes on errors unchanged unless they are of its own classes
-            raise TypeError(f"{self.__name__} has no body for {name}: register one with @{self.__name__}.case(...)")
+            raise TypeError(f"{self.__name__} has no case for {name}: register one with @{self.__name__}.case(...)")
         return body
 
 

@@ -172,7 +172,7 @@ class Executor:
     def _why_absent(self, name: str) -> str:
         command = self._command_of(name)
         if self.graph[name].only_by:
-            return self.left_out.get(name, f"it was not asked for; {command} computes it")
+            return self.left_out.get(name, f"it was not requested; {command} computes it")
         none_yet = self.graph[name].why_unsuited(self.config) or f"no current result; {command} computes one"
         return self.left_out.get(name, none_yet)
 

@@ -141,7 +141,7 @@ class Stage:
 
         if self.why_unsuited(config) is not None:
             block = f"`{contact_to_add(config.walker)}`"
-            instead = f"Add one to the config, such as the paper's by this walker's mass: {block}."
+            instead = f"Add one to the config, such as the paper's, scaled by this walker's mass: {block}."
             advice = f"{instead} `walkerlab schema contact` explains its keys."
             raise contact_required_error(target, config.walker, advice)
 
@@ -174,7 +174,7 @@ class Graph:
         self.stages = stages
         self._by_name = {stage.name: stage for stage in stages}
         if len(self._by_name) != len(stages):
-            raise ValueError("two stages have one name")
+            raise ValueError("two stages have the same name")
 
     def __getitem__(self, name: str) -> Stage:
         return self._by_name[name]
@@ -192,7 +192,7 @@ class Graph:
         stages = self.needed_for(target, config)
         for stage in stages:
             if stage.draws:
-                raise ConfigError(f"{stage.name} draws the files of its run; it has no result without them.")
+                raise ConfigError(f"{stage.name} only draws files into a run folder; it has no result in memory.")
             stage.refuse_unsuited(target, config)
         return stages
 
@@ -204,7 +204,7 @@ class Graph:
 MODEL_HELP = "Model whose gaits to study."
 ESTIMATED = (
     Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds."),
-    Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its deviation."),
+    Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its standard deviation."),
     Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate too.", list),
     Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
 )
@@ -233,7 +233,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "tune", "walkerlab.evidence.paper.tune",
-        "Adjust the initial velocities until the contact model walks; say whether, how much, and why.",
+        "Adjust the initial velocities until the contact model walks; report how much was needed, and why.",
         reads.TuneConfig, results_of("fixedpoint"), requires=("contact",),
         does_without=later("walkerlab.evidence.paper.omissions", "adjustment_omissions"),
     ),
@@ -243,7 +243,7 @@ PIPELINE = Graph(
         walks_and(), requires=("contact",),
         options=(
             Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV."),
-            Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Its columns.", needs=("--with",)),
+            Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Columns of that file.", needs=("--with",)),
             Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", needs=("--with",)),
         ),
     ),
@@ -321,17 +321,17 @@ PIPELINE = Graph(
             Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", bool),
             Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
             Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file lacks."),
-            Option("--plan", "", "", "Without data: errors that each way of measuring would leave.", bool, runs="plan"),
+            Option("--plan", "", "", "Without data: predict the errors of each way of measuring.", bool, runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),
     ),
     Stage(
         "plan", "walkerlab.pipeline.stages.plan",
-        "Say which measurements would determine parameters of the walker, and with how many steps.",
+        "Find which measurements, over how many steps, determine parameters of the walker.",
         reads.PlanConfig, results_of("fixedpoint"), only_by="plan",
         options=(
             *ESTIMATED, ERRORS_TO_REACH,
-            Option("--steps", "plan.steps", "N", "Steps of the walk whose errors are stated.", int),
+            Option("--steps", "plan.steps", "N", "Number of steps to report errors for.", int),
         ),
     ),
     Stage(

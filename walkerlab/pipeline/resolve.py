@@ -82,7 +82,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
     except Damaged as error:
         raise ConfigError(
             f"{path} is damaged, and no config can be taken from it: {error}.",
-            f"`-c {folder.quoted_path}` takes the one of its folder.",
+            f"Use the config of its folder: `-c {folder.quoted_path}`.",
         ) from None
     return folder, ConfigFile(Path(folder.name), str(path), stored.provenance.config, folder.changes)
 

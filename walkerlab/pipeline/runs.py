@@ -135,7 +135,7 @@ def results_to_show(
     results = results_in(folder, stages, graph)
     outdated = why_outdated(folder, results, graph)
     for stage, why in outdated.items():
-        warn(f"{folder.artifact(stage)} is out of date: {why}; {command(folder, graph[stage])} makes it anew.")
+        warn(f"{folder.artifact(stage)} is out of date: {why}; {command(folder, graph[stage])} recomputes it.")
     with refusing_older(folder, outdated, graph):
         yield results
 
@@ -160,9 +160,7 @@ def refusing_older(folder: RunFolder, outdated: Collection[str], graph: Graph = 
         paths = [str(folder.artifact(stage)) for stage in outdated]
         commands = [command(folder, graph[stage]) for stage in outdated]
         they = "is outdated and lacks" if len(paths) == 1 else "are outdated and lack"
-        raise StaleError(
-            f"{join_words(paths)} {they} {missing}.", f"{join_words(commands)} computes it anew."
-        ) from missing
+        raise StaleError(f"{join_words(paths)} {they} {missing}.", f"Run {join_words(commands)}.") from missing
 
 
 def command(folder: RunFolder, stage: Stage) -> str:
@@ -184,7 +182,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
     if run is not None:
         return run
     names = sorted(path.name for path in runs_dir.glob("*/"))
-    near = suggestion(Path(text).name, names) or (f" There are {', '.join(names)}." if names else "")
+    near = suggestion(Path(text).name, names) or (f" Available runs: {', '.join(names)}." if names else "")
     raise ConfigError(f"there is no run {text}.{near}", "`walkerlab report` creates the run of the paper config.")
 
 
@@ -211,7 +209,7 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
     recorded = config_of(folder)
     if recorded is None and record is None:  # nothing in the folder can be read
         return
-    changes = ["it is no longer a config"]
+    changes = ["its config is no longer valid"]
     if recorded is not None:
         changes = list(
             differences(

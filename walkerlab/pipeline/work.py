@@ -122,8 +122,8 @@ class Spread:
         self._deaths += 1
         if self._deaths > MAX_DEATHS and not self._alive:
             raise NoAnswer(
-                f"no worker lives: {type(error).__name__}: {error}",
-                "Results so far are kept, and the same command resumes. Look at memory and limits of this machine.",
+                f"all worker processes died: {type(error).__name__}: {error}",
+                "Results so far are kept, and the same command resumes. Check this machine's memory and limits.",
             )
         middle = len(batch) // 2
         if failures and middle:

@@ -53,7 +53,7 @@ class WorkerDiedError(WalkerlabError):
         how = signal.Signals(-exit_code).name if exit_code < 0 else f"exit code {exit_code}"
         super().__init__(
             f"a worker process ended before it had answered ({how}).",
-            "What it printed may say why. If it was killed, perhaps memory was short: --jobs 1 needs less.",
+            "Its output may say why. If it was killed, the machine may be short of memory: --jobs 1 needs less.",
         )
         self.exit_code_of_worker = exit_code
 

@@ -169,7 +169,7 @@ def test_a_hinge_to_a_body_that_does_not_exist_is_refused():
 
 
 def test_two_bodies_of_one_name_are_refused():
-    with pytest.raises(ValueError, match="one name"):
+    with pytest.raises(ValueError, match="duplicate body name"):
         Assembly((Body("leg", 1.0, (0.0, 0.0)), Body("leg", 2.0, (0.0, 0.0))), joints=())
 
 

@@ -398,7 +398,7 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
 
     follower = BranchFollower(map_of(walker_at, 10.0), ValueSpan(8.0, 18.0))
     branch = follower.family(seeds_at(walker_at, 10.0), 1)[0]
-    assert branch.ends[1].reason == NO_WALKER == "no walker has the parameter's next value"
+    assert branch.ends[1].reason == NO_WALKER == "the parameter's next value makes no walker"
     assert 12.5 < branch.ends[1].value < 13.0
 
 
@@ -422,7 +422,7 @@ def test_a_branch_that_ends_in_a_push_off_that_lasts_too_long_says_so():
 def test_a_branch_that_uses_up_its_points_says_so():
     follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), most=5)
     branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
-    assert all(end.reason == "5 points are used up" for end in branch.ends)
+    assert all(end.reason == "the limit of 5 points is reached" for end in branch.ends)
 
 
 def test_a_closed_branch_is_gone_round_once_wherever_it_is_begun():
@@ -437,7 +437,7 @@ def test_a_closed_branch_is_gone_round_once_wherever_it_is_begun():
     assert len(seeds) > 1
     for seed in seeds:
         (branch,) = BranchFollower(pushed, ValueSpan(1.0, 8.0)).family([seed, *seeds], 1)
-        assert [end.reason for end in branch.ends] == ["comes round to where it began"] * 2
+        assert [end.reason for end in branch.ends] == ["returns to its first point"] * 2
         assert branch.points[0] is branch.points[-1]
         folds = sorted(one.value for one in branch.bifurcations if one.kind == "fold")
         assert folds == pytest.approx([2.6594772, 2.8432054, 4.7852377, 6.0665538], abs=1e-6)

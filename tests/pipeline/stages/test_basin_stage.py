@@ -164,7 +164,7 @@ def test_walkers_with_more_coordinates_are_refused(tmp_path):
 
 
 def test_a_window_upside_down_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="other side"):
+    with pytest.raises(ConfigError, match="is not below"):
         run(tmp_path, "basin.lower=[0.9,-1.0]")
 
 

@@ -70,7 +70,7 @@ def test_a_spring_is_followed_from_none_on_and_a_gait_that_goes_on_neither_way_i
     for branch in summary["branches"]:
         assert (branch["from"], branch["to"]) == (0.0, 40.0)
         assert [end["reason"] for end in branch["ends"]] == ["end of the span"] * 2
-    (alone,) = [one for one in summary["left_out"] if "goes on neither way" in one["why"]]
+    (alone,) = [one for one in summary["left_out"] if "continues in neither direction" in one["why"]]
     assert alone["what"].startswith("a gait of the rigid model at 20 N m/rad")
     assert alone["why"].endswith("Newton's method finds no further gait")  # not that there is no walker
 

@@ -106,7 +106,7 @@ def test_a_slope_without_a_gait_has_no_answer_in_words(slope, begins, said, advi
 
 def test_a_drive_that_no_gait_goes_with_is_what_to_change():
     driven = Config.model_validate({"slope_rad": 0.0, "push_off": {"impulse_N_s": 60.0}})
-    assert "too strong or too weak for it there: try another push_off.impulse_N_s" in fixedpoint.advice(driven)
+    assert "too strong or too weak on this slope: try another push_off.impulse_N_s" in fixedpoint.advice(driven)
     sprung = Config.model_validate({"slope_rad": 0.0, "walker": {"hip": {"spring_N_m_per_rad": 5.0}}})
     assert "or drive the walker (push_off.impulse_N_s" in fixedpoint.advice(sprung)
 

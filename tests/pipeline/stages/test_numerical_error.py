@@ -82,7 +82,7 @@ WALKED = {
 def test_where_the_second_walk_ends_otherwise_there_is_a_reason_and_no_number():
     fell = WALKED | {"outcome": "fell", "steps": 1}
     assert change(WALKED, fell) == {
-        "reason": "with a hundred times tighter tolerances the walk ends otherwise: fell after 1 step"
+        "reason": "with a hundred times tighter tolerances the walk ends differently: fell after 1 step"
     }
     assert list(change(WALKED, WALKED | {"steps": 1}, by="another method, radau5")) == ["reason"]
 

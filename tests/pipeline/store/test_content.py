@@ -144,5 +144,5 @@ def test_groups_on_the_way_to_others_are_there():
 
 @pytest.mark.parametrize("values", [[1.0], [1], [True]])
 def test_a_number_without_a_unit_is_refused(values):
-    with pytest.raises(ValueError, match="has no unit; that of a pure number is '1'"):
+    with pytest.raises(ValueError, match="has no unit; use '1' for a dimensionless quantity"):
         Variable(np.array(values), ("x",), "", "how many")

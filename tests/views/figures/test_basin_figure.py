@@ -56,8 +56,8 @@ def test_cells_are_drawn_around_their_middles():
 
 
 def test_without_a_basin_it_says_how_to_make_one():
-    why = FIGURE.why_left_out({}, {"basin": "it was not asked for; `walkerlab basin` makes it"})
-    assert why == "it needs basin: it was not asked for; `walkerlab basin` makes it"
+    why = FIGURE.why_left_out({}, {"basin": "it was not requested; `walkerlab basin` makes it"})
+    assert why == "it needs basin: it was not requested; `walkerlab basin` makes it"
 
 
 def test_the_report_has_its_shares_and_attractors():

@@ -60,5 +60,5 @@ def test_captions_count_the_cells():
 
 
 def test_without_maps_they_are_left_out_and_say_so():
-    absent = {"stability-maps": "it was not asked for"}
-    assert STEP.why_left_out({}, absent) == "it needs stability-maps: it was not asked for"
+    absent = {"stability-maps": "it was not requested"}
+    assert STEP.why_left_out({}, absent) == "it needs stability-maps: it was not requested"

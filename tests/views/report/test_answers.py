@@ -134,10 +134,10 @@ def test_periods_and_lengths_have_the_digits_that_their_numerical_error_leaves()
 
 
 def test_an_unknown_numerical_error_is_told_with_its_reason():
-    unknown = {"reason": "with a hundred times tighter tolerances the walk ends otherwise: fell after 1 step"}
+    unknown = {"reason": "with a hundred times tighter tolerances the walk ends differently: fell after 1 step"}
     lines = answer("contact-sim", WALK | {"numerical_error": unknown})
     assert lines[0].endswith("takes 0.7000 s and is 0.3700 m long.")
-    assert "numerical error: unknown: with a hundred times tighter tolerances the walk ends otherwise" in " ".join(
+    assert "numerical error: unknown: with a hundred times tighter tolerances the walk ends differently" in " ".join(
         lines
     )
 

@@ -28,7 +28,7 @@ FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quan
 # smallest noise, as a fraction of a quantity's typical size; noise-free measurements are given this noise
 NOISE_FLOOR: Final = 1e-6
 NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
-NO_NEIGHBOURS: Final = "the walk from the start, or one beside it, ends before the measured steps are over"
+NO_NEIGHBOURS: Final = "the predicted walk, or one with slightly changed parameters, ends before the last measured step"
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
 SETTLED_FIT: Final = 1e-6  # relative change of the cost, or of the unknowns, that ends a round

@@ -140,7 +140,7 @@ def combination_in_words(parts: list[tuple[str, float]]) -> str:
 def reason_in_words(value: float, largest: float) -> str:
     if value <= LOST_SHARE * largest:
         return "the walk does not change with this combination"
-    return f"a change of it by its whole size moves the walk by {value:.2g} standard deviations of the data"
+    return f"changing it by its whole size moves the walk by only {value:.2g} standard deviations of the data"
 
 
 def contributions(fitted: Fitted, quantities: tuple[str, ...], count: int, basis: Floats) -> dict[str, float]:

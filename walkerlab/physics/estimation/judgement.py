@@ -36,7 +36,7 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
     if fitted.why:
         return "not-converged", fitted.why
     if fitted.noise.roughness_m > ROUGHEST * leg_length_m:
-        return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough would explain the steps"
+        return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough could explain the steps"
     white = whitened_residuals(forecast, fitted)
     steps = forecast.steps.count
     for place, quantity in enumerate(forecast.channels):

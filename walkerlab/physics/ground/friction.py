@@ -92,8 +92,8 @@ class Coulomb(NamedTuple):
 
     def in_words(self) -> str:
         return (
-            f"Coulomb friction as ADAMS has it, with a coefficient of {self.static:g} at a slip of "
-            f"{self.stiction_velocity:g} m/s and {self.dynamic:g} from {self.friction_velocity:g} m/s on"
+            f"ADAMS's Coulomb friction, with a coefficient of {self.static:g} at a slip velocity of "
+            f"{self.stiction_velocity:g} m/s and {self.dynamic:g} above {self.friction_velocity:g} m/s"
         )
 
 
@@ -174,7 +174,7 @@ def missing_members(law: type) -> list[str]:
     missing = [name for name in asked if not hasattr(law, name)]
     switching = (switching_count, sample_switching)
     needed = (friction_coefficient, *(switching if any(law in function for function in switching) else ()))
-    cases = [f"a body @{function.__name__}.case({law.__name__})" for function in needed if law not in function]
+    cases = [f"a case @{function.__name__}.case({law.__name__})" for function in needed if law not in function]
     return missing + cases
 
 

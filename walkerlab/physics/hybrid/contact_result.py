@@ -115,7 +115,7 @@ class ContactWalkResult(WalkRecord):
         stiff = method_named(self.method).stiff
         if self.outcome is Outcome.BUDGET_EXHAUSTED and not stiff:
             return (
-                f"The walk exhausted its evaluation budget by {self.method}, which stiff ground holds to short steps "
+                f"The walk exhausted its evaluation budget: on stiff ground, {self.method} needs short steps "
                 f"at any tolerance; {SET_STIFF}"
             )
         if self.energy_balance_residual_J <= self.explained_residual_J:

@@ -82,8 +82,8 @@ class RigidWalkResult(WalkRecord):
             reasons.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
         if self.max_friction_ratio > MAX_FRICTION:
             reasons.append(
-                f"the stance foot would slip: it takes a friction coefficient of {self.max_friction_ratio:.3g}, and "
-                f"hardly any ground gives more than {MAX_FRICTION:g}"
+                f"the stance foot would slip: it needs a friction coefficient of {self.max_friction_ratio:.3g}, "
+                f"and hardly any ground provides more than {MAX_FRICTION:g}"
             )
         return tuple(reasons)
 

@@ -87,7 +87,7 @@ class Assembly:
     def __post_init__(self) -> None:
         names = [body.name for body in self.bodies]
         if len(set(names)) < len(names):
-            raise ValueError(f"two bodies of one name among {', '.join(names)}")
+            raise ValueError(f"duplicate body name in {', '.join(names)}")
         placed = [*(particle.body for particle in self.particles), *(foot.body for foot in self.feet)]
         locked = [body for knee in self.knees for body in (knee.thigh, knee.shank)]
         coupled = [body for coupling in self.couplings for body in (coupling.body, *coupling.of)]

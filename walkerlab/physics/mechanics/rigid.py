@@ -112,7 +112,7 @@ def find_hip(assembly: Assembly) -> Revolute:
     first, second = (leg[0] for leg in assembly.legs)
     hinge = assembly.hinge(second, first)
     if hinge is None:
-        raise ValueError(f"no hinge joins the legs {first!r} and {second!r} at a hip; add one between them")
+        raise ValueError(f"legs {first!r} and {second!r} are not hinged together; add a hip hinge between them")
     return hinge
 
 
@@ -125,11 +125,11 @@ def knee_position(assembly: Assembly) -> tuple[float, float] | None:
 def check_equal_legs(assembly: Assembly) -> None:
     first, second = assembly.legs
     if not first or len(first) != len(second):
-        raise ValueError("both legs need the same bodies, from the hip down: legs: [[…], […]]")
+        raise ValueError("both legs need the same number of bodies, listed from the hip down: legs: [[…], […]]")
     if len(first) > 2:
         raise ValueError("a leg has at most a thigh and a shank, with one knee between them")
     if set(first) & set(second):
-        raise ValueError(f"{', '.join(sorted(set(first) & set(second)))} belongs to both legs; list a body for one")
+        raise ValueError(f"both legs list {', '.join(sorted(set(first) & set(second)))}; a body belongs to one leg")
     feet = tuple(foot.body for foot in assembly.feet)
     if len(feet) != 2 or feet[0] not in first or feet[1] not in second:
         raise ValueError("a walker has two feet, the first on a body of the first leg, the second on one of the second")
@@ -137,14 +137,14 @@ def check_equal_legs(assembly: Assembly) -> None:
     for leg in assembly.legs:
         for above, below in pairwise(leg):
             if (above, below) not in knees:
-                raise ValueError(f"{below!r} hangs from {above!r} without a knee that locks: the leg could not stand")
+                raise ValueError(f"no locking knee joins {above!r} and {below!r}: the stance leg would fold")
     coupled = {coupling.body for coupling in assembly.couplings}
     for body in assembly.bodies:
         if body.name not in (*first, *second) and body.name not in coupled:
-            raise ValueError(f"body {body.name!r} belongs to no leg and no coupling holds it")
+            raise ValueError(f"body {body.name!r} is in neither leg and has no coupling")
     one, other = (leg_measures(assembly, k) for k in range(2))
     if not np.allclose(one, other, rtol=ALIKE, atol=ALIKE * np.abs(one).max()):
-        raise ValueError("the two legs differ; a walker whose legs change roles needs two that are alike")
+        raise ValueError("the two legs differ; they exchange roles at heel strike, so they must be equal")
 
 
 def leg_measures(assembly: Assembly, k: int) -> Floats:

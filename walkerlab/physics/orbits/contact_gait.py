@@ -45,12 +45,12 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
     if excluded:
         return GaitAnswer(None, *excluded)
     tolerances = replace(tolerances, budget=SEARCH_STEP_BUDGET)
-    failure = "the start does not even let the feet pass each other"
+    failure = "from the start, the feet do not even pass each other"
     for steps, z in section_points(walker, ground, tolerances, start):
         gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.pitch), z)
         if isinstance(gait, Cycle):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
-        failure = f"Newton's method found none after {steps} steps from the start: {gait}"
+        failure = f"Newton's method found no gait after {steps} steps from the start: {gait}"
     followed = follow_from_rigid(walker, ground, tolerances, start)
     if followed.gait is not None:
         return followed

@@ -366,7 +366,7 @@ class ContactMap(StepMap):
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         site = self._at(p)
-        assert site is not None, "what is watched was walked"
+        assert site is not None, "p must make a walker"
         slip, tripped, start = 0.0, 0.0, z
         for _ in range(steps):
             step = self._walk(site, start, False)
@@ -379,7 +379,7 @@ class ContactMap(StepMap):
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
         site = self._at(p)
-        assert site is not None, "what is disturbed has a gait"
+        assert site is not None, "p must make a walker"
         ground = site.ground._replace(terrain=self._terrain(site))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
@@ -391,7 +391,7 @@ class ContactMap(StepMap):
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         site, touch = self._at(p), self.step(z, p, derived=False)
-        assert site is not None, "what is sampled makes a walker"
+        assert site is not None, "p must make a walker"
         ground = site.ground._replace(terrain=self._terrain(site))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
@@ -403,7 +403,7 @@ class ContactMap(StepMap):
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         site = self._at(p)
-        assert site is not None, "what is measured has a gait"
+        assert site is not None, "p must make a walker"
         return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
     def at(self, tolerances: Tolerances) -> ContactMap:
@@ -428,5 +428,5 @@ class OwnPads(Stepper):
 
 
 def contact_step(gait: Cycle) -> SectionStep:
-    assert isinstance(gait.step, SectionStep), "a gait of the contact model"
+    assert isinstance(gait.step, SectionStep), "the gait must be one of the contact model"
     return gait.step

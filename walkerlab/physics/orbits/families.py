@@ -33,8 +33,8 @@ AMPLITUDE_HALVINGS = 12  # halvings of the amplitude when entering a doubled bra
 MAX_MULTIPLIER_CHANGE = 0.6  # between neighbouring points, for multipliers near the unit circle
 CRITICAL_RANGE = 1.6  # multipliers are near the unit circle if their magnitude or its inverse is below this
 SEED_EVALUATIONS = 20  # evaluations in Newton's method from a seed
-CLOSED_LOOP = "comes round to where it began"
-NO_WALKER = "no walker has the parameter's next value"
+CLOSED_LOOP = "returns to its first point"
+NO_WALKER = "the parameter's next value makes no walker"
 END_OF_SPAN = "end of the span"
 EDGE_TOLERANCE = 1e-12  # relative to the size of the span
 # points per branch; growth of a disturbance over a cycle beyond which gaits cannot be resolved
@@ -227,7 +227,7 @@ class BranchFollower:
             step = min(step, 0.5 * float(np.linalg.norm(half_cycle_difference(start.evaluated.data))))
         while end is None:
             if len(points) >= self.most:
-                end = BranchEnd(points[-1].value, f"{self.most} points are used up")
+                end = BranchEnd(points[-1].value, f"the limit of {self.most} points is reached")
                 break
             following = self.next_point(equations, last, step, before)
             if isinstance(following, BranchEnd):
@@ -249,7 +249,7 @@ class BranchFollower:
                     share = (monitor.limit - ahead) / (after - ahead)
                     crossings.append(Crossing(monitor, left.value + share * (right.value - left.value)))
             if end is None and abs(points[-1].multipliers[0]) > MAX_CYCLE_GROWTH:
-                end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold a cycle")
+                end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold per cycle")
             before, last = last, solved
         if end.reason == CLOSED_LOOP:  # begin at an unstable gait, so that no stable stretch is split
             begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))

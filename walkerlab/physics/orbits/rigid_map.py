@@ -289,9 +289,9 @@ class RigidMap(StepMap):
     """Step map of the rigid model in section coordinates of the similar walker of unit size."""
 
     monitors = (
-        Monitor("min_normal_force_N", "N", "least normal force on the stance foot", 0.0),
+        Monitor("min_normal_force_N", "N", "minimum normal force on the stance foot", 0.0),
         Monitor("max_friction_ratio", "1", "largest ratio of tangential to normal force"),
-        Monitor("max_scuff_depth_m", "m", "depth of the swing foot below the slope"),
+        Monitor("max_scuff_depth_m", "m", "largest depth of the swing foot below the slope"),
     )
 
     tolerances = MONITORED_STEPS
@@ -334,7 +334,7 @@ class RigidMap(StepMap):
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         unit = self._unit_at(p)
-        assert unit is not None, "what is watched was walked"
+        assert unit is not None, "p must make a walker"
         walker, units = unit.walker, unit.units
         walk = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
         extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
@@ -343,7 +343,7 @@ class RigidMap(StepMap):
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
         unit = self._unit_at(p)
-        assert unit is not None, "what is disturbed makes a walker"
+        assert unit is not None, "p must make a walker"
         walker, units, start = unit.walker, unit.units, np.array(state_on_section(unit.walker, z))
         start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
         walk = self._walk_over(unit, z, heights_m, start)
@@ -361,7 +361,7 @@ class RigidMap(StepMap):
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         unit = self._unit_at(p)
-        assert unit is not None, "what is sampled makes a walker"
+        assert unit is not None, "p must make a walker"
         start = np.array(state_on_section(unit.walker, z))
         observer = new_observer(times_s / unit.units.time, start.size)
         self._walk_over(unit, z, heights_m, start, observer)
@@ -412,7 +412,7 @@ class RigidMap(StepMap):
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
         # Negative values mean that the ground would have to pull.
         unit = self._unit_at(p)
-        assert unit is not None, "what is pushed has a gait"
+        assert unit is not None, "p must make a walker"
         walker, units, start = unit.walker, unit.units, state_on_section(unit.walker, z)
         pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
         impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
@@ -421,7 +421,7 @@ class RigidMap(StepMap):
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         unit = self._unit_at(p)
-        assert unit is not None, "what is measured has a gait"
+        assert unit is not None, "p must make a walker"
         return unit.units.length, unit.units.time
 
     def at(self, tolerances: Tolerances) -> RigidMap:

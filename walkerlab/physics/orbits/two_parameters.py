@@ -122,7 +122,7 @@ def trace_curve(
             return np.array(values), BranchEnd(float(values[-1][1]), "end of the plane")
         values.append(value)
         before, last = last, solved
-    return np.array(values), BranchEnd(float(values[-1][1]), f"{points} points are used up")
+    return np.array(values), BranchEnd(float(values[-1][1]), f"the limit of {points} points is reached")
 
 
 def clip_to_plane(inside: Floats, outside: Floats, spans: tuple[ValueSpan, ValueSpan]) -> Floats:
@@ -169,7 +169,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Interpolate a period-1 gait from the branches at each value, preferring stable ones; None if no branch has one."""
+    """Interpolate a period-1 gait from the branches at each value, preferring stable ones; None where no branch is."""
     gaits, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:

@@ -78,7 +78,7 @@ def run(
         raise ConfigError(
             f"basin takes walkers with {len(COORDINATES)} coordinates just after heel strike; this one has "
             f"{len(rigid.section_indices)}.",
-            "Lock the knees in the heel strike: --set walker.knee.at_heel_strike=locked.",
+            "Lock the knees at heel strike: --set walker.knee.at_heel_strike=locked.",
         )
     window = window_of(config, [float(gait["state"][place]) for place in rigid.section_indices])
     progress.start("basin: attractors")
@@ -131,7 +131,7 @@ def window_of(config: BasinConfig, z: list[float]) -> Window:
     lower = settings.lower or tuple(z[axis] - half[axis] for axis in axes)
     upper = settings.upper or tuple(z[axis] + half[axis] for axis in axes)
     if any(b <= a for a, b in zip(lower, upper, strict=True)):
-        raise ConfigError("basin.lower lies above the window's other side.", "Give basin.upper too.")
+        raise ConfigError("basin.lower is not below basin.upper.", "Give both bounds.")
     return Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
 
 
@@ -178,11 +178,11 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
 
     settled = np.where(ends.attractor == UNREACHED, 0, ends.steps)
     variables |= {
-        "outcome": over(ends.outcome, "how the walk ended, see attribute outcomes"),
-        "attractor": over(ends.attractor, "number of the attractor that was reached; -1 for none"),
+        "outcome": over(ends.outcome, "how the walk ended; codes in attribute outcomes"),
+        "attractor": over(ends.attractor, "index of the attractor that was reached; -1: none"),
         "steps": over(ends.steps, "steps taken"),
-        "steps_to_settle": over(settled, "steps until the attractor was reached; 0 where none was"),
-        "walking": over(walking, "share of the cell that walks; of cells at edges from their parts"),
+        "steps_to_settle": over(settled, "steps until the attractor was reached; 0: none was"),
+        "walking": over(walking, "fraction of the cell that walks; edge cells: from their subcells"),
     }
     held_values = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})

@@ -90,7 +90,7 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
     if atol > RESOLVED * rising:
         progress.note(
             f"contact-sim: lower solver.contact.atol ({atol:g} m/s): it is large relative to contact.stiction_velocity "
-            f"({rising:g} m/s), up to which friction rises, so friction and how the walk ends may be chance"
+            f"({rising:g} m/s), up to which friction rises, so friction and the outcome may be due to chance"
         )
 
 
@@ -141,8 +141,8 @@ def pads_group(pitch: float, end: float) -> Group:
     return Group(
         {
             **numbered(numbers.size, "pad", "pad number"),
-            "left_m": Variable(numbers * pitch - 0.5 * pitch, ("pad",), "m", "where the pad begins, along the slope"),
-            "right_m": Variable(numbers * pitch + 0.5 * pitch, ("pad",), "m", "where the pad ends, along the slope"),
+            "left_m": Variable(numbers * pitch - 0.5 * pitch, ("pad",), "m", "start of the pad along the slope"),
+            "right_m": Variable(numbers * pitch + 0.5 * pitch, ("pad",), "m", "end of the pad along the slope"),
             "leg": Variable(2 - numbers % 2, ("pad",), "1", "leg whose lane the pad lies in"),
         }
     )

@@ -108,8 +108,8 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     if not any(family.branches for family in families):
         raise NoAnswer(
             f"no gait was found with {parameter.key} from {block.least:g} to {block.most:g} {parameter.unit}: "
-            f"none at any of {len(question.start_values())} values looked at",
-            "Choose another span (--from, --to), or change what else the config fixes.",
+            f"no gait at any of {len(question.start_values())} trial values",
+            "Choose another span (--from, --to), or change other parameters.",
             content,
         )
     return content
@@ -326,7 +326,7 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
 
 def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
     """Return the side of a crossing on which the monitored quantity exceeds its limit."""
-    assert step_map is not None, "a branch is followed with one"
+    assert step_map is not None, "a followed branch has a step map"
     place, limit = list(step_map.monitors).index(crossing.monitor), crossing.monitor.limit
     nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
     beyond = limit is not None and nearest.monitors[place] > limit
@@ -414,7 +414,7 @@ def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, 
     """Report a gait that continues in neither direction, because the step map is discontinuous there."""
     (gait,) = branch.points
     what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
-    return {"what": what, "why": f"it goes on neither way: {branch.ends[1].reason}", "saves": ""}
+    return {"what": what, "why": f"it continues in neither direction: {branch.ends[1].reason}", "saves": ""}
 
 
 def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> list[dict[str, str]]:
@@ -422,14 +422,14 @@ def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> li
     followed, entries, second = {family.model: family for family in families}, [], question.second
     for model in question.models:
         if model not in followed:
-            entries.append((f"the {model} model's gaits", f"{question.parameter.key} does not touch that model"))
+            entries.append((f"the {model} model's gaits", f"{question.parameter.key} does not affect this model"))
         elif not followed[model].branches:
-            entries.append((f"the {model} model's gaits", "no gait was found in the span to begin from"))
+            entries.append((f"the {model} model's gaits", "no starting gait was found in the span"))
         elif model == CONTACT and question.config.continuation.periods > THOROUGHNESS[CONTACT].periods:
             what = f"the contact model's gaits of more than {THOROUGHNESS[CONTACT].periods} steps"
             entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
     entries += [
-        (f"the {family.model} model's plane of both keys", "the second key does not touch that model")
+        (f"the {family.model} model's plane of both keys", "the second key does not affect this model")
         for family in families
         if second is not None and family.branches and not second.touches(family.model)
     ]

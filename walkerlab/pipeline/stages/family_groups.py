@@ -37,10 +37,10 @@ EVERY = 3  # every third sample between heel strikes is stored
 
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
-STANCE = Label("rad", "stance leg just after each heel strike", name="stance_angle")
+STANCE = Label("rad", "angle of the stance leg just after each heel strike", name="stance_angle")
 CURVES = {"model": MODEL, "kind": Label("", "fold or flip"), "period": PERIOD}
 BIFURCATIONS = {"kind": KIND, "period": PERIOD, "branch": Label("1", "number of the branch")}
-EXPONENTS = {"exponent": Label("1", "largest exponent per step"), "uncertainty": Label("1", "its standard error")}
+EXPONENTS = {"exponent": Label("1", "largest exponent per step"), "uncertainty": Label("1", "standard error")}
 POINTS = {
     "stable": Label("1", "whether disturbances die out"),
     "periods_s": Label("s", "durations of the steps", ("step",), name="step_period"),
@@ -49,16 +49,16 @@ POINTS = {
     "z": Label("1", "section coordinates", ("coordinate",), name="section"),
 }
 ATTRACTORS = {
-    "period": Label("1", "steps after which it repeats; 0: never"),
-    "periods_s": Label("s", "durations of steps on it", ("visit",), name="step_period"),
+    "period": Label("1", "steps after which the attractor repeats; 0: never"),
+    "periods_s": Label("s", "durations of steps on the attractor", ("visit",), name="step_period"),
     "angles": replace(STANCE, dims=("visit",)),
 }
-SETTLED: Final = "steps after which walks repeat themselves; 0: never, -1: none goes on"
+SETTLED: Final = "steps after which walks repeat themselves; 0: never, -1: no walk continues"
 MARKS = {
-    "after": Label("1", "point before a bifurcation; -1: none", name="mark_after"),
+    "after": Label("1", "index of the point before the bifurcation; -1: none", name="mark_after"),
     "kind": replace(KIND, name="mark_kind"),
-    "periods": Label("s", "durations of the steps there", ("step",), name="mark_step_period"),
-    "angles": Label("rad", "stance leg just after each heel strike there", ("step",), name="mark_stance_angle"),
+    "periods": Label("s", "step durations of the gait at the bifurcation", ("step",), name="mark_step_period"),
+    "angles": Label("rad", "stance angles of the gait at the bifurcation", ("step",), name="mark_stance_angle"),
 }
 
 
@@ -82,7 +82,7 @@ def groups(
         }
 
     if answer["branches"]:
-        ends = {"from": Label(parameter.unit, "where it begins"), "to": Label(parameter.unit, "where it ends")}
+        ends = {"from": Label(parameter.unit, "start of the branch"), "to": Label(parameter.unit, "end of the branch")}
         overview = columns(answer["branches"], {"model": MODEL, "period": PERIOD, **ends}, "branch")
         stored["branches"] = Group(overview, {"over": parameter.key})
     if answer["curves"]:
@@ -159,7 +159,7 @@ def branch_group(
         label = Label(monitor.unit, monitor.meaning)
         variables[monitor.name] = labelled([point.monitors[place] for point in points], label, "point")
     if marks:
-        labels = MARKS | {"value": Label(value["value"].unit, "where it is", name="mark_value")}
+        labels = MARKS | {"value": Label(value["value"].unit, "value at the bifurcation", name="mark_value")}
         variables |= columns(marks, labels, "mark")
     attrs: dict[str, Attribute] = {
         "period": branch.period,

@@ -23,18 +23,18 @@ NUMBERS = {
     "spectral_radius": Label("1", "largest magnitude of a multiplier"),
     "stable": Label("1", "whether small disturbances die out"),
     "residual": Label("rad", "residual P(x) - x, velocities times sqrt(L/g)"),
-    "energy": Label("J", "time mean of the energy from the stance foot", name="energy_J"),
-    "energy_drift": Label("J", "spread of the energy within the swing", name="energy_drift_J"),
+    "energy": Label("J", "mean energy over time, heights from the stance foothold", name="energy_J"),
+    "energy_drift": Label("J", "range of the energy within the swing", name="energy_drift_J"),
     "speed": Label("m/s", "step length over period", name="speed_m_s"),
     "froude": Label("1", "speed over sqrt(g L), L the leg length"),
-    "cost_of_transport": Label("1", "work spent over weight and distance"),
-    "min_normal_force": Label("N", "least normal force on the stance foot", name="min_normal_force_N"),
+    "cost_of_transport": Label("1", "work spent divided by weight times distance"),
+    "min_normal_force": Label("N", "minimum normal force on the stance foot", name="min_normal_force_N"),
     "max_friction_ratio": Label("1", "largest ratio of tangential to normal force"),
     "min_normal_impulse": Label(
-        "N s", "least normal impulse of the ground in a strike of heel or knee", name="min_normal_impulse_N_s"
+        "N s", "minimum normal impulse of the ground in a strike of heel or knee", name="min_normal_impulse_N_s"
     ),
     "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
-    "max_scuff_depth": Label("m", "depth of the swing foot below the slope", name="max_scuff_depth_m"),
+    "max_scuff_depth": Label("m", "largest depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
 """Labels of the fields of `RigidGait` that are stored and printed."""
 OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
@@ -62,16 +62,16 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
 def advice(config: RigidConfig) -> str:
     """Return advice for a slope without a gait."""
     walk_anyway = (
-        f"to walk there all the same, give a start state (start: [{', '.join(state_names(config))}]), and the "
-        "contact model a pitch of its pads (contact.pad_pitch: a number)"
+        f"to walk on this slope anyway, give a start state (start: [{', '.join(state_names(config))}]), and "
+        "for the contact model a pad pitch (contact.pad_pitch: a number)"
     )
     drives = "push_off.impulse_N_s or walker.hip.torque_N_m"
     if config.push_off.impulse_N_s or config.walker.hip.torque_N_m:
-        tried = f"What drives the walker may be too strong or too weak for it there: try another {drives}"
+        tried = f"The drive may be too strong or too weak on this slope: try another {drives}"
     elif config.slope_rad <= 0.0:
         tried = f"Let the slope descend in walking direction (slope_deg above 0), or drive the walker ({drives})"
     else:
-        tried = "Gaits on other slopes are followed by `walkerlab continuation`"
+        tried = "Find gaits on other slopes with `walkerlab continuation`"
     return f"{tried}; {walk_anyway}."
 
 
@@ -125,9 +125,9 @@ def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
         **rows_group(gaits, {"state": STATE, **numbers_of(gaits[0])}, GAIT, "gait, shortest period first").variables,
         **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), "multiplier"),
         "coordinate": Variable(np.array(state_names(config)), ("coordinate",), "", "coordinate of the state"),
-        "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starting values that led here"),
-        "found_by": Variable(found_by, (GAIT,), "", "searches that led here"),
-        "objections": Variable(objections, (GAIT,), "", "why the gait cannot be walked"),
+        "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starts that found this gait"),
+        "found_by": Variable(found_by, (GAIT,), "", "searches that found this gait"),
+        "objections": Variable(objections, (GAIT,), "", "why the gait is not physical"),
     }
     attrs: dict[str, Any] = {
         "slope_rad": config.slope_rad,

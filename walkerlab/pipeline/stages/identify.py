@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 LABELS: Final = {
     "key": Label("", "parameter of the config"),
     "value": Label("SI", "estimate, in the unit of the key"),
-    "standard_error": Label("SI", "standard error; absent where the walk leaves the parameter open"),
+    "standard_error": Label("SI", "standard error; absent if the walk does not determine the parameter"),
     "start": Label("SI", "value in the config"),
 }
 UNTOUCHED: Final = 1e-3  # a walk that reduces a prior's variance by a smaller fraction adds no information to it
 SHOWN_STEPS, SHOWN_SAMPLES = 10, 800
 """Number of steps, and approximate number of samples, that the motion player shows."""
-FEWER: Final = "Fit fewer parameters, add what was weighed (--prior), or start nearer to the walk (--set)."
+FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
 
 
 def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
@@ -232,7 +232,7 @@ def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
     swing_first = reorder_by_leg(angle_residuals(result, measured), 1 - measured.step % 2)
     return Group(
         {
-            "phase": Variable(measured.phase, ("sample",), "1", "share of the step's period that has passed"),
+            "phase": Variable(measured.phase, ("sample",), "1", "elapsed fraction of the step's period"),
             "of_step": Variable(measured.step, ("sample",), "1", "index of the step"),
             "residual_rad": Variable(swing_first, ("sample", "leg"), "rad", "measured minus predicted angle"),
         }

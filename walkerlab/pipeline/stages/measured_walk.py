@@ -130,9 +130,7 @@ def read_steps(path: Path, block: Identify) -> MeasuredSteps:
     """Read a table with one row per step: `period_s` and, if measured, `length_m` and `touch_angle_rad`."""
     table = read_delimited(path)
     for name in block.columns.keys() - STEP_KINDS.keys():
-        raise ConfigError(
-            f"--columns: {name!r} is not a quantity of a step.", f"Quantities are {', '.join(STEP_KINDS)}."
-        )
+        raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Choose from {', '.join(STEP_KINDS)}.")
     values = {name: read_column(table, name, block) for name in STEP_KINDS}
     period = values["period_s"]
     if period is None:
@@ -184,5 +182,5 @@ def refuse_sizes(table: Recording, name: str, source: str, values: Floats) -> No
     allowed = "up to half a turn" if angle else f"{PLAUSIBLE[0]:g} to {PLAUSIBLE[1]:g} {unit}"
     raise ConfigError(
         f"{table.path}: {source!r} is {values[step]:.3g} {unit} in step {step + 1}; possible: {allowed}.",
-        f"Correct it, or say its unit: --units {name}=UNIT.",
+        f"Correct it, or give its unit: --units {name}=UNIT.",
     )

@@ -49,7 +49,7 @@ def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
     """Return the largest changes between two summaries of a walk, in the form that `numerical_error` returns."""
     if (first["outcome"], first["steps"]) != (again["outcome"], again["steps"]):
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
-        return {"reason": f"with {by} the walk ends otherwise: {again['outcome']} after {steps}"}
+        return {"reason": f"with {by} the walk ends differently: {again['outcome']} after {steps}"}
     changes = {}
     for key, name in ERROR_OF_EACH_STEP.items():
         both = zip(first.get(key) or (), again.get(key) or (), strict=False)  # the last foot may not have lifted

@@ -97,7 +97,7 @@ def curves_of(options: Sequence[WayToMeasure], keys: Sequence[str]) -> Group:
                 np.array(errors, float),
                 ERROR_DIMENSIONS,
                 "SI",
-                "standard error in the key's unit; a gap where it is open",
+                "standard error in the key's unit; a gap if it is not determined",
                 missing=True,
             ),
         }

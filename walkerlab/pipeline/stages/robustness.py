@@ -55,7 +55,7 @@ GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
 """Names of the ground reactions during and after a push that `RigidMap.ground_after_push` returns, in its order."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
-MODEL: Final = {"model": Label("", "which model walks")}
+MODEL: Final = {"model": Label("", "model that walks")}
 NONE_BESIDE: Final = Gradient(None, None, "neighbouring walks end early, or the config rejects their parameters")
 LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
@@ -63,15 +63,15 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "indicator": Label("", "measured quantity of the steps"),
         "value": Label("SI", "gait sensitivity norm, in the units of indicator and disturbance"),
         "direct": Label("SI", "change of the disturbed step itself"),
-        "error": Label("SI", "of the norm, from quotients over two step sizes"),
+        "error": Label("SI", "error of the norm, from difference quotients with two step sizes"),
     },
     "largest_step": {
-        "down_m": Label("m", "largest step down after which the walk goes on"),
-        "up_m": Label("m", "largest step up after which the walk goes on"),
+        "down_m": Label("m", "largest step down that the gait survives"),
+        "up_m": Label("m", "largest step up that the gait survives"),
     },
     "largest_push": {
-        "forward_N_s": Label("N s", "largest push forward at the hip after which the walk goes on"),
-        "backward_N_s": Label("N s", "largest push backward"),
+        "forward_N_s": Label("N s", "largest push forward at the hip that the gait survives"),
+        "backward_N_s": Label("N s", "largest push backward at the hip that the gait survives"),
         **{
             f"{way}_{name}": Label(unit, f"{what} of the largest push {way}; negative where the ground would pull")
             for way in ("forward", "backward")
@@ -83,7 +83,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
     },
     "rough_ground": {
         "roughness_m": Label("m", "standard deviation of the footholds' heights"),
-        "mean_steps": Label("1", "mean number of steps to failure, or a bound from below"),
+        "mean_steps": Label("1", "mean number of steps to failure, or a lower bound"),
         "walks": Label("1", "walks"),
         "capped": Label("1", "walks that were cut off"),
         "method": Label("", "method of the mean"),
@@ -91,7 +91,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
     "sensitivity": {
         "of": Label("", "quantity of the gait"),
         "to": Label("", "parameter of the config"),
-        "value": Label("SI", "derivative, in the units of both"),
+        "value": Label("SI", "derivative, in the units of quantity and parameter"),
     },
 }
 """Labels of the columns of each table in the answer, in addition to the model."""
@@ -120,7 +120,7 @@ def run(
         # the rigid model's gradients and largest disturbances take less time than the start of a process
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
         numbers = gait_quantities(gait)
-        assert numbers is not None, "a gait that was found walks"
+        assert numbers is not None, "a gait has quantities"
         answer["gaits"].append({"model": subject.model, **numbers})
         answer["sensitivity"] += sensitivities(subject, config.robustness.to, numbers, progress, jobs_but_for_walks)
         if numbers["spectral_radius"] >= 1.0:
@@ -157,7 +157,7 @@ def refuse(config: RobustnessConfig) -> None:
     """Raise ConfigError for an invalid `robustness` block."""
     block = config.robustness
     if block.model in (CONTACT, "both") and config.contact is None:
-        raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or ask for rigid.")
+        raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or choose rigid.")
     for place, key in enumerate(block.to):
         parameter_of(key, config, ("robustness", "to", place))
         if not any(model_reads(model, config, key) for model in models_of(config)):
@@ -242,12 +242,12 @@ def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range,
 
 def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
     roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
-    about = "steps that a walk took; one that went on to the last step that was looked at has as many"
+    about = "steps that a walk took, at most cut_off_at"
     return Group(
         {
-            "model": Variable(np.array([*steps]), ("model",), "", "which model walks"),
+            "model": Variable(np.array([*steps]), ("model",), "", "model that walks"),
             "roughness_m": Variable(roughness, ("roughness",), "m", "standard deviation of the heights"),
-            "cut_off_at": Variable(caps, ("model",), "1", "the last step that was looked at"),
+            "cut_off_at": Variable(caps, ("model",), "1", "step limit of a walk"),
             "steps": Variable(np.array([*steps.values()]), ("model", "roughness", "walk"), "1", about),
         }
     )

@@ -70,7 +70,7 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
     root = root_attributes(content, identity, provenance, content.complete, content.digest())
     own = content.groups[""].attrs if "" in content.groups else {}
     if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
-        raise ValueError(f"attributes of the root that say something else: {sorted(own)}")
+        raise ValueError(f"some of these root attributes have reserved names: {sorted(own)}")
     image = hdf5.image(content.groups, {**root, **own})
     seal = hashlib.sha256(image).hexdigest()
     write_atomically(path, image, f"\nwalkerlab sha256 {seal}\n".encode())
@@ -197,7 +197,7 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
         seal=seal,
     )
     if artifact.digest() != root["content_digest"]:
-        raise Damaged("its content does not have the digest that it was stored with")
+        raise Damaged("its content does not match its stored digest")
     if identity.key != root["stage_key"]:
-        raise Damaged("its key is not that of the config, inputs and code it names")
+        raise Damaged("its key does not match the config, inputs and code that it records")
     return artifact

@@ -43,13 +43,13 @@ class Variable:
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "dims", tuple(self.dims))
         if values.ndim != len(self.dims) or len(set(self.dims)) != len(self.dims):
-            raise ValueError(f"{self.long_name!r}: shape {values.shape} does not go with dimensions {self.dims}")
+            raise ValueError(f"{self.long_name!r}: shape {values.shape} does not match dimensions {self.dims}")
         if values.dtype.kind == "f" and not self.missing and not np.isfinite(values).all():
             raise ValueError(
                 f"{self.long_name!r} holds values that are not finite; leave out values that were not computed"
             )
         if values.dtype.kind != "O" and not self.units:
-            raise ValueError(f"{self.long_name!r} has no unit; that of a pure number is '1'")
+            raise ValueError(f"{self.long_name!r} has no unit; use '1' for a dimensionless quantity")
         check_text(self.units, self.long_name)
 
 
@@ -116,7 +116,7 @@ class Content:
                 check_name(part)
             parent = self.groups.get(above, Group({}))
             if name in parent.variables or name in parent.sizes:
-                raise ValueError(f"{path!r} is a group, and {name!r} a variable or dimension next to it")
+                raise ValueError(f"group {path!r} has the name of a variable or dimension next to it")
 
     def __getitem__(self, path: str) -> Group:
         return self.groups[path]

@@ -188,7 +188,7 @@ def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
     """Read the values of a dataset after checking its declared size."""
     layout = dataset.id.get_create_plist()
     if layout.get_layout() not in (h5py.h5d.CONTIGUOUS, h5py.h5d.COMPACT) or layout.get_external_count():
-        raise ValueError(f"the layout of {name!r} is not one that is written here")
+        raise ValueError(f"{name!r} has a layout that walkerlab does not write")
     if dataset.shape is None:
         raise ValueError(f"{name!r} has no shape")
     dtype = dataset.dtype
@@ -196,7 +196,7 @@ def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
     if is_text(dtype):
         return read_strings(dataset, budget)
     if dtype not in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("i1")):
-        raise ValueError(f"{name!r} has type {dtype}, which is not written here")
+        raise ValueError(f"{name!r} has type {dtype}, which walkerlab does not write")
     return np.asarray(dataset[()])
 
 
@@ -222,7 +222,7 @@ def read_attributes(holder: Any) -> dict[str, Attribute]:
         declared = holder.attrs.get_id(name)
         is_known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
         if declared.shape != () or not is_known:
-            raise ValueError(f"its attribute {name!r} is of a type that is not written here")
+            raise ValueError(f"its attribute {name!r} has a type that walkerlab does not write")
         value = holder.attrs[name]
         attributes[name] = value if isinstance(value, str) else value.item()
     return attributes
@@ -236,7 +236,7 @@ def read_text(holder: Any, name: str, default: str | None = None) -> str:
     if isinstance(value, bytes):
         return value.decode()
     if not isinstance(value, str):
-        raise ValueError(f"its attribute {name!r} is no text")
+        raise ValueError(f"its attribute {name!r} is not text")
     return value
 
 

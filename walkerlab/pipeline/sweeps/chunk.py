@@ -47,7 +47,7 @@ class PointResult:
     ]
     reason: Annotated[str, Label("", "why there is no answer; empty if there is one")]
     numbers: Annotated[str, Label("", "the stage's summary by name, as JSON and without run times")] = "{}"
-    wall_s: Annotated[float, Label("s", "time it took", timing=True)] = 0.0
+    wall_s: Annotated[float, Label("s", "computation time", timing=True)] = 0.0
     bug: str = ""
     """Traceback of a bug that stopped the computation; empty if there was none."""
 

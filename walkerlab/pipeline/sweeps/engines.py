@@ -190,10 +190,10 @@ def engine_named(text: str) -> tuple[SweepEngine, str]:
     """Return the engine and the address of NAME or NAME=ADDRESS; raises ConfigError for an unknown name."""
     name, _, address = text.partition("=")
     if name not in ENGINES:
-        raise ConfigError(f"--engine {text}: no such engine; there are {', '.join(ENGINES)}.")
+        raise ConfigError(f"--engine {text}: unknown engine; choose from {', '.join(ENGINES)}.")
     # multiprocessing's own test for a process that it started; such a process first runs the calling script
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
-            "--engine dask: the processes that Dask starts run the calling script, which would sweep once more.", GUARD
+            "--engine dask: the processes that Dask starts run the calling script, which would sweep again.", GUARD
         )
     return ENGINES[name], address

@@ -288,4 +288,4 @@ def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
                 if quantity != "outcome"
             )
             hint = f" Did you mean {near}?" if near else ""
-            raise ConfigError(f"{option}: {question.stage} has no such quantity.{hint}", f"There are {listed}.")
+            raise ConfigError(f"{option}: {question.stage} has no such quantity.{hint}", f"Choose from {listed}.")

@@ -24,7 +24,7 @@ CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
 
 
 OWN: Final = {
-    "outcome": "how it ended: the stage's own outcome, otherwise whether it has an answer",
+    "outcome": "the stage's own outcome, or else whether it has an answer",
     "status": "answered, no-answer, or failed: not computed",
     "reason": "why there is no answer",
 }

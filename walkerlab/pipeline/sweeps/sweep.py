@@ -88,7 +88,7 @@ class Swept:
         if not self.bugs:
             return NoAnswer(f"{message}; {why}", "The same command tries them again and keeps the rest.")
         error = WalkerlabError(
-            f"{message}, and a bug is among the reasons; {why}", "Please report the traceback; the rest is stored."
+            f"{message}, at least one because of a bug; {why}", "Please report the traceback; the rest is stored."
         )
         for bug in self.bugs:
             error.add_note(bug)
@@ -190,7 +190,7 @@ class SweepRun:
         started = time.perf_counter()
         reporter = reporter or Silent()
         for key in self.unread():
-            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ in it alone are one")
+            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it coincide")
         make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
             claim(self.folder, self.loaded.config)
@@ -244,7 +244,7 @@ class SweepRun:
             for bug in (row.bug for row in chunk.rows if row.bug):
                 place = bug.rpartition("\n  ")[0]  # leave out the message, which differs from point to point
                 if place not in bugs:
-                    reporter.warn(f"a bug stopped a point of the sweep; the others go on.\n{bug}")
+                    reporter.warn(f"a bug stopped one point of the sweep; the others continue.\n{bug}")
                     bugs[place] = bug
             progress.advance(len(chunk.rows))
 
