@@ -231,7 +231,7 @@ def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together
     assert told["rest_s"] == pytest.approx(0.012)
     said = words("adjustment.caused", told).replace("\u00a0", " ")
     assert said.startswith(
-        "Its period differs from the rigid gait's by 10 ms. With each cause switched off alone, −2 ms"
+        "Its period differs from the rigid gait's by 10 ms. Switching off one cause at a time shows that −2 ms"
     )
     assert "12 ms (120 %) from creep in the friction law and the interaction, which could not" in said
     told = causes(replace(limit, without_creep=Extrapolation(0.701, 1e-6)))

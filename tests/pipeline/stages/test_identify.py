@@ -128,7 +128,7 @@ def test_two_masses_of_a_rigid_walk_are_reported_as_one_combination(table, gait)
     combination = text.partition("by this walk (")[2].partition(";")[0]
     assert "leg mass (" in combination
     assert "hip mass (" in combination
-    assert "No walk would separate them; a value known beforehand (--prior) does." in text
+    assert "No walk would separate them; a value known beforehand (--prior) would." in text
 
 
 def test_a_weighed_leg_determines_the_hip(table, gait):

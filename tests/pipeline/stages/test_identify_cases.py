@@ -71,4 +71,4 @@ def test_the_person_takes_a_step_of_six_tenths_of_a_second():
 
 
 def test_the_page_repeats_the_answer_word_for_word():
-    assert len(re.findall(r"No walker that differs from the start by", PAGE)) == 2
+    assert len(re.findall(r"No choice of slope_deg", PAGE)) == 2

@@ -162,7 +162,7 @@ def test_figures_draw_the_recorded_walk_under_its_name(tmp_path):
     figures = execute(config, "plot", folder).summary["figures"]
     captions = {figure["number"]: figure["caption"] for figure in figures if "number" in figure}
     assert captions[7].endswith(", mine walked 6 steps.")
-    assert "Dotted: mine less the rigid model at the same phase; maxima: angle" in captions[8]
+    assert "Dotted: mine minus the rigid model at the same phase; maxima: angle" in captions[8]
     for number in ("07", "08", "09"):
         assert "mine" in (folder.path / "figures" / f"figure-{number}.svg").read_text(encoding="utf-8")
 

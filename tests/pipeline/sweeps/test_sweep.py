@@ -102,7 +102,7 @@ def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted
     swept = toy.run("roll", "strides=[5, 7, 8]", sets=WALKED_AGAIN)
     error = swept.summary["numerical_error"]
     assert (error["walked_again"], error["of"], error["ended_otherwise"]) == (3, 3, 1)
-    assert summary_lines(swept.summary)[0].endswith("3 of 3 points were recomputed, of which 1 ended otherwise.")
+    assert summary_lines(swept.summary)[0].endswith("3 of 3 points were recomputed, of which 1 had another outcome.")
     unknown = toy.run("roll", "strides=[7]", sets=WALKED_AGAIN).summary
     assert summary_lines(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
 

@@ -43,7 +43,7 @@ def test_the_format_is_named_or_follows_the_file(walker, options, file):
     (("kneed", "--to", "adm"), "Knees that lock cannot be exported"),
     (("round-feet", "--to", "mjcf"), "Set contact.terrain=checkerboard."),
     (("paper", "--to", "pdf"), "a model cannot be written as pdf."),
-    (("paper", "--to", "adm", "-o", "x.xml"), "name two formats"),
+    (("paper", "--to", "adm", "-o", "x.xml"), "contradicts the ending"),
     (("paper", "--to", "adm", "--law", "hertz"), "--law hertz: not a contact law."),
     (("paper", "--to", "mjcf", "--law", "functions"), "--law chooses between contact laws of ADAMS."),
     (("rigid-only", "--to", "adm"), "contact"),

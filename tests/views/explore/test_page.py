@@ -200,7 +200,7 @@ def test_what_was_found_is_saved(page, served):
     page.until("document.getElementById('made').textContent.startsWith('Saved')")
     assert load(served.folder / "found.yaml").config == load(None, ["slope_deg=3", "name=found"]).config
     page.evaluate("document.getElementById('save').click()")
-    page.until("document.getElementById('made').textContent.includes('exists already')")
+    page.until("document.getElementById('made').textContent.includes('already exists')")
 
 
 def test_the_picture_is_what_is_seen_on_the_pages_own_ground(page):

@@ -73,9 +73,7 @@ def test_every_figure_is_the_pages_in_another_size(run, monkeypatch):
 
 def test_a_figure_of_outdated_results_says_so(run, capsys):
     export_from(run, "figure-07", Target("svg", None), 516.0, "", Console())
-    assert "outdated results, which are drawn all the same: compare, contact-sim and simulate;" in (
-        capsys.readouterr().err
-    )
+    assert "outdated results, which are drawn anyway: compare, contact-sim and simulate;" in capsys.readouterr().err
 
 
 def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
@@ -106,7 +104,7 @@ def test_format_and_file_mean_the_same_everywhere(run, tmp_path):
         path = export_from(run, "figure-07", target, 252.0, "", QUIET)
         assert path == target.output
         assert path.read_bytes().startswith(b"<?xml")
-    with pytest.raises(ConfigError, match="two formats"):
+    with pytest.raises(ConfigError, match="contradicts the ending"):
         export_from(run, "figure-07", Target("pdf", tmp_path / "mine.svg"), 252.0, "", QUIET)
     film = write_film(run, Target("gif", None), Film("simulate", 1, 5, 1.0), QUIET)
     assert film.name == "paper-simulate.gif"
@@ -164,7 +162,7 @@ def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:
             export_from(run, name, Target("pdf", None), 516.0, "", QUIET)
-        assert refused.value.advice == f"`walkerlab {command} -c {run.quoted_path}` makes what it needs."
+        assert refused.value.advice == f"Run `walkerlab {command} -c {run.quoted_path}` first."
 
 
 def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
@@ -176,7 +174,7 @@ def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
 @pytest.mark.parametrize(
     ("what", "kind", "error", "said"),
     [
-        ("tabl", "tex", ConfigError, "nothing is called tabl. Did you mean table"),
+        ("tabl", "tex", ConfigError, "this run has no item tabl. Did you mean table"),
         ("table-1", "tex", ConfigError, "compares with the paper's walker"),
         ("figure-07", "csv", ConfigError, "cannot be written as csv"),
         ("figure-11", "pdf", StaleError, "cannot be drawn"),

@@ -72,7 +72,10 @@ def swept(count=5):
 
 
 def test_over_one_number_both_models_are_drawn_and_the_least_disturbed_gait_is_named():
-    drawing = robustness.sweep_illustration(swept(), ("slope_deg",)).render({})
+    illustration = robustness.sweep_illustration(swept(), ("slope_deg",))
+    assert illustration.heading == "Figure 17. Robustness over one parameter"
+    assert illustration.alt_text.startswith("Four stacked plots")
+    drawing = illustration.render({})
     assert "The rigid model's least sensitive gait is at 2 deg, with a norm of 20 s/m" in drawing.caption
     assert "The contact model's least sensitive gait is at 2 deg, with a norm of 21 s/m" in drawing.caption
     assert "speed (m/s)" in drawing.svg.decode()
@@ -100,7 +103,7 @@ def test_ways_to_drive_a_walker_are_told_apart_by_what_is_not_zero():
         "impulse_N_s": [False, False, True, True],
     }
     drawing = robustness.sweep_illustration(group, names).render({})
-    assert "With slope the least sensitive gait walks at 0.4 m/s, with a norm of 20 s/m" in drawing.caption
-    assert "With push-off the least sensitive gait walks at 0.6 m/s" in drawing.caption
+    assert "Driven by the slope, the least sensitive gait walks at 0.4 m/s, with a norm of 20 s/m" in drawing.caption
+    assert "Driven by the push-off, the least sensitive gait walks at 0.6 m/s" in drawing.caption
     assert robustness.actuations(driven([1.0, 2.0, 1.0, 0.0], [0.0, 0.0, 2.0, 4.0]), names) is None
     assert robustness.actuations(group, ("slope_deg",)) is None

@@ -230,7 +230,7 @@ def test_long_rows_keep_their_ends():
     assert elide(list(range(100))) == [0, 1, 2, 3, 4, 5, "…", 98, 99]
     (line,) = describe_summary({"values": list(range(1000))}, short=True)
     assert line.split()[:5] == ["values", "0", "1", "2", "3"]
-    assert "(1000 of them" in line
+    assert "(1000 values" in line
 
 
 def test_columns_line_up_under_letters_with_dots():

@@ -187,7 +187,7 @@ def test_the_same_results_give_the_same_bytes(whole):
 
 
 def test_two_sections_cannot_have_one_anchor():
-    with pytest.raises(ValueError, match="one anchor"):
+    with pytest.raises(ValueError, match="share an anchor"):
         sheet(Section("a", "A"), Section("a", "B"))
 
 

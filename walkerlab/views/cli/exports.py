@@ -37,6 +37,7 @@ from walkerlab.pipeline.store.files import as_text
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.target import Target, write_file
+from walkerlab.views.figures.style import EXPORT_DPI
 from walkerlab.views.report.answers import paper_table
 from walkerlab.views.report.outcomes import MODEL_NAMES
 from walkerlab.views.report.tables import Table, as_csv, record_table
@@ -54,15 +55,13 @@ NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY, STEPS = "trajectory", "steps"
 COLUMN_WIDTHS = {1: 252.0, 2: 516.0}
 """Width of one or two columns of a journal (pt)."""
-DPI = 300
-"""Resolution that journals ask for (pixels per inch)."""
 STORED_WITH = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
 def export_from(
-    folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = DPI
+    folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = EXPORT_DPI
 ) -> Path:
     """Write one item of a run to a file (`width` pt, `dpi`), and return its path.
 
@@ -148,9 +147,9 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     names += tables
     names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
     nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
-    advice = "\n  ".join([f"{folder.path} has", *names]) if names else nothing
+    advice = "\n  ".join([f"Items of {folder.path}:", *names]) if names else nothing
     near = suggestion(name, (*figures, *TABLES, STEPS, TRAJECTORY, *tables))
-    raise ConfigError(f"nothing is called {name}.{near}", advice)
+    raise ConfigError(f"this run has no item {name}.{near}", advice)
 
 
 def plan_run(folder: RunFolder) -> Executor:
@@ -175,17 +174,15 @@ def figure(
         why = illustration.why_left_out(stored, {})
     if why is not None:
         commands = [command(folder, PIPELINE[stage]) for stage in illustration.stages if stage not in stored]
-        advice = (
-            f"{join_words(commands)} {'makes' if len(commands) == 1 else 'make'} what it needs." if commands else ""
-        )
+        advice = f"Run {join_words(commands)} first." if commands else ""
         raise StaleError(f"{illustration.name} cannot be drawn: {why}.", advice)
     left_out = stored.keys() <= inputs.keys()
     if not left_out:
         inputs |= stored | {name: result for name, result in outdated.items() if result.complete}
     if outdated:
         console.warn(
-            f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn all the same'}: "
-            f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} makes them anew."
+            f"{folder.path} has outdated results, which are {'left out' if left_out else 'drawn anyway'}: "
+            f"{join_words(sorted(outdated))}; {command(folder, PIPELINE['report'])} recomputes them."
         )
     with refusing_older(folder, outdated):
         return illustration.as_file(inputs, kind, *size)
@@ -197,7 +194,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
         summary = the_result(results, folder, "compare").summary
     if TABLES[name] not in summary:
         raise ConfigError(
-            f"{folder.path} has no {name}: it compares with the paper's walker, and this run's walker is another.",
+            f"{folder.path} has no {name}: it compares with the paper's walker, and this run has another walker.",
             f"Its page has {join_words(page_tables(folder))}.",
         )
     rows = summary[TABLES[name]]
@@ -267,7 +264,7 @@ class Film:
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
     """Return `model`, by default contact-sim (simulate if only that has run); ConfigError if it is not a walk."""
     if model is not None and model not in MODEL_NAMES:
-        raise ConfigError(f"--model {model}: not a walk.", f"There are {', '.join(MODEL_NAMES)}.")
+        raise ConfigError(f"--model {model} is not a walk.", f"Choose from {', '.join(MODEL_NAMES)}.")
     rigid, contact = MODEL_NAMES
     alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
     return model or (rigid if alone else contact)

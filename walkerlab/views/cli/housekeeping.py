@@ -41,7 +41,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         if stage not in names:
             raise typer.BadParameter(f"there is no stage {stage!r}; choose from {', '.join(names)}", param_hint="STAGE")
         if len(runs) > 1 or (runs and request.config is not None):
-            raise typer.BadParameter("one run at a time", param_hint="RUN")
+            raise typer.BadParameter("give only one run", param_hint="RUN")
         request_for_stage = replace(request, command=stage, config=runs[0] if runs else request.config)
         with exit_on_failure(request_for_stage):
             from walkerlab.pipeline.runs import run_named

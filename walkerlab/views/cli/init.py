@@ -45,5 +45,5 @@ def template(walker: str) -> str:
     if walker not in choices:
         beyond = beyond_scope(walker)
         hint = f"; {beyond}." if beyond else f".{suggestion(walker, choices)}"
-        raise ConfigError(f"there is no type of walker {walker!r}{hint}", f"There are {', '.join(choices)}.")
+        raise ConfigError(f"there is no walker type {walker!r}{hint}", f"Choose from {', '.join(choices)}.")
     return choices[walker]

@@ -10,6 +10,7 @@ from walkerlab.errors import StoppedError
 from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.interrupts import raise_on
 from walkerlab.views.cli.request import OF_TALK, Request, command
+from walkerlab.views.figures.style import EXPORT_DPI
 
 RunArgument = Annotated[
     str, typer.Argument(metavar="RUN", help="A run's folder, or its name in the folder of all runs.")
@@ -26,7 +27,7 @@ Output = Annotated[
         help="File to write; its ending gives the format. Default: named after the run or the config, in this folder.",
     ),
 ]
-FIRST_WALK = "default: contact-sim, or simulate where that has not run"
+FIRST_WALK = "default: contact-sim, or simulate if that has not run"
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:
@@ -89,7 +90,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             float | None,
             typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
         ] = None,
-        dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = 300,
+        dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = EXPORT_DPI,
         model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
         law: Annotated[
             str | None,

@@ -38,11 +38,11 @@ def main() -> None:
         return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
 
     warnings.formatwarning = worded
-    print_whatever_there_is_to_print()
+    tolerate_output_errors()
     program()()
 
 
-def print_whatever_there_is_to_print() -> None:
+def tolerate_output_errors() -> None:
     """Discard output to closed streams, and escape characters without encoding, as in undecodable file names."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:

@@ -88,7 +88,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
         if option.runs or (not value and value != 0):
             continue
         if any(values[flag] is None for flag in option.needs):
-            raise typer.BadParameter(f"also give {' and '.join(option.needs)}", param_hint=option.flag)
+            raise typer.BadParameter(f"requires {' and '.join(option.needs)}", param_hint=option.flag)
         typed = " ".join(f"{option.flag} {item}" for item in (value if isinstance(value, list) else [value]))
         if ":" in option.metavar:
             text = bounds(option.flag, value, option.metavar)
@@ -161,12 +161,12 @@ class Request:
     jobs: int | None = option(
         "--jobs", metavar="N", min=1, help="Processes for independent stages and cells; default: all cores."
     )
-    force: bool = option("--force", default=False, help="Run the stage and all it needs, up to date or not.")
+    force: bool = option("--force", default=False, help="Recompute the stage and all it needs, even if up to date.")
     dry_run: bool = option("--dry-run", default=False, help="Show what would be done and why; change nothing.")
     no_wait: bool = option(
         "--no-wait", default=False, help="Give up (exit 6) if another process works in the run folder."
     )
-    open_page: bool = option("--open", default=False, help="Show the page in the browser as soon as it is there.")
+    open_page: bool = option("--open", default=False, help="Show the page in the browser as soon as it exists.")
     every: bool = option("--all", default=False, help="Show all values, not only the headline values.")
     as_json: bool = option("--json", default=False, help="Print one JSON object on stdout.")
     quiet: bool = option("--quiet", "-q", default=False, help="Show only warnings and errors.")
@@ -253,7 +253,7 @@ class KeysAreNoOptions(TyperCommand):
             keys.sort(key=lambda key: not key.startswith(f"{self.name}."))  # prefer the command's own block
             key = next((key for key in keys if name in (key, key.rpartition(".")[2])), None)
             if key is not None:
-                message = f"There is no option {typed}, but a key of the config: --set {key}=VALUE"
+                message = f"There is no option {typed}; set the config key with --set {key}=VALUE"
                 error.message = message  # type: ignore[attr-defined]
             raise
 

@@ -46,7 +46,7 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
         return
     why = "the code is the same" if same_code else "the code has changed since"
     another = StaleError(
-        f"{path} is not reproduced: {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
+        f"{path} is not reproduced: content {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
         "Results agree bit for bit only on the same platform with the same versions; `walkerlab show` lists both.",
     )
     print_result(request, value, [], another)

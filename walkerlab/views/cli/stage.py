@@ -101,7 +101,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     if "html" in own:
         page = (report.run_dir / str(own["html"])).resolve()
         shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
-        details = f"`walkerlab show STAGE{request.typed}` has every number"
+        details = f"`walkerlab show STAGE{request.typed}` lists every value"
         where = ["", f"page: {page}", f"next: {shows}; {details}."]
         rigid_alone = ["", why_rigid_alone(request.resolved.walker)] if request.resolved.contact is None else []
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]

@@ -198,8 +198,8 @@ def result_lines(swept: "Swept", page: Path) -> list[str]:
     over = ", ".join(f"{name} ({len(set(values))})" for name, values in summary["parameters"].items())
     return [
         f"sweep of {summary['of']} over {over}: {summary['points']} points, {outcomes}",
-        *([f"  {swept.reused} of them already existed"] if swept.reused else []),
+        *([f"  {swept.reused} of them were reused"] if swept.reused else []),
         *(line for text in summary_lines(summary) for line in paragraph(text)),
-        f"  numbers  {swept.path}",
+        f"  results  {swept.path}",
         f"  page     {page}",
     ]

@@ -31,9 +31,7 @@ class Target:
         if kind not in kinds:
             raise ConfigError(f"{what} cannot be written as {kind}.", f"--to {', '.join(kinds)}")
         if ending in kinds and ending != kind:
-            raise ConfigError(
-                f"--to {kind} and {output} name two formats.", "Leave out --to, or give the file that ending."
-            )
+            raise ConfigError(f"--to {kind} contradicts the ending of {output}.", "Leave out --to, or rename the file.")
         path = output or Path(f"{stem}.{kind}")
         with storing(path):
             self.refuse(path, kind)

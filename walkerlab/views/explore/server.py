@@ -154,7 +154,7 @@ class Server(ThreadingHTTPServer):
             return save(question, body.get("name"))
         if path == "/api/job":
             return self.job.begin(body.get("kind"), question)
-        return failure(404, f"there is no {path}")
+        return failure(404, f"not found: {path}")
 
 
 def save(question: ExploredConfig, name: Any) -> Answered:
@@ -169,7 +169,7 @@ def save(question: ExploredConfig, name: Any) -> Answered:
     except ConfigError as error:
         return question.refusal(error)
     except FileExistsError:
-        return failure(409, f"{path} exists already.", "Choose another name; files are never overwritten.")
+        return failure(409, f"{path} already exists.", "Choose another name; files are never overwritten.")
     except OSError as error:
         return failure(500, f"{path} cannot be written: {error.strerror}.")
     return 200, {"file": str(path.resolve()), "text": text}
@@ -202,7 +202,7 @@ class Handler(BaseHTTPRequestHandler):
                 return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
         except (ValueError, OSError):  # malformed address, or unreadable file
             pass
-        return self.answer(*failure(404, f"there is no {self.path}"))
+        return self.answer(*failure(404, f"not found: {self.path}"))
 
     def do_POST(self) -> None:
         if not self.local() or not self.allowed(self.bearer()):

@@ -41,6 +41,6 @@ def draw_errors(results: Results) -> Drawn:
 
 FIGURES: Final = (
     Illustration(
-        "planned-errors", (Need("plan", "errors", ("standard_error",), "no error was expected"),), draw_errors
+        "planned-errors", (Need("plan", "errors", ("standard_error",), "no errors were computed"),), draw_errors
     ),
 )  # fmt: skip

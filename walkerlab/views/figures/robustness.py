@@ -52,7 +52,7 @@ BELOW, BESIDE = 1.7, 0.4
 def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:
     """Return the illustration of a robustness sweep over one parameter, or by drive; None for sweeps of other forms."""
     if can_be_drawn(group, parameters):
-        return Illustration("figure-17", (), partial(over_one_parameter, group, parameters[0]))
+        return paper_figure(17, (), partial(over_one_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
     return None if driven is None else Illustration("push-off-or-hip", (), partial(push_off_or_hip, group, driven))
 

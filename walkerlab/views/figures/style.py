@@ -26,7 +26,9 @@ WIDTH: Final = 7.2
 POINT: Final = 1.0 / 72.0
 """One point (in)."""
 PNG_DPI: Final = 160
-"""Resolution of PNGs on the page; exports choose their own."""
+"""Resolution of PNGs on the page (pixels per inch)."""
+EXPORT_DPI: Final = 300
+"""Default resolution of exports, as journals ask for (pixels per inch)."""
 
 RC: Final = {
     "axes.formatter.limits": (-4, 5),

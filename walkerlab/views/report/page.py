@@ -39,7 +39,7 @@ def render(page: Page) -> str:
     """Render a page as HTML; ValueError if two sections have the same anchor."""
     anchors = [section.anchor for section in page.sections]
     if len(set(anchors)) != len(anchors):
-        raise ValueError(f"two sections of the report have one anchor: {anchors}")
+        raise ValueError(f"two sections of the report share an anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
     # Markup only for the package's own files; all other texts are escaped.
     own = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}

@@ -55,7 +55,7 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
         paths = [folder.figures / f"{swept.path.stem}.{kind}" for kind in ("svg", "png")]
         for path, data in zip(paths, (figure.svg, figure.png), strict=True):
             write_atomically(path, data)
-        about = {"title": figure.title, "caption": figure.caption}
+        about = {"title": own.heading, "caption": figure.caption, "alt": own.alt_text}
         files = {path.suffix.removeprefix("."): path.relative_to(folder.path) for path in paths}
         pictures.append(picture({**about, **files}, folder.path))
     page = folder.path / PAGE
@@ -68,7 +68,7 @@ def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], 
     for name in names:
         if not is_number(group, name, dims):
             listed = ", ".join(key for key in group.variables if is_number(group, key, dims) and "." not in key)
-            raise ConfigError(f"{option} {name}: no such quantity in the result.", f"There are {listed}.")
+            raise ConfigError(f"{option} {name} is not a quantity of the result.", f"Choose from {listed}.")
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
@@ -77,7 +77,7 @@ def check_options(stage: str, names: Mapping[str, str], variables: Collection[st
     for option, name in names.items():
         if name not in available and "." not in name:
             listed = ", ".join(quantity for quantity in available if "." not in quantity)
-            raise ConfigError(f"{option}: no such quantity in the first results.", f"There are {listed}.")
+            raise ConfigError(f"{option} is not a quantity of the first results.", f"Choose from {listed}.")
 
 
 PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))
@@ -96,13 +96,13 @@ def page_of(swept: Swept, pictures: Sequence[Picture], quantities: Sequence[str]
         *(Column(name, written=format_value, numeric=True) for name in (*question.names, *quantities)),
         *(Column("outcome"), Column("reason", wide=True)),
     ]
-    listed = f"Of the {len(question)} points the first {MAX_ROWS} are listed. " if len(question) > MAX_ROWS else ""
-    where = f"All numbers of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
+    listed = f"The first {MAX_ROWS} of {len(question)} points are listed. " if len(question) > MAX_ROWS else ""
+    where = f"All values of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
     tables = (
         table("Parameters", PARAMETER_COLUMNS, parameters),
         table("Points", columns, rows(group, question, quantities), note=f"{listed}{where}"),
     )
-    section = Section("points", "Numbers", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
+    section = Section("points", "Results", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
     lead = (f"{summary['points']} points: {outcomes}.", *summary_lines(summary))
     return Page(f"{question.stage} over {', '.join(question.names)}", (section,), lead, PAGE)
 

@@ -113,7 +113,7 @@ def table(
     groups = records if isinstance(records, Mapping) else {"": records}
     for record in chain.from_iterable(groups.values()):
         if isinstance(record, list | tuple) and len(record) != len(columns):
-            raise ValueError(f"{record!r} has not {len(columns)} cells")
+            raise ValueError(f"expected {len(columns)} cells: {record!r}")
     rows = {
         title: [[column.cell(record, place) for place, column in enumerate(columns)] for record in members]
         for title, members in groups.items()

@@ -32,7 +32,7 @@ def cut(value: Any) -> Any:
     if not isinstance(value, list) or len(value) <= LONGEST_ROW:
         return value
     ends = [in_words(item) for item in (*value[:ENDS], *value[-ENDS:])]
-    return [*ends[:ENDS], "…", *ends[ENDS:], f"({len(value)} of them; `walkerlab show` has all)"]
+    return [*ends[:ENDS], "…", *ends[ENDS:], f"({len(value)} values; `walkerlab show` lists all)"]
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:

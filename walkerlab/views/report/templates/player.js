@@ -2,14 +2,14 @@ const TAU = 2 * Math.PI;
 const UNITS = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
 const minus = (text) => text.replace("-", "−");
 const digits = (value, count = 4) => (value === undefined ? "–" : minus(Math.abs(value) < 1e-12 ? "0" : Number(value.toPrecision(count)).toString()));
-// What is below a nanometre is rounding.
+// Lengths below a nanometre are rounding errors.
 const metres = (value, count = 3) => {
   const [scale, unit] = UNITS.find(([size]) => Math.abs(value) >= size) ?? [Infinity, "m"];
   return `${digits(value / scale, count)} ${unit}`;
 };
 const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 
-// The numbers of a walker, and their values at an instant.
+// A walker's recorded motion, and its values at the current instant.
 class Track {
   constructor(meta, packed) {
     Object.assign(this, meta);
@@ -38,7 +38,7 @@ class Track {
     this.over = time > this.end + 1e-6;
     this.time = time;
   }
-  // The leg that pushes off, for as long as an eye sees it; -1 if none does.
+  // The leg that pushes off, kept for 0.08 s so that it is seen; -1 if there is none.
   get pushing() {
     const step = this.strikes.findLastIndex((strike) => strike <= this.time);
     return this.pushes && step >= 0 && this.time - this.strikes[step] < 0.08 ? 1 - (step % 2) : -1;
@@ -53,7 +53,7 @@ class Track {
   }
 }
 
-// A canvas as wide as its place, sharp on every screen.
+// A canvas as wide as its container, sharp on every screen.
 class Picture {
   constructor(canvas, shape) {
     Object.assign(this, { canvas, shape, context: canvas.getContext("2d") });
@@ -83,7 +83,7 @@ function arrow(c, x, y, dx, dy) {
   c.stroke();
 }
 
-// The force on a foot as an arrow, an ordinary one `unit` long, none longer than `most`.
+// Draw the force on a foot as an arrow: `unit` long for an ordinary force, never longer than `most`.
 function force(c, scene, track, leg, x, y, unit, most) {
   const [normal, along] = [track.at(`n${leg}`), track.at(`d${leg}`) ?? 0];
   if (!normal || normal < 0) return;
@@ -95,7 +95,7 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   const { context: c, width, height } = picture;
   const scale = (0.66 * height) / (scene.leg_m + scene.torso_m);
   const [sin, cos] = [Math.sin(scene.slope_rad), Math.cos(scene.slope_rad)];
-  // The camera follows what still walks: it leaves a walker that has ended within half a second.
+  // The camera follows the walkers that still walk; it leaves one that has ended within half a second.
   const shares = tracks.map((track) => clamp(1 - (track.time - track.end) / 0.5, 0, 1));
   const hip = tracks.reduce((sum, track, index) => sum + shares[index] * track.at("hx"), 0) / shares.reduce((sum, share) => sum + share, 0);
   const place = picture.place = (x, y) => [
@@ -149,7 +149,7 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   tracks.forEach((track, index) => drawWalker(picture, scene, track, colours, scale, index));
 }
 
-// Levels of uneven ground again, under it, so much higher that an eye sees them, and by how much.
+// Draw uneven ground a second time, below it, with exaggerated heights and a label with the factor.
 function drawRelief({ context: c, place, height }, scene, levels, colours) {
   const roughest = Math.max(0, ...scene.ground.map(([, level]) => Math.abs(level)));
   const times = roughest ? niceStep((0.04 * scene.leg_m) / roughest) : 0;
@@ -159,7 +159,7 @@ function drawRelief({ context: c, place, height }, scene, levels, colours) {
   for (const [from, to, level] of levels) for (const x of [from, to]) c.lineTo(...place(x, times * level - 0.19 * scene.leg_m));
   c.stroke();
   c.textAlign = "left";
-  c.fillText(`red line: the ground, its heights × ${digits(times)}`, 8, height - 8);
+  c.fillText(`red line: ground heights × ${digits(times)}`, 8, height - 8);
 }
 
 function drawWalker(picture, scene, track, colours, scale, index) {
@@ -173,7 +173,7 @@ function drawWalker(picture, scene, track, colours, scale, index) {
     c.strokeStyle = c.fillStyle = colours[track.style];
     const path = new Path2D();
     for (const name of bent ? ["h", `k${leg}`] : ["h"]) path.lineTo(...joint(name));
-    // The sole is where the leg's own direction meets the foot's arc.
+    // The sole is where the leg's direction meets the foot's arc.
     const [x, y] = place(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radius_m);
     const radius = scale * scene.foot_radius_m;
     const down = Math.PI / 2 - (track.at(`b${leg}`) ?? track.at(`a${leg}`));
@@ -229,7 +229,7 @@ function dot(c, [x, y], radius, fill) {
   c.fill();
 }
 
-// The ground between two places: where each of its levels begins and ends, and its height over the slope.
+// Ground levels between two positions, each as [start, end, height above the slope].
 function levelsOf(scene, left, right) {
   const levels = scene.ground.length ? scene.ground : [[-Infinity, 0]];
   return levels
@@ -237,13 +237,13 @@ function levelsOf(scene, left, right) {
     .filter(([from, to]) => from < to);
 }
 
-// How high a foot is over the ground under it, m.
+// Height of a foot above the ground below it (m).
 function clearance(scene, track, leg) {
   const x = track.at(`fx${leg}`);
   return track.at(`fy${leg}`) - levelsOf(scene, x - 1e-9, x + 1e-9)[0][2];
 }
 
-// One foot, the slope drawn level: how deep it is in the ground, how far it slipped, and the forces.
+// Draw one foot, with the slope level: its penetration, its slip and the forces.
 function drawFoot(picture, scene, track, leg, colours) {
   const { context: c, width, height } = picture;
   const scale = height / scene.closeup_m;
@@ -312,7 +312,7 @@ const niceStep = (rough) => {
   return ten * ([5, 2, 1].find((step) => step * ten <= rough) ?? 1);
 };
 
-// A plot: its curves are drawn once, its cursor lies in a layer above them.
+// A plot: the curves are drawn once, the cursor in a layer above them.
 class Plot {
   static WIDTH = 340;
   static HEIGHT = 230;
@@ -433,7 +433,7 @@ function element(name, attributes, text) {
   return made;
 }
 
-// The player: one clock, and everything that follows it; returns what gives it other walks.
+// Start a player: one clock, and everything that follows it. Returns its controls and the picture of the walk.
 function play(root, firstScene, firstTracks) {
   const find = (selector) => root.querySelector(selector);
   let [scene, tracks, plots, end, strikes] = [{}, [], [], 0, [0]];
@@ -451,7 +451,7 @@ function play(root, firstScene, firstTracks) {
     for (const track of tracks) track.seek(time);
     show();
   };
-  // Other walks are taken up where these are: in the same step, as far into it.
+  // Replace the walks; the clock keeps its step, and the fraction of it.
   const change = (newScene, newTracks) => {
     const step = Math.max(0, strikes.findLastIndex((strike) => strike <= time));
     const share = (time - strikes[step]) / (strikes[step + 1] - strikes[step]) || 0;
@@ -459,7 +459,7 @@ function play(root, firstScene, firstTracks) {
     tracks.forEach((track) => (track.alone = tracks.length === 1));
     end = Math.max(...tracks.map((track) => track.end));
     strikes = [0, ...close.strikes, end];
-    // A loop's end, beginning and length; `back` is how far it has gone back.
+    // End and start of the loop (s), and its distance (m); `back` is the distance of all completed loops.
     [round, again, lap] = scene.loop ?? [end, 0, 0];
     if (!lap) back = 0;
     const to = Math.min(step, strikes.length - 2);
@@ -549,14 +549,14 @@ function play(root, firstScene, firstTracks) {
   root.classList.add("scripted");
   new ResizeObserver(fit).observe(root);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
-  // Whoever asked for less motion starts at a quarter of the speed.
+  // Users who prefer reduced motion start at a quarter of the speed.
   if (matchMedia("(prefers-reduced-motion: reduce)").matches) find(".speed").value = "0.25";
   change(firstScene, firstTracks);
   fit();
   return { change, start, walk };
 }
 
-// What a player is told in the page itself.
+// Read a player's scene and tracks from the page.
 const told = (root) => [
   JSON.parse(root.dataset.player),
   [...root.querySelectorAll(".track")].map(({ dataset }) => new Track(JSON.parse(dataset.meta), dataset.floats)),
@@ -602,7 +602,7 @@ function makePlots(root, tracks, seek) {
   return made;
 }
 
-// A table of what each model has at the instant; returns the function that fills it in.
+// Build the table of each model's values at the current instant; returns the function that updates it.
 function makeReadout(table, tracks) {
   const rows = [["a0", "angle of leg 1 (rad)"], ["a1", "angle of leg 2 (rad)"], ["v0", "velocity of leg 1 (rad/s)"], ["v1", "velocity of leg 2 (rad/s)"], ["ke", "kinetic energy (J)"], ["pe", "potential energy (J)"], ["me", "their sum (J)"]].filter(([name]) => tracks.some((track) => track.has(name)));
   for (const part of [table.tHead, table.tBodies[0]]) part.replaceChildren();
@@ -630,7 +630,7 @@ function makeReadout(table, tracks) {
   };
 }
 
-// A gait of a diagram takes the walk's place in the player, until the walk is asked for again.
+// Show a gait of the diagram in the player, with a button that brings the walk back.
 function load(mark, walk) {
   const next = walk.cloneNode(true);
   const [first, ...others] = next.querySelectorAll(".track");
