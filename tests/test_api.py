@@ -225,7 +225,7 @@ def test_multipliers_are_complex_numbers():
         (lambda: walkerlab.compass(hip_mass=20), r"^walker\.hip_mass: unknown key \(20\)"),
         (
             lambda: walkerlab.find_gait(slope_deg=1, slope_rad=1),
-            r"^slope_\w+: the slope is given already, as slope_\w+;",
+            r"^slope_\w+: slope already set by slope_\w+;",
         ),
         (
             lambda: walkerlab.design(over={"slope_deg": 3}, minimise="period_s"),
