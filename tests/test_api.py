@@ -111,7 +111,7 @@ def test_no_answer_is_a_value():
 def test_what_cannot_be_meant_is_refused():
     with pytest.raises(ConfigError, match=r"did you mean walker\.hip_mass_kg"):
         walkerlab.compass(hip_mas_kg=3)
-    with pytest.raises(ConfigError, match="no such stage"):
+    with pytest.raises(ConfigError, match="unknown stage"):
         walkerlab.run("walk")
     with pytest.raises(KeyError, match="there are"):
         walkerlab.find_gait().dataset("gaits")
