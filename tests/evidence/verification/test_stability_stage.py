@@ -75,7 +75,7 @@ def test_a_case_that_gives_up_as_expected_is_counted_apart_and_is_not_green():
     gave_up = replace(GOOD, name="rings", expected=("budget-exhausted",), outcome="budget-exhausted")
     summary = summarise([GOOD, gave_up], [RIGHT], [])
     shown = report_of(summary)
-    counted = "3 of 3 extreme cases and known problems ended as expected, 1 of them without an answer."
+    counted = "3 of 3 extreme cases and problems with known answers ended as expected, 1 of them without an answer."
     assert shown.finding == counted
     (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
     assert [row[1].tone for row in next(iter(table.groups.values()))] == ["good", "fair"]
