@@ -37,7 +37,7 @@ _REASONS: Final = {
     "less_than_equal": "is out of bounds",
     "missing": "has too few values",
     "too_long": "has too many values",
-    "string_pattern_mismatch": "is not safe as a name",
+    "string_pattern_mismatch": "is not valid",
     "union_tag_invalid": "is not a known type",
 }
 MAX_PROBLEMS: Final = 100

@@ -174,7 +174,7 @@ def test_init_makes_the_folder_and_advises_nothing_that_it_has_not(walker):
 def test_a_config_that_is_not_there_is_begun_with_init(walker):
     done = walker("fixedpoint", "-c", "mine.yaml")
     assert done.returncode == 3
-    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to begin with"
+    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to start from"
 
 
 def test_a_film_needs_no_name(walker):
