@@ -94,7 +94,7 @@ class Result:
         Raises KeyError for an unknown group.
         """
         if group not in self.groups:
-            raise KeyError(f"{self.stage} has no group {group!r}; there are {', '.join(self.groups) or 'none'}")
+            raise KeyError(f"{self.stage} has no group {group!r}; its groups: {', '.join(self.groups) or 'none'}")
         return dataset(self.content[group])
 
 
@@ -162,7 +162,7 @@ class Run:
         try:
             return dataset(artifact.read(path)[""])
         except FileNotFoundError:
-            raise StaleError(f"{self.folder.path} has no sweep {name}.", f"There are {', '.join(names)}.") from None
+            raise StaleError(f"{self.folder.path} has no sweep {name}.", f"Choose from {', '.join(names)}.") from None
         except Damaged as error:
             raise StaleError(f"{path} is damaged: {error}.", "Run the same sweep again to rebuild it.") from error
 
@@ -294,7 +294,7 @@ def contact(**keys: Any) -> Contact:
     100000.0
     """
     block = validate_tree(tree_of({"contact": keys}, NOWHERE)).contact
-    assert block is not None, "a block that is given is there"
+    assert block is not None, "a block set by an argument is in the config"
     return block
 
 
@@ -548,7 +548,7 @@ def export_model(
 
 def _stage_block(stage: str, keys: dict[str, Any], **values: Any) -> dict[str, Any]:
     block = block_of(Config.model_fields[stage])
-    assert block is not None, "a stage that is asked something has a block"
+    assert block is not None, "a stage with a question has a block"
     own = {name: keys.pop(name) for name in block.model_fields if name in keys}
     entries = {name: value for name, value in {**own, **values}.items() if value is not None}
     return {stage: entries or None}
@@ -653,7 +653,7 @@ def sweep_values(key: str, values: Any) -> str | list[Any]:
 def _check_stage(stage: str) -> None:
     names = [known_stage.name for known_stage in PIPELINE.stages]
     if stage not in names:
-        raise ConfigError(f"{stage}: no such stage.", f"There are {', '.join(names)}.")
+        raise ConfigError(f"{stage}: unknown stage.", f"Choose from {', '.join(names)}.")
 
 
 def _result_of(

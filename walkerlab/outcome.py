@@ -74,19 +74,19 @@ OUTCOME_TEXTS = {
     ),
     Outcome.OFF_PAD: OutcomeWords(
         "trips on a pad",
-        "met the flank of a pad or tripped over the pad they had left",
-        "the swinging foot meets a pad's flank, or its own pad again",
+        "hit the side of a pad or tripped on the one they left",
+        "the swing foot hits the side of a pad, or trips on the pad it left",
         "#F7CF85",
-        "A foot met the flank of a pad below its top, or tripped over the pad it had left: the steps do not fit the "
+        "A foot hit the side of a pad, or tripped on the pad it had left: the steps do not fit the "
         "pads; try contact.terrain: after-mid-swing, or another contact.pad_pitch.",
     ),
     Outcome.LIFTED_OFF: OutcomeWords(
         "leaves the ground",
         "left the ground",
-        "the ground would have to pull",
+        "the ground would have to pull on the foot",
         "#DDB3CC",
         "The walker left the ground: no foot was in contact for a quarter of a pendulum time or, in the rigid model, "
-        "the ground would have had to pull; slow the start down, or stiffen or damp the contact.",
+        "the ground would have had to pull on the foot; slow the start down, or stiffen or damp the contact.",
     ),
     Outcome.SLID: OutcomeWords(
         "slides away",
@@ -97,8 +97,8 @@ OUTCOME_TEXTS = {
     ),
     Outcome.NO_HEEL_STRIKE: OutcomeWords(
         "never reaches a heel strike",
-        "never came to a heel strike",
-        "the swinging foot does not come down",
+        "never reached a heel strike",
+        "the swing foot does not come down",
         "#7F7F7F",
         "The swing foot did not come down within ten pendulum times; the start is far from walking.",
     ),
@@ -112,14 +112,14 @@ OUTCOME_TEXTS = {
     Outcome.SOLVER_FAILED: OutcomeWords(
         "makes the solver fail",
         "made the solver fail",
-        "the solver's step fell to rounding, or the energy balance does not close",
+        "the solver's steps shrank to rounding error, or the energy balance does not close",
         "#5B3A1E",
-        "The step size fell to rounding, or the energy balance does not close; choose another solver.*.rtol or "
+        "The steps shrank to rounding error, or the energy balance does not close; choose another solver.*.rtol or "
         "solver.*.method.",
     ),
     Outcome.REJECTED: OutcomeWords(
         "starts in a state that is not allowed",
-        "began in a state that is not allowed",
+        "started in a state that is not allowed",
         "its push-off is not over when the feet pass each other",
         "#FFFFFF",
         "The start is not a possible state of this walker.",
@@ -135,7 +135,7 @@ OUTCOME_TEXTS = {
     Outcome.STUBBED: OutcomeWords(
         "stubs its foot",
         "stubbed a foot",
-        "the swinging foot is below its next foothold as the feet pass",
+        "the swing foot is below its next foothold as the feet pass",
         "#E7C9A9",
         "The swing foot was below its next foothold when the feet passed each other; lower the footholds (ground), or "
         "try contact.terrain: after-mid-swing.",
@@ -143,7 +143,7 @@ OUTCOME_TEXTS = {
 }
 TRY_EVEN_GROUND = (
     "lower the footholds (ground.heights_m, ground.roughness_m). On even ground (ground.roughness_m: 0) the same start "
-    "shows whether it walks at all, and `walkerlab robustness` shows how rough a ground the gait survives."
+    "shows whether it walks at all, and `walkerlab robustness` shows what roughness the gait survives."
 )
 ADVICE_ON_UNEVEN_GROUND = {
     Outcome.FELL: "On this uneven ground the hip came below half a leg above the slope or, in the rigid model, a foot "

@@ -5,8 +5,8 @@
 ! Its last step: 0.7110229 s, 0.3608206 m.
 ! Touches (s): 0.7107174, 1.431657, 2.148981, 2.860841, 3.570681, 4.280776, 4.991577, 5.702715
 ! Touches (s): 6.413842, 7.124865
-! Left out: the rule that a foot which meets a pad below its top ends the walk; here the pad pushes it away
-! Left out: the judgement of falls, slides and steps, and the energy balance
+! Left out: the end of a walk when a foot hits a pad from the side; here the pad pushes the foot away
+! Left out: detection of falls, slides and steps, and the energy balance
 defaults units  &
    length = mm  &
    angle = rad  &

@@ -117,7 +117,7 @@ def test_strides_of_the_command_line_are_over_everything() -> None:
         ),
         ("contact.damping=fast", r"^--set contact\.damping=fast: contact\.damping: 'fast' is not a number"),
         ("strides=", r"strides: nothing is not an integer"),
-        ("name=../../x", r"is not safe"),
+        ("name=../../x", r"is not valid"),
         ("extends=paper", r"extends: belongs in a file"),
         ("strides", r"is not of the form KEY=VALUE"),
         ("=3", r"is not of the form KEY=VALUE"),

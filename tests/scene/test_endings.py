@@ -21,7 +21,7 @@ def test_walks_that_pads_end_are_told_from_limits_of_the_walker():
     first, second = describe_endings(COUNTS, PAPER, contact=True, pads=pads)
     assert (first["outcome"], first["walks"], first["of"], first["ground"]) == ("off-pad", 178, 360, True)
     assert first["said"] == (
-        "178 of 360 walks met the flank of a pad or tripped over the pad they had left (off-pad). The pads end them, "
+        "178 of 360 walks hit the side of a pad or tripped on the one they left (off-pad). The pads end them, "
         "not the walker. The pads' pitch is 0.15 m, the rigid gait's step length; their last steps were 0.31 to 0.36 m "
         "long. Try contact.terrain=after-mid-swing or contact.pad_pitch=own."
     )

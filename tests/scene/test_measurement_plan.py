@@ -84,5 +84,5 @@ def test_a_value_known_beforehand_determines_what_periods_leave_open(config, gai
 
 
 def test_a_start_too_far_from_the_gait_has_no_plan(config, gait):
-    with pytest.raises(NoAnswer, match=r"takes \d+ of 9 steps"):
+    with pytest.raises(NoAnswer, match=r"takes only \d+ of 9 steps"):
         plan_measurements(config, gait, QUESTION, PLAN.model_copy(update={"start_change": 0.5}), "rigid")

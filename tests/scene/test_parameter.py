@@ -87,15 +87,15 @@ def test_at_its_own_value_the_config_is_itself(config):
 @pytest.mark.parametrize(
     ("name", "key", "said"),
     [
-        ("paper", "walker.torso.mass_kg", "is not there: the config has no walker.torso; give it one first"),
+        ("paper", "walker.torso.mass_kg", "cannot be used: the config has no block walker.torso; add it first"),
         (
             "paper",
             "walker.thigh.mass_kg",
             "is not a key of this walker, whose type is compass; did you mean walker.hip_mass_kg",
         ),
         ("kneed", "walker.foot_to_mass_m", "is not a key of this walker, whose type is kneed"),
-        ("parts", "walker.bodies.mass_kg", "has a value for each of the walker.bodies, not a single one"),
-        ("rigid-only", "contact.stiffness", "is not there: the config has no contact; give it one first"),
+        ("parts", "walker.bodies.mass_kg", "has one value for each of walker.bodies, so it is not a single number"),
+        ("rigid-only", "contact.stiffness", "cannot be used: the config has no block contact; add it first"),
         ("paper", "walker.torso", "is a block of keys, not a number"),
         ("paper", "strides", "affects no model"),
         ("paper", "contact.terrain", "is not a number"),

@@ -29,24 +29,24 @@ class Basin(Block):
         bounds=f"two or three of {', '.join(COORDINATES)}, each once",
     )
     cells: tuple[Annotated[int, Field(ge=2, le=4000)], ...] = key(
-        (400, 400), "1", "cells along each coordinate", bounds="a number from 2 to 4000 for each coordinate"
+        (400, 400), "1", "cells along each coordinate", bounds="one number from 2 to 4000 per coordinate"
     )
     lower: _Bounds = key(
         (),
         _COORDINATE_UNITS,
         "lower bounds of the window",
-        bounds="a number for each",
+        bounds="one number per coordinate",
         default_in_words=f"below {_WIDTH}",
     )
     upper: _Bounds = key(
         (),
         _COORDINATE_UNITS,
         "upper bounds of the window",
-        bounds="a number for each, above `lower`",
+        bounds="one number per coordinate, above `lower`",
         default_in_words=f"above {_WIDTH}",
     )
     refine: int = key(
-        4, "1", "parts along each axis into which cells at edges of basins are divided; 1: no refinement", ge=1, le=32
+        4, "1", "parts into which cells at basin boundaries are divided along each axis; 1: no refinement", ge=1, le=32
     )
     steps: int = key(300, "1", "steps of the rigid model after which a walk is called unsettled", ge=1, le=1_000_000)
     contact_steps: int = key(12, "1", "steps that the contact model walks", ge=2, le=10_000)
@@ -63,7 +63,7 @@ class Basin(Block):
     def _one_for_each_coordinate(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
         plane, usual = info.data.get("plane"), not value and info.field_name != "cells"
         if plane is not None and not usual and len(value) != len(plane):
-            raise meaning_error(f"must have {len(plane)} numbers, one for each of plane")
+            raise meaning_error(f"must have {len(plane)} numbers, one for each coordinate in plane")
         return value
 
     _above = check_against(

@@ -41,7 +41,7 @@ class Span(_Span):
         "slope_rad",
         "",
         "parameter to vary, such as slope_deg or walker.hip_mass_kg",
-        bounds="a key with its blocks, dotted",
+        bounds="dotted path of a config key",
         pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$",
     )
 
@@ -58,7 +58,7 @@ class Span(_Span):
 class Continuation(Span):
     """Options of `walkerlab continuation`."""
 
-    model: FollowedModel = key("rigid", "", "which model's gaits: rigid, contact, or both on the same axes")
-    periods: int = key(16, "1", "largest number of steps per gait to which the cascade is followed", ge=1, le=64)
+    model: FollowedModel = key("rigid", "", "model whose gaits are followed: rigid, contact, or both on the same axes")
+    periods: int = key(16, "1", "period-doubling cascades are followed up to gaits of this many steps", ge=1, le=64)
     points: int = key(400, "1", "maximum points of one branch", ge=2, le=100_000)
-    second: Span | None = key(None, "", "a second key, for the curves of folds and flips in the plane of both")
+    second: Span | None = key(None, "", "second parameter, for fold and flip curves in the plane of both")

@@ -46,9 +46,7 @@ class Design(Block):
         for name, bounds in value.items():
             if len(bounds) != 2 or bounds[0] >= bounds[1]:
                 text = ", ".join(f"{bound:g}" for bound in bounds)
-                raise meaning_error(
-                    f"has bounds for {name}, [{text}], that are not two numbers, the first below the second"
-                )
+                raise meaning_error(f"has bounds for {name}, [{text}]: give two numbers, the lower one first")
         return value
 
     @field_validator("keep")

@@ -165,7 +165,7 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
         there_is = purpose or _what_there_is() if reference else f"a run, {_what_there_is()}"
-        advice = KEYS_ARE_LISTED if purpose else "`walkerlab init` writes a config to begin with"
+        advice = KEYS_ARE_LISTED if purpose else "`walkerlab init` writes a config to start from"
         beyond = "" if purpose or file.path.suffix else beyond_scope(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
         raise problem_error(reference, text, there_is, "" if beyond else _near(file), advice) from None

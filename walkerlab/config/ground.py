@@ -11,11 +11,11 @@ class Footholds(Block):
     roughness_m: float = key(
         0.0, "m", "standard deviation of the footholds' heights, which are drawn independently", ge=0.0, le=1e3
     )
-    seed: int = key(0, "1", "seed of the heights that are drawn", ge=0, le=2**32 - 1)
+    seed: int = key(0, "1", "seed of the random heights", ge=0, le=2**32 - 1)
     heights_m: tuple[float, ...] = key(
         (),
         "m",
-        "heights of footholds 1, 2, … over the slope, along its normal; those beyond lie at the last",
+        "heights of footholds 1, 2, … over the slope, along its normal; later footholds have the last height",
         bounds="a list of numbers from -1e3 to 1e3, in place of roughness_m",
     )
 

@@ -17,7 +17,7 @@ class Identify(Block):
         "", "", "file with the measured walk", bounds="a path, from the current folder", default_in_words="none"
     )
     level: Literal["steps", "angles"] = key(
-        "steps", "", "steps: a period for each step, or also a length and the leg's angle at touch; angles: over time"
+        "steps", "", "steps: period (and length and touch angle if measured) of each step; angles: leg angles over time"
     )
     fit: dict[str, Pair | None] = key(
         dict,
@@ -28,22 +28,22 @@ class Identify(Block):
     prior: dict[str, Pair] = key(
         dict,
         "",
-        "parameters that were measured otherwise, in the key's unit",
+        "parameters that were measured by other means, in the key's unit",
         bounds="[value, standard deviation] for each key, the second above 0",
     )
     nuisance: tuple[Nuisance, ...] = key(
-        (), "", "properties of clock and sensors to estimate too", bounds=f"a list of {', '.join(get_args(Nuisance))}"
+        (), "", "clock and sensor properties to estimate as well", bounds=f"a list of {', '.join(get_args(Nuisance))}"
     )
     model: Literal["rigid", "contact", "both"] = key("rigid", "", "model to fit")
-    starts: int = key(1, "1", "starts of the fit: the config's values, the rest up to 10 % beside them", ge=1, le=100)
+    starts: int = key(1, "1", "starts of the fit: the config's values, others within 10 %", ge=1, le=100)
     robustness: bool = key(
-        False, "", "whether to report the identified gait's sensitivity norm, of the period for a drop of the floor"
+        False, "", "whether to report the identified gait's sensitivity norm (step period for a drop of the floor)"
     )
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
     )
     columns: dict[str, str] = key(
-        dict, "", "columns by quantity, where their names do not say it", bounds="a column for each quantity"
+        dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
     )
     units: dict[str, str] = key(
         dict, "", "units by kind (time, length, angle), quantity or column", bounds="a unit for each"
@@ -54,9 +54,7 @@ class Identify(Block):
     def _upwards(cls, value: dict[str, Pair | None]) -> dict[str, Pair | None]:
         for name, bounds in value.items():
             if bounds is not None and (len(bounds) != 2 or bounds[0] >= bounds[1]):
-                raise meaning_error(
-                    f"has bounds for {name}, [{listed(bounds)}], that are not two numbers, the first below the second"
-                )
+                raise meaning_error(f"has bounds for {name}, [{listed(bounds)}]: give two numbers, the lower one first")
         return value
 
     @field_validator("prior")

@@ -51,7 +51,7 @@ def _refuse_two_slopes(keys: dict[str, Position]) -> None:
     if len(slopes) == len(SLOPE_KEYS):
         (first, first_place), (second, second_place) = slopes
         where = f" at {first_place}" if first_place else ""
-        raise problem_error(second_place, f"{second}: the slope is given already, as {first}{where}", "one of both")
+        raise problem_error(second_place, f"{second}: slope already set by {first}{where}", "only one of them")
 
 
 def parse_setting(text: str) -> ConfigSetting:

@@ -102,7 +102,7 @@ def load(
     named = tree.entries["name"]
     warnings = [*suspicious_values(config, changed_tree), *moved]
     if isinstance(named, Scalar) and named.position == start and named.value != file.path.stem:
-        cannot = "since a run folder cannot have the file's name"
+        cannot = "since the file's name is not valid for a run folder"
         warnings.insert(0, f"{file.label}: the run is named {named.value}, {cannot}")
     return LoadedConfig(config, name or folder, changes, tuple(warnings), file.label, changed_tree)
 
@@ -122,8 +122,8 @@ def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
         moved = leg.source.startswith("built-in") or mass.startswith("--")  # changed the mass, not the leg
         if leg.source != mass and not moved and stays != walker.leg_length_m / 2:
             yield (
-                f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m stays {short_number(stays)} m, "
-                f"as {mass} has it: the mass is not in the middle of the leg"
+                f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m is still {short_number(stays)} m "
+                f"(from {mass}), so the mass is not in the middle of the leg"
             )
     slope = tree.keys.get("slope_rad")
     if slope is not None and abs(config.slope_rad) > STEEP_RAD:

@@ -39,15 +39,15 @@ def check_cases(config: Config, tree: Mapping) -> None:
         return
     block = tree.entries["stability"]
     listed = block.entries["cases"] if isinstance(block, Mapping) else block
-    assert isinstance(listed, Sequence), "cases that are typed are a list"
+    assert isinstance(listed, Sequence), "validated cases are a list"
     places: dict[str, Position] = {}
     for case, node in zip(config.stability.cases, listed.items, strict=True):
-        assert isinstance(node, Mapping), "a case that is typed is a block"
+        assert isinstance(node, Mapping), "a validated case is a block"
         if case.name in places:
-            raise problem_error(node.keys["name"], f"name: {case.name} is a case at {places[case.name]} already")
+            raise problem_error(node.keys["name"], f"name: {case.name} is already used at {places[case.name]}")
         places[case.name] = node.keys["name"]
         lines = node.entries.get("config", Mapping(node.position))
-        assert isinstance(lines, Mapping), "lines that are typed are a block"
+        assert isinstance(lines, Mapping), "a validated config is a block"
         over = paper_config_with_tree(lines)
         if case.model == "contact":
             check_ground(case, over, lines)
@@ -56,14 +56,14 @@ def check_cases(config: Config, tree: Mapping) -> None:
 def check_ground(case: Case, config: Config, lines: Mapping) -> None:
     if config.contact is None:
         where = lines.keys.get("contact", lines.position)
-        raise problem_error(where, f"contact: case {case.name} walks on the ground and has none", "model: rigid")
+        raise problem_error(where, f"contact: case {case.name} needs a contact block but has none", "model: rigid")
     if isinstance(config.start, str):
         return
     # Other terrains, too, judge steps by the length of the start's step, which therefore must not be 0.
     by_start = config.contact.pad_pitch == "rigid" or config.contact.terrain == "after-mid-swing"
     if by_start and config.start[0] == config.start[1]:
         where = lines.keys.get("start", lines.position)
-        text = f"start: case {case.name} starts with its feet together, and so pads of its step have no length"
+        text = f"start: case {case.name} starts with its feet together, but its ground needs a step length above 0"
         raise problem_error(where, text, "legs apart, or on a checkerboard contact.pad_pitch: a number")
 
 

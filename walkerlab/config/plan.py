@@ -8,8 +8,8 @@ from walkerlab.config.fields import Block, key, meaning_error
 class Plan(Block):
     """Measurements to plan, with their assumed noise."""
 
-    steps: int = key(20, "1", "steps of the walk whose standard errors are stated", ge=2, le=500)
-    max_steps: int = key(50, "1", "longest walk to consider", ge=2, le=500)
+    steps: int = key(20, "1", "steps of the walk for which standard errors are reported", ge=2, le=500)
+    max_steps: int = key(50, "1", "steps of the longest walk to consider", ge=2, le=500)
     errors: dict[str, float] = key(
         dict, "", "standard errors to reach, in the key's unit", bounds="a number above 0 for each key of identify.fit"
     )
@@ -19,7 +19,7 @@ class Plan(Block):
     rate_hz: float = key(100.0, "Hz", "sampling rate of angles over time", ge=1.0, le=10_000.0)
     roughness_m: float = key(1e-4, "m", "standard deviation of the floor's heights", ge=0.0, le=0.1)
     start_change: float = key(
-        0.02, "1", "relative change of the section's coordinates in the walk that starts off the gait", gt=0.0, le=0.5
+        0.02, "1", "relative change of the start's coordinates, for walks that do not start on the gait", gt=0.0, le=0.5
     )
 
     @field_validator("errors")

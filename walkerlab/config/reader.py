@@ -91,9 +91,9 @@ class _Composer:
             if name == "DocumentStartEvent":
                 documents += 1
                 if documents > 1:
-                    self._refuse(event, "a second document begins: a config is one")
+                    self._refuse(event, "a second document begins; a config has only one")
                 if event.version not in (None, (1, 2)):
-                    self._refuse(event, "a config is YAML 1.2")
+                    self._refuse(event, "a config must be YAML 1.2")
             elif name not in ("StreamStartEvent", "StreamEndEvent", "DocumentEndEvent"):
                 root = self._node(event, 0)
         if self._twice:
@@ -104,12 +104,12 @@ class _Composer:
         name, position = type(event).__name__, _position(event.start_mark, self._source, self._column)
         if name == "AliasEvent":
             self._refuse(
-                event, f"alias *{printable(event.anchor)}: a config has none; write the value out, or use extends"
+                event, f"alias *{printable(event.anchor)}: aliases are not supported; repeat the value, or use extends"
             )
         if event.anchor is not None:
-            self._refuse(event, f"anchor &{printable(event.anchor)}: a config has none; use extends to share values")
+            self._refuse(event, f"anchor &{printable(event.anchor)}: anchors are not supported; use extends instead")
         if event.tag is not None:
-            self._refuse(event, f"tag {printable(event.tag)}: a config has none; types are known from the keys")
+            self._refuse(event, f"tag {printable(event.tag)}: tags are not supported; types follow from the keys")
         if name == "ScalarEvent":
             return Scalar(position, value_of(event.value) if event.implicit[0] else event.value, event.value)
         if depth == MAX_DEPTH:
@@ -119,14 +119,12 @@ class _Composer:
         block = Mapping(position)
         for word in self._until("MappingEndEvent"):
             if type(word).__name__ in ("MappingStartEvent", "SequenceStartEvent"):
-                self._refuse(word, "a key is a word, not a list or a block")
+                self._refuse(word, "a key must be a word, not a list or a block")
             key, value = self._node(word, depth + 1), self._node(next(self._events), depth + 1)
-            assert isinstance(key, Scalar), "whatever else begins there is refused"
+            assert isinstance(key, Scalar), "keys that are lists or blocks are refused"
             if key.text in block.keys:
                 first = block.keys[key.text]
-                self._twice.append(
-                    Problem(key.position, f"{printable(key.text)}: given a second time, first at {first}")
-                )
+                self._twice.append(Problem(key.position, f"{printable(key.text)}: duplicate key, first at {first}"))
             else:
                 block.put(key.text, value, key.position)
         return block

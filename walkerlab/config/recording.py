@@ -14,10 +14,10 @@ class RecordedFile(Block):
         default_in_words="none",
     )
     name: str = key(
-        "", "", "name of the walk in figures and tables", bounds="a text", default_in_words="the file's, without ending"
+        "", "", "name of the walk in figures and tables", bounds="any text", default_in_words="file name without ending"
     )
     columns: dict[str, str] = key(
-        dict, "", "columns by quantity, where their names do not say it", bounds="a column for each quantity"
+        dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
     )
     units: dict[str, str] = key(
         dict, "", "units by kind (angle, length, ...), quantity or column", bounds="a unit for each"

@@ -20,7 +20,7 @@ class Robustness(Block):
         (),
         "",
         "parameters with respect to which the gait is differentiated",
-        bounds="a list of keys, dotted",
+        bounds="a list of dotted paths of config keys",
         default_in_words="every parameter that the model reads",
     )
     steps: int = key(50, "1", "steps that a walk must take after a single disturbance", ge=1, le=10_000)
@@ -30,5 +30,5 @@ class Robustness(Block):
         "standard deviations of the footholds' heights; an empty list leaves rough ground out",
         bounds="a list of numbers above 0",
     )
-    walks: int = key(400, "1", "walks on each rough ground", ge=2, le=1_000_000)
+    walks: int = key(400, "1", "walks per roughness", ge=2, le=1_000_000)
     max_steps: int = key(20_000, "1", "steps after which a walk on rough ground is cut off", ge=1, le=10_000_000)

@@ -56,7 +56,7 @@ class SlopeInDegrees(Block):
     slope_deg: float = key(
         ...,
         "deg",
-        "slope in degrees; a file has one of slope_rad and slope_deg",
+        "slope in degrees; give either slope_rad or slope_deg",
         bounds="between -90 and 90, both excluded",
         gt=-90.0,
         lt=90.0,
@@ -146,7 +146,7 @@ class Tune(Block):
         None,
         "1",
         "cells of the map along each of its axes, the factors on the two velocities",
-        default_in_words="61; 21 for other walkers than the paper's compass",
+        default_in_words="61 for the paper's compass, 21 for other walkers",
         ge=2,
         le=501,
     )
@@ -155,7 +155,7 @@ class Tune(Block):
     rigid_limit: bool = key(
         True,
         "",
-        "whether to also stiffen the contact towards the rigid limit, to find out when deviations fall to 1e-4",
+        "whether to also stiffen the contact towards the rigid limit, to find where deviations fall to 1e-4",
     )
 
     @field_validator("swing_factors", "stance_factors")
@@ -181,7 +181,7 @@ class Source(Block):
     url: str | None = key(
         None,
         "",
-        "where it can be read",
+        "web address of the study",
         bounds="an address that begins with http:// or https://",
         pattern=r"^https?://\S+$",
     )
@@ -240,7 +240,7 @@ class Config(Block):
     plan: Plan | None = None
     sweep: Sweep | None = None
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
-    seed: int = key(0, "1", "seed of everything random", ge=0, le=2**32 - 1)
+    seed: int = key(0, "1", "seed of all random numbers", ge=0, le=2**32 - 1)
 
     _fits = check_against("start", "walker", why_no_state)
     _pushes = check_against(
@@ -254,9 +254,9 @@ class Config(Block):
         if value == "as-printed" and {"walker", "push_off"} <= info.data.keys():
             values = SimpleNamespace(**info.data)
             if acting := acting_on(values):
-                raise meaning_error(f"is for a passive compass, and this walker has {', '.join(acting)}")
+                raise meaning_error(f"is for a passive compass, but this walker has {', '.join(acting)}")
             if not is_passive_compass(values):
-                raise meaning_error("is for a compass, and this walker is not one")
+                raise meaning_error("is for a compass, which this walker is not")
         return value
 
     @field_validator("outputs")

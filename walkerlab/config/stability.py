@@ -19,25 +19,25 @@ class Case(Block):
     """Test case: changes to the paper config, and the expected outcomes."""
 
     name: str = key(..., "", "name of the case", bounds="up to 64 letters, digits, '.', '_', '+' or '-'", pattern=NAME)
-    family: str = key("own", "", "what it belongs to, for tables", bounds="as a name", pattern=NAME)
+    family: str = key("own", "", "group of the case in tables", bounds="same as for name", pattern=NAME)
     model: Literal["contact", "rigid"] = key("contact", "", "which model walks")
-    config: dict[str, Any] = key(dict, "", "keys of a config, over the paper's", bounds="a block of keys")
+    config: dict[str, Any] = key(dict, "", "config keys that replace the paper's", bounds="a block of keys")
     steps: int = key(4, "1", "steps to walk", ge=1, le=2_000_000)
-    lowered_m: float = key(0.0, "m", "how far the start is sunk into the ground; negative lifts it", ge=-1e3, le=1e3)
+    lowered_m: float = key(0.0, "m", "depth of the start below the ground; negative: above it", ge=-1e3, le=1e3)
     expected: tuple[Fate, ...] = key(
         ..., "", "expected outcomes", bounds=f"a list of {', '.join(FATES)}", sequence=True
     )
     reason: str = key(..., "", "why these outcomes are expected", bounds="a sentence")
-    budget: int = key(400_000, "1", "right-hand sides that the walk may evaluate", ge=1, le=100_000_000)
-    balance: float = key(1e-6, "1", "largest residual of the energy balance, as a share of the walker's energy", gt=0.0)
+    budget: int = key(400_000, "1", "maximum number of right-hand sides evaluated in the walk", ge=1, le=100_000_000)
+    balance: float = key(1e-6, "1", "largest residual of the energy balance, relative to the walker's energy", gt=0.0)
     agreement: float = key(
         1e-4,
         "1",
-        "largest change of times at a ten times tighter tolerance, in pendulum times; also for a twin",
+        "largest change of times at a ten times tighter tolerance, in pendulum times; also between twins",
         gt=0.0,
     )
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)
-    twin: bool = key(False, "", "whether a walker of another size must do the same")
+    twin: bool = key(False, "", "whether the same walker in another size must walk alike")
 
     @field_validator("expected")
     @classmethod

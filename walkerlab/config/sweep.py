@@ -8,7 +8,7 @@ Values = str | list[float | int | bool | str]
 class Sweep(Block):
     """Defaults of the options of `walkerlab sweep`."""
 
-    stage: str = key("fixedpoint", "", "stage to run", bounds="a stage that draws nothing")
+    stage: str = key("fixedpoint", "", "stage to run", bounds="any stage that draws no figures")
     over: dict[str, Values] = key(
         dict,
         "",
@@ -19,7 +19,7 @@ class Sweep(Block):
     sample: str = key(
         "",
         "",
-        "sample points from the intervals instead",
+        "sample points from the intervals instead of the grid",
         bounds="latin-hypercube:N, sobol:N, random:N, or empty",
         default_in_words="empty",
     )

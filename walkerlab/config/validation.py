@@ -24,7 +24,7 @@ Location: TypeAlias = tuple[int | str, ...]
 _REASONS: Final = {
     "float_type": "is not a number",
     "int_type": "is not an integer",
-    "string_type": "is not a text",
+    "string_type": "is not text",
     "tuple_type": "is not a list",
     "list_type": "is not a list",
     "dict_type": "is not a block of keys",
@@ -37,7 +37,7 @@ _REASONS: Final = {
     "less_than_equal": "is out of bounds",
     "missing": "has too few values",
     "too_long": "has too many values",
-    "string_pattern_mismatch": "is not safe as a name",
+    "string_pattern_mismatch": "is not valid",
     "union_tag_invalid": "is not a known type",
 }
 MAX_PROBLEMS: Final = 100
@@ -97,7 +97,7 @@ def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]
     for place, (name, of) in followers(walker).items():
         for first, theta in ((0, "theta"), (bodies, "dtheta")):
             start[first + place] = sum(weight * start[first + body] for body, weight in of.items())
-            why[first + place] = f"{theta}_{name.split()[0]}", f"as the {name} follows other bodies"
+            why[first + place] = f"{theta}_{name.split()[0]}", f"because the {name} follows other bodies"
     moved = [
         f"start: {name} moved from {short_number(config.start[place])} to {short_number(start[place])} "
         f"{'rad' if place < bodies else 'rad/s'}, {because}"
@@ -125,7 +125,7 @@ def check_bodies(config: Config, tree: Mapping) -> None:
             refuse(("walker", *place), f"{printable(name)} is not a body", bodies, nearest(name, bodies))
     for k, (foot, leg) in enumerate(zip(walker.feet, walker.legs, strict=True)):
         if foot.body in bodies and foot.body not in leg:
-            why = f"{printable(foot.body)} is not of leg {k + 1}, whose foot this is"
+            why = f"{printable(foot.body)} does not belong to leg {k + 1}, although this foot does"
             refuse(("walker", "feet", k, "body"), why, leg)
     if problems:
         raise problems_error(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
@@ -165,7 +165,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     if what == "extra_forbidden":
         return _unknown_key(location, tree)
     path, field, _ = _along(model, location, tree)
-    assert field is not None, "a key that is wrong is a key"
+    assert field is not None, "the key of an invalid value is in the schema"
     key = ".".join(path)
     node, position = node_at(tree, location)
     if node is None and what == "missing":
@@ -177,7 +177,7 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         if given is not None and node is None:
             position = where
         elif given is not None and where.source != position.source and _is_later(where, position):
-            text = f"contact.{judge}: {key} stays {value}, as {position.source} has it, and {reason}"
+            text = f"contact.{judge}: {key} is still {value} (from {position.source}) and {reason}"
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
     meant = nearest(word, words_of(field.annotation)) if word else ""
@@ -219,7 +219,7 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
     name, block = str(location[-1]), inner or Config
     kinds = {} if field is None else kinds_of(field)
     parent, _ = node_at(tree, location[:-1])
-    assert isinstance(parent, Mapping), "it holds the key"
+    assert isinstance(parent, Mapping), "the parent holds the key"
     if any(name in kind.model_fields for kind in kinds.values()):
         return _keys_of_another_kind(".".join(above), parent, parent.keys[name].source, block, kinds)
     if location == ("extends",):

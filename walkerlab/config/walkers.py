@@ -69,7 +69,7 @@ def check_inertia(inertia: str, why: str, *places: str) -> Any:
 
     def has_inertia(value: float, info: ValidationInfo) -> float:
         if value == 0.0 and all(info.data.get(place) == 0.0 for place in places):
-            raise meaning_error(f"is 0 with {why} would be massless")
+            raise meaning_error(f"is 0 while {why} would be massless")
         return value
 
     return field_validator(inertia)(has_inertia)
@@ -82,7 +82,7 @@ class Torso(Block):
     above_hip_m: float = key(..., "m", "its centre of mass above the hip", ge=0.0, le=MAX_LENGTH_M)
     inertia_kg_m2: float = inertia(0.0, "the torso")
     held: Literal["bisecting"] = key(
-        "bisecting", "", "what holds it", "Wisse, Schwab, van der Helm, Robotica 22 (2004)"
+        "bisecting", "", "what holds the torso", "Wisse, Schwab, van der Helm, Robotica 22 (2004)"
     )
 
 
@@ -106,10 +106,10 @@ class _Legged(Block):
         with suppress(AttributeError):  # errors of the keys above are reported already
             inertia = leg_inertia(SimpleNamespace(**info.data))
             if value.too_quick_for(inertia):
-                most = f"at most {QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
+                most = f"{QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
                 raise meaning_error(
                     f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: with their inertia about the "
-                    f"hip, {inertia:.3g} kg m^2, it may have {most}"
+                    f"hip, {inertia:.3g} kg m^2, the limits are {most}"
                 )
         return value
 
@@ -171,7 +171,7 @@ class StraightLegs(_Legged):
 
     _arc = check_arc("leg_length_m", "leg_length_m")
     _inertia = check_inertia(
-        "leg_inertia_kg_m2", "the leg's mass at the hip: the swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
+        "leg_inertia_kg_m2", "the leg's mass is at the hip, so a swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
     )
 
 
@@ -195,7 +195,7 @@ class Shank(Block):
     inertia_kg_m2: float = inertia(0.0, "one shank")
 
     _inertia = check_inertia(
-        "inertia_kg_m2", "the shank's mass at the knee: the shank", "mass_below_knee_m", "mass_ahead_m"
+        "inertia_kg_m2", "the shank's mass is at the knee, so the shank", "mass_below_knee_m", "mass_ahead_m"
     )
 
 
@@ -261,10 +261,10 @@ class PartHinge(Block):
 
     name: str = name_key("name of the hinge")
     parent: str = name_key("one body")
-    parent_point_m: Point = point("the hinge in its frame")
+    parent_point_m: Point = point("hinge position in the parent's frame")
     child: str = name_key("the other body")
-    child_point_m: Point = point("the hinge in its frame")
-    locks: bool = key(False, "", "whether it is a knee, parent the thigh and child the shank")
+    child_point_m: Point = point("hinge position in the child's frame")
+    locks: bool = key(False, "", "whether it is a knee; its parent is then the thigh, its child the shank")
 
 
 class PartParticle(Block):
@@ -273,14 +273,14 @@ class PartParticle(Block):
     name: str = name_key("name of the particle")
     mass_kg: float = mass(..., "its mass", least=0.0)
     body: str = name_key("the body it is fixed to")
-    at_m: Point = point("where, in its frame")
+    at_m: Point = point("position in the body's frame")
 
 
 class PartFoot(Block):
     """A foot: a circular arc around a point of a body."""
 
     body: str = name_key("the body it belongs to")
-    centre_m: Point = point("the arc's centre in its frame")
+    centre_m: Point = point("the arc's centre in the body's frame")
     radius_m: float = key(0.0, "m", "radius of the arc, 0 is a point", ge=0.0, le=MAX_LENGTH_M)
 
 
@@ -299,12 +299,12 @@ class PartsWalker(_Legged):
     bodies: tuple[PartBody, ...] = parts(PartBody, "the bodies")
     hinges: tuple[PartHinge, ...] = parts(PartHinge, "the hinges, without closed loops")
     particles: tuple[PartParticle, ...] = parts(PartParticle, "point masses", ())
-    feet: tuple[PartFoot, PartFoot] = parts(PartFoot, "a foot for either leg", number="two of ")
+    feet: tuple[PartFoot, PartFoot] = parts(PartFoot, "a foot for each leg", number="two of ")
     couplings: tuple[PartCoupling, ...] = parts(PartCoupling, "bodies that follow others", ())
     legs: tuple[LegBodies, LegBodies] = key(
-        ..., "", "bodies of either leg, hip down", bounds="two lists of names", sequence=True
+        ..., "", "bodies of each leg, hip down", bounds="two lists of names", sequence=True
     )
-    leg_length_m: float = length(..., "hip to sole, as follows from the parts; the unit of lengths and falls")
+    leg_length_m: float = length(..., "hip to sole, must agree with the parts; scale for lengths and falls")
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
     hip: Hip = Hip()
@@ -317,7 +317,7 @@ class PartsWalker(_Legged):
         length = hip_to_sole(info.data["hinges"], info.data["feet"], info.data["legs"])
         if length is None or math.isclose(value, length, rel_tol=LEG_LENGTH_DIGITS):
             return value
-        upright = f"upright, from the hip's hinge to the first leg's sole, it is {length:.9g} m"
+        upright = f"standing upright, it is {length:.9g} m from the hip's hinge to the first leg's sole"
         raise meaning_error(f"disagrees with the parts: {upright}")
 
     @property
@@ -413,9 +413,7 @@ def why_no_push_off(walker: Any) -> str:
     """Explain why a walker cannot push off along its trailing leg; empty if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
-        return (
-            "whose impulse needs a trailing knee that is locked, and walker.knee.at_heel_strike is free" if free else ""
-        )
+        return "cannot act: it needs a locked trailing knee, but walker.knee.at_heel_strike is free" if free else ""
     if isinstance(walker, CompassWalker):
         above, ahead = walker.foot_to_mass_m, 0.0
     else:
@@ -423,7 +421,7 @@ def why_no_push_off(walker: Any) -> str:
     leading = walker.leg_mass_kg * (above**2 + ahead**2) + walker.leg_inertia_kg_m2
     if walker.hip_mass_kg + torso_mass(walker.torso) + leading > 0.0:
         return ""
-    return "whose impulse pushes no mass: the hip has none, and the leading leg's mass is at its foot"
+    return "cannot act on any mass: the hip has none, and the leading leg's mass is at its foot"
 
 
 def too_light_for_contact(walker: Any) -> str:
@@ -440,14 +438,14 @@ def too_light_for_contact(walker: Any) -> str:
 def why_no_contact(walker: Any) -> str:
     """Explain why a walker cannot have a contact block, with advice; empty if it can."""
     why = too_light_for_contact(walker)
-    return f"{why}; leave the contact block out, or give the legs mass" if why else ""
+    return f"cannot carry this walker, as {why}; leave the contact block out, or give the legs mass" if why else ""
 
 
 def why_no_state(start: Any, walker: Any) -> str:
     """Explain why a start has the wrong number of values for a walker; empty if the number is right."""
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
-    return "" if fits else f"has {len(start)} numbers, and this walker's state has {numbers}"
+    return "" if fits else f"has {len(start)} values; this walker needs {numbers}"
 
 
 def contact_to_add(walker: Any) -> str:
@@ -473,8 +471,8 @@ def contact_required_error(request: str, walker: Any, instead: str) -> ConfigErr
     """Build the error for a request that needs contact; `instead` is the advice if only the block is missing."""
     why = too_light_for_contact(walker)
     if why:
-        return ConfigError(f"{request} needs contact, but {why}.", "Stay with the rigid model, or give the legs mass.")
-    return ConfigError(f"{request} needs a contact block, and the config has none.", instead)
+        return ConfigError(f"{request} needs contact, but {why}.", "Use the rigid model, or give the legs mass.")
+    return ConfigError(f"{request} needs a contact block, but the config has none.", instead)
 
 
 Walker = Annotated[

@@ -103,8 +103,8 @@ def matches(recording: Recording, named: set[str]) -> dict[str, str]:
             sources[name] = candidates[0]
         elif len(candidates) > 1:
             raise ConfigError(
-                f"{recording.path}: {' and '.join(candidates[:3])} could each be {name!r}.",
-                f'Say which: --columns "{name}=..."',
+                f"{recording.path}: columns {' and '.join(candidates[:3])} could each be {name!r}.",
+                f'Choose one: --columns "{name}=..."',
             )
     return sources
 
@@ -128,15 +128,15 @@ def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str,
         name = known.get(plain(quantity))
         if name is None:
             near = get_close_matches(plain(quantity), known, 1)
-            advice = f"Did you mean {known[near[0]]!r}?" if near else f"Quantities are: {', '.join(QUANTITY_KINDS)}."
-            raise ConfigError(f"--columns: {quantity!r} is no quantity of a walk.", advice)
+            advice = f"Did you mean {known[near[0]]!r}?" if near else f"Available: {', '.join(QUANTITY_KINDS)}."
+            raise ConfigError(f"--columns: {quantity!r} is not a quantity of a walk.", advice)
         ends = LINE.fullmatch(column)
         markers = [f"{marker}.{axis}" for marker in (ends[1], ends[2]) for axis in "xyz"] if ends else [column]
         for needed in markers:
             if needed not in recording.columns:
                 near = get_close_matches(needed, recording.columns, 1, 0.3)
                 advice = (
-                    f"The nearest is {near[0]!r}." if near else f"There are: {', '.join(list(recording.columns)[:12])}."
+                    f"Did you mean {near[0]!r}?" if near else f"Available: {', '.join(list(recording.columns)[:12])}."
                 )
                 raise ConfigError(f"{recording.path} has no column {needed!r}.", advice)
         sources[name] = column
@@ -183,14 +183,14 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
     )  # fmt: skip
     if not unit:
         raise ConfigError(
-            f"{recording.path} does not say in which unit {source!r} ({name}) is.",
-            f"Say it: --units {kind}={SI[kind]}, or one of {', '.join(UNIT_VALUES[kind])}.",
+            f"{recording.path} states no unit for {source!r} ({name}).",
+            f"Add --units {kind}={SI[kind]}, or another unit: {', '.join(list(UNIT_VALUES[kind])[:6])}.",
         )
     value = UNIT_VALUES[kind].get(unit.strip().lower())
     if value is None:
         raise ConfigError(
-            f"{recording.path}: {unit!r} is no unit of {name!r} that is known ({kind}).",
-            f"Known are {', '.join(UNIT_VALUES[kind])}: --units {kind}={SI[kind]}",
+            f"{recording.path}: {unit!r}, stated for {name!r}, is not a known unit of {kind}.",
+            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; set --units {kind}={SI[kind]}.",
         )
     return value
 
@@ -248,5 +248,5 @@ def parse_units(texts: Sequence[str]) -> dict[str, str]:
             alone[kinds[0]] = part
         else:
             known = ", ".join(unit for units in UNIT_VALUES.values() for unit in units)
-            raise ConfigError(f"{part!r} is not a known unit.", f"Units are {known}.")
+            raise ConfigError(f"{part!r} is not a known unit.", f"Known units: {known}.")
     return alone | parse_pairs("--units", pairs)

@@ -75,24 +75,24 @@ def law_named(text: str) -> Law:
     for law in CONTACT_LAWS:
         if text == law:
             return law
-    raise ConfigError(f"--law {text}: not a contact law.", f"Laws of ADAMS models: {', '.join(CONTACT_LAWS)}.")
+    raise ConfigError(f"--law {text}: unknown contact law.", f"Choose from {', '.join(CONTACT_LAWS)}.")
 
 
 def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Iterator[str]:
     """Describe the parts of the walk that an exported model lacks or replaces."""
     config, by_functions = export.config, kind != "mjcf" and law == "functions"
     if export.scene.ground.terrain.has_pads:
-        yield "the rule that a foot which meets a pad below its top ends the walk; here the pad pushes it away"
+        yield "the end of a walk when a foot hits a pad from the side; here the pad pushes the foot away"
     if not by_functions and any(radius == 0.0 for radius in export.scene.ours.whole.radius):
         millimetres = 1e3 * export.model.balls[0].radius_m
-        yield f"point feet; balls of {millimetres:g} mm stand for them, on ground that much lower"
+        yield f"point feet, replaced by balls of {millimetres:g} mm on ground lower by the same amount"
     if kind == "mjcf":
         if mjcf.needs_script(export):
-            yield f"push-offs and hip torque in the model itself; the script {script} applies them"
+            yield f"push-offs and hip torque, which the script {script} applies instead"
     else:
-        when = "act at the times of walkerlab's own touches, as ADAMS functions have no memory"
+        when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"
         if config.push_off.impulse_N_s:
             yield f"the trigger of push-offs; open-loop pulses {when}"
         if export.hip.torque_N_m:
-            yield f"the trigger by which the hip torque changes legs; changes {when}"
-    yield "the judgement of falls, slides and steps, and the energy balance"
+            yield f"the trigger that switches the hip torque between legs; switches {when}"
+    yield "detection of falls, slides and steps, and the energy balance"

@@ -96,7 +96,7 @@ class Exported:
         for row in coupling_rows(self.scene.assembly, self.model):
             if abs(row[0]) > COUPLED:
                 raise ConfigError(
-                    "A body whose angle follows others' by weights that do not add up to 1 cannot be exported.",
+                    "A body whose coupling weights do not add up to 1 cannot be exported.",
                     "Choose weights that add up to 1 in walker.couplings.",
                 )
             links = [int(place) for place in np.flatnonzero(np.abs(row) > COUPLED)]
@@ -174,7 +174,7 @@ def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: Stat
     scene = scene_for_engines(contact_scene, rigid_state)
     if contact_scene.assembly.knees:
         raise ConfigError(
-            "Knees that lock cannot be exported: no statement of ADAMS or MJCF locks and releases a hinge by itself.",
+            "Knees that lock cannot be exported: ADAMS and MJCF have no statement that locks and releases a hinge.",
             "Choose a walker with straight legs, such as paper, round-feet or torso.",
         )
     heights = foothold_heights(config.ground, steps + 1)

@@ -213,7 +213,7 @@ def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
     static = float(export.scene.ours.friction.largest)
     yield (
         f"Contact tuned to ADAMS's law under {target.mass:.6g} kg: penetration at rest {target.penetration:.4g} m, "
-        f"damping ratio {target.damping_ratio:.4g}, friction {target.friction:.4g} of a foot that slides, creep of "
+        f"damping ratio {target.damping_ratio:.4g}, friction {target.friction:.4g} of a sliding foot, creep of "
         f"{target.creep_velocity:.4g} m/s under a tangential load of {target.creep_load:.4g} of the normal force."
     )
     yield (

@@ -66,7 +66,7 @@ def read_recording(path: Path) -> Recording:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise ConfigError(
-            f"{path} is in a format that cannot be read ({path.suffix or 'no ending'}).",
+            f"{path} has an unsupported format ({path.suffix or 'no extension'}).",
             FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {WANTED}."),
         )
     try:
@@ -83,22 +83,20 @@ def checked_time(recording: Recording) -> Recording:
     time, path = recording.columns.get(TIME), recording.path
     if time is None:
         names = ", ".join(list(recording.columns)[:8])
-        raise ConfigError(
-            f"{path} has no column of time; its columns begin with: {names}.", "Name it: --columns time=NAME"
-        )
+        raise ConfigError(f"{path} has no time column; the first columns are {names}.", "Name it: --columns time=NAME")
     if time.size < 2:
         raise ConfigError(f"{path} holds {time.size} samples; a walk needs at least two.", "Record a longer walk.")
     gaps = np.flatnonzero(~np.isfinite(time))
     if gaps.size:
         raise ConfigError(
-            f"{path}: time is missing at sample {gaps[0] + 1}.", "Fill the column of time, or leave out such rows."
+            f"{path}: time is missing at sample {gaps[0] + 1}.", "Fill the time column, or leave out such rows."
         )
     steps_back = np.flatnonzero(np.diff(time) <= 0.0)
     if steps_back.size:
         row = int(steps_back[0])
         raise ConfigError(
             f"{path}: time does not rise from sample {row + 1} ({time[row]:.9g}) to {row + 2} ({time[row + 1]:.9g}).",
-            "Sort the rows by time, and give each time once.",
+            "Sort the rows by time, and remove duplicate times.",
         )
     return recording
 
@@ -130,7 +128,7 @@ def text_of(path: Path) -> str:
         if "\0" in text:
             break
         return text
-    raise ConfigError(f"{path} is not a text, although its ending says so.", f"Export it as one of: {WANTED}.")
+    raise ConfigError(f"{path} is not a text file, despite its extension.", f"Export it as one of: {WANTED}.")
 
 
 def without_last_delimiters(lines: list[str]) -> list[str]:
@@ -186,7 +184,7 @@ def unique(path: Path, names: Sequence[str]) -> list[str]:
     """Return the names; raises ConfigError if two are the same."""
     for name in names:
         if names.count(name) > 1:
-            raise ConfigError(f"{path} has two columns named {name!r}.", "Give each column a name of its own.")
+            raise ConfigError(f"{path} has two columns named {name!r}.", "Give each column a unique name.")
     return list(names)
 
 
@@ -262,7 +260,7 @@ def read_adams_results(path: Path) -> Recording:
     steps = [step for block in blocks for step in elements(block, "Step")]
     if not steps:
         raise ConfigError(
-            f"{path} holds no steps of a simulation.", "Run a dynamic simulation before exporting its results."
+            f"{path} holds no simulation steps.", "Run a dynamic simulation before exporting its results."
         )
     table = [numbers_of_step(path, place, step, len(names)) for place, step in enumerate(steps)]
     values = np.array(table)
@@ -297,7 +295,7 @@ def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, st
         raise ConfigError(f"{path}: a component has no id.", "Export the results again with RESULTS/XRF.") from None
     if len({name[0] for name in names}) < len(names) or not names:
         raise ConfigError(
-            f"{path}: ids of components are missing or not unique.", "Export the results again with RESULTS/XRF."
+            f"{path}: component ids are missing or not unique.", "Export the results again with RESULTS/XRF."
         )
     return names
 
@@ -308,7 +306,7 @@ def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: in
         values = [float(cell) for cell in (step.text or "").split()]
     except ValueError:
         raise ConfigError(
-            f"{path}: step {place + 1} holds something that is no number.", "Export the results again."
+            f"{path}: step {place + 1} contains a value that is not a number.", "Export the results again."
         ) from None
     if len(values) != count:
         raise ConfigError(
@@ -338,7 +336,7 @@ def read_opensim(path: Path) -> Recording:
     lines = text_of(path).splitlines()
     end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None or end + 1 >= len(lines):
-        raise ConfigError(f"{path} has no line 'endheader', or nothing behind it.", "Export it again from OpenSim.")
+        raise ConfigError(f"{path} has no line 'endheader', or nothing after it.", "Export it again from OpenSim.")
     settings = dict(line.lower().replace(" ", "").split("=", 1) for line in lines[:end] if "=" in line)
     if settings.get("datatype", "double") != "double":
         raise ConfigError(
@@ -367,7 +365,7 @@ def read_markers(path: Path) -> Recording:
     lines = text_of(path).splitlines()
     if len(lines) < 5 or not lines[0].startswith("PathFileType"):
         raise ConfigError(
-            f"{path} is no file of markers: its first line must begin with PathFileType.", "Export it again as .trc."
+            f"{path} is not a marker file: its first line must begin with PathFileType.", "Export it again as .trc."
         )
     settings = dict(zip(lines[1].split(), lines[2].split(), strict=False))
     labels = [label.strip() for label in lines[3].split("\t")]
@@ -396,7 +394,7 @@ def read_c3d(path: Path) -> Recording:
     names, places = unique(path, [str(label).strip() for label in arrays["labels"]]), arrays["places"]
     rate = float(arrays["rate"][0]) if arrays["rate"].size else 0.0
     if not names or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(names):
-        raise ConfigError(f"{path} holds no markers, or no rate of frames.", "Export it again.")
+        raise ConfigError(f"{path} holds no markers, or no frame rate.", "Export it again.")
     columns = {
         f"{name}.{axis}": places[place, row] for row, name in enumerate(names) for place, axis in enumerate("xyz")
     }

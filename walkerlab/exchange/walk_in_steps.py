@@ -71,7 +71,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     if largest > math.pi:
         raise ConfigError(
             f"{source}: an angle from the vertical reaches {largest:.3g} rad, more than half a turn.",
-            "Say in which unit angles are, such as --units angle=deg, or remove outliers.",
+            "State the unit of angles, e.g. --units angle=deg, or remove outliers.",
         )
 
     def total(angles: Array) -> Array:
@@ -93,8 +93,8 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         raise ConfigError(
             f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
             f"{largest:.3g} rad.",
-            "Angles are from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
-            "without outliers, over at least one whole step.",
+            "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
+            "without outliers, and over at least one whole step.",
         )
     refuse_duration((ends[-1].time_s - origin) / len(ends), source)
     refuse_gaps(walk.time_s, [origin, *(touch.time_s for touch in ends)], source)
@@ -109,8 +109,8 @@ def is_plausible(size: float) -> bool:
 def refuse_duration(step_s: float, source: str) -> None:
     if not is_plausible(step_s):
         raise ConfigError(
-            f"{source}: its steps take {step_s:.3g} s, which no walker does.",
-            "Say in which unit time is, such as --units time=ms.",
+            f"{source}: steps of {step_s:.3g} s are implausible.",
+            "State the unit of time, e.g. --units time=ms.",
         )
 
 
@@ -122,7 +122,7 @@ def refuse_gaps(time: Array, touches: list[float], source: str) -> None:
             raise ConfigError(
                 f"{source}: step {number} has no sample from time {first:.6g} to {last:.6g} s, "
                 f"{(last - first) / (end - begin):.0%} of its duration.",
-                f"Record at least {1 / LONGEST_GAP:.0f} samples a step, or cut the recording to a part without gaps.",
+                f"Record at least {1 / LONGEST_GAP:.0f} samples per step, or cut the recording to a part without gaps.",
             )
 
 

@@ -132,7 +132,7 @@ def identify_walk(
     if not answers:
         raise NoAnswer(
             f"no walk of the model can be fitted: {verdicts[0].reason}.",
-            "Start from a config whose walk takes as many steps, or fit fewer parameters.",
+            "Start from a config whose walk takes at least as many steps as the recording, or fit fewer parameters.",
         )
     best = max(answers, key=lambda answer: (answer.models[0].fit == "fits", answer.models[0].log_likelihood))
     return replace(best, models=verdicts)

@@ -101,7 +101,7 @@ def predict_measured(subject: ModelUnderTest, question: Question, plan: Plan) ->
     walk = walks.disturbed(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
         raise NoAnswer(
-            f"the {subject.model} model takes {walk.durations_s.size} of {plan.max_steps + 1} steps.",
+            f"the {subject.model} model takes only {walk.durations_s.size} of {plan.max_steps + 1} steps.",
             "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change).",
         )
     steps = slice(plan.max_steps)
@@ -121,7 +121,7 @@ def walk_of(subject: ModelUnderTest, measured: Measured, question: Question) -> 
     walk = planned_walk(problem, question.keys)
     if walk is None:
         raise NoAnswer(
-            f"a walk of the {subject.model} model beside the planned one ends early.",
+            f"a {subject.model}-model walk with slightly changed parameters, needed for the derivatives, ends early.",
             "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change).",
         )
     return walk

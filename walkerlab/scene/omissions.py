@@ -54,9 +54,9 @@ def stance_omission(config: RigidConfig) -> Entry:
 
 def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
     contact = config.contact
-    omissions = [omission("force law of a foot out of reach", "no ground touches it", "one of two while a foot swings")]
+    omissions = [omission("force law of a foot in the air", "no ground touches it", "one of two force laws in a swing")]
     if contact is not None and not contact.has_friction:
-        saved = "4 of the 9 event functions that a foot is watched by, and the friction law"
+        saved = "4 of a foot's 9 event functions, and the friction law"
         omissions.append(omission("tangential velocity and friction force", "contact.friction is none", saved))
     if contact is not None and contact.stance == "pinned":
         angles = count_step_angles(config.walker)
@@ -64,8 +64,8 @@ def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
         saved = f"4 of {2 * angles + 4} equations and both force laws in that step"
         omissions.append(omission(what, f"{why}: {angles} angles suffice", saved))
     if config.walker.foot_radius_m == 0.0:
-        saved = "nothing: a zero in their place takes no longer"
-        omissions.append(omission("terms of the feet's radius", "walker.foot_radius_m is 0", saved))
+        saved = "nothing: zeros cost the same time"
+        omissions.append(omission("terms of the foot radius", "walker.foot_radius_m is 0", saved))
     return (*omissions, *leg_omissions(config), *output_omissions(config.outputs, "contact", CONTACT_NUMBERS))
 
 
@@ -78,17 +78,17 @@ def count_step_angles(walker: Walker) -> int:
 
 def leg_omissions(config: RigidConfig) -> Iterator[Entry]:
     if getattr(config.walker, "leg_inertia_kg_m2", None) == 0.0:
-        saved = "nothing: it is summed into constants before anything runs"
+        saved = "nothing: its terms are constants, summed before the walk starts"
         yield omission("leg inertia", "walker.leg_inertia_kg_m2 is 0", saved)
 
 
 def output_omissions(outputs: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
     for output, count in numbers.items():
         if output not in outputs:
-            what, why = f"{output} of the {model} walk in time", f"outputs does not ask for {output}"
-            yield omission(what, why, f"{count} of {sum(numbers.values())} numbers a sample")
+            what, why = f"{output} of the {model} walk in time", f"{output} are not in `outputs`"
+            yield omission(what, why, f"{count} of {sum(numbers.values())} values per sample")
     if not outputs:
-        yield omission(f"samples of the {model} walk", "outputs asks for nothing in time", "all states within steps")
+        yield omission(f"samples of the {model} walk", "`outputs` is empty", "all states during steps")
 
 
 def omission(what: str, why: str, saves: str) -> Entry:

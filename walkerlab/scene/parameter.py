@@ -130,9 +130,9 @@ def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInf
     for depth in range(1, len(path) + 1):
         value, block = value_at(config, path[:depth]), ".".join(path[:depth])
         if value is None:
-            return f"is not there: the config has no {block}; give it one first"
+            return f"cannot be used: the config has no block {block}; add it first"
         if isinstance(value, tuple):
-            return f"has a value for each of the {block}, not a single one"
+            return f"has one value for each of {block}, so it is not a single number"
     return "" if isinstance(value, int | float) else f"is {value!r} in the config, not a number"
 
 

@@ -79,12 +79,12 @@ def find_model_gait(
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
     own = SLOPE.config_at(config, config.slope_rad)
-    assert own is not None, "a config keeps its slope"
+    assert own is not None, "the config's own slope is always possible"
     answer = gait_off_pads(own, length, as_state(gait["state"]))
     if answer.gait is None:
         raise NoAnswer(f"no gait of the contact model: {answer.reason}", answer.advice)
     if require_contact(config).terrain == "checkerboard":
-        note("the contact model walks on after-mid-swing ground: pads would end disturbed walks")
+        note("the contact model walks on after-mid-swing ground, as pads would end disturbed walks")
     length = answer.gait.step.length_m
     z = contact_map(config, SLOPE, 1.0, length).scale_section(answer.gait.z)
     return ModelUnderTest(CONTACT, config, z, length)

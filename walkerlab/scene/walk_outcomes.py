@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 GROUND_CAUSES: Final = {
     "slid": "The ground's friction ends them: contact.static_friction, contact.dynamic_friction, "
     "contact.stiction_velocity.",
-    "lifted-off": "The ground throws them off, or they start too fast: contact.stiffness, contact.damping.",
+    "lifted-off": "The ground throws them up, or they start too fast: contact.stiffness, contact.damping.",
 }
 # Meanings of `contact.pad_pitch`, to append to a length.
 PITCH_SOURCES: Final = {"rigid": ", the rigid gait's step length", "own": ", the contact gait's step length"}

@@ -249,11 +249,11 @@ def test_the_energy_of_matlab_is_that_of_ten_steps_and_that_of_adams_is_nobodys(
     found = rows()
     assert "(5 steps)" in E_AVG.matlab.quantity
     assert found[E_AVG.matlab].verdict == NumberVerdict.EXPLAINED
-    for said in ("150.110 J over five steps", "150.127 J over ten", "its value is that of ten"):
+    for said in ("150.110 J over five steps", "150.127 J over ten", "its value matches the mean over ten"):
         assert said in found[E_AVG.matlab].evidence
     # 150.03 J, with samples to either side of the printed number, and it between the means of all models
     assert found[E_AVG.adams].verdict == NumberVerdict.NOT_REPRODUCED
-    assert "-0.110 J off the printed one" in found[E_AVG.adams].evidence
+    assert "-0.110 J off the printed value" in found[E_AVG.adams].evidence
 
 
 def test_a_start_that_walks_does_not_explain_a_fall(rows):
@@ -317,7 +317,7 @@ def test_a_slope_without_gaits_has_no_columns_of_the_rigid_model(rows):
 
 def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
     elsewhere = Departures(("slope_rad 0.05 instead of 0.0174",), ("slope_rad 0.05 instead of 0.0174",))
-    about_itself = "to the paper's own numbers, not to this scene"
+    about_itself = "about the paper's own numbers, not this scene"
     for row in rows(elsewhere).values():
         assert row.verdict != NumberVerdict.CONTRADICTED or about_itself in row.evidence
         assert row.verdict in (NumberVerdict.INPUT, NumberVerdict.REPRODUCED) or "slope_rad 0.05" in row.evidence

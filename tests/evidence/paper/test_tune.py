@@ -77,7 +77,7 @@ def test_both_fates_of_the_papers_adams_start_are_told_with_model_and_ground():
     start = small("paper").summary["paper_start"]
     rigid, contact = start["reason"].split("the contact model on ")
     assert "in the rigid model, whose stance foot is hinged to an even slope" in rigid
-    assert "with its foot held down like that the walk ends (fell) at 0.347 s" in rigid
+    assert "with its foot held down the walk ends (fell) at 0.347 s" in rigid
     assert contact.startswith("its checkerboard of pads cannot pull")
     assert f"ends there at {start['end_time_s']:.3g} s" in contact
     assert "off-pad: a foot meets a pad from the side, where the rigid model has no pads" in contact

@@ -75,7 +75,7 @@ def test_a_case_that_gives_up_as_expected_is_counted_apart_and_is_not_green():
     gave_up = replace(GOOD, name="rings", expected=("budget-exhausted",), outcome="budget-exhausted")
     summary = summarise([GOOD, gave_up], [RIGHT], [])
     shown = report_of(summary)
-    counted = "3 of 3 extreme cases and known problems ended as expected, 1 of them without an answer."
+    counted = "3 of 3 extreme cases and problems with known answers ended as expected, 1 of them without an answer."
     assert shown.finding == counted
     (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
     assert [row[1].tone for row in next(iter(table.groups.values()))] == ["good", "fair"]
@@ -151,15 +151,15 @@ def test_cases_of_ones_own_come_from_a_file(tmp_path):
         ),
         (
             "- name: x\n  expected: [walked]\n  reason: mine\n  config:\n    slope_deg: 1\n    slope_rad: 0.1\n",
-            "cases.yaml:6:5: slope_rad: the slope is given already, as slope_deg at .*cases.yaml:5:5",
+            "cases.yaml:6:5: slope_rad: slope already set by slope_deg at .*cases.yaml:5:5",
         ),
         (
             "- name: x\n  expected: [walked]\n  reason: mine\n  config:\n    contact: null\n",
-            "cases.yaml:5:5: contact: case x walks on the ground and has none",
+            "cases.yaml:5:5: contact: case x needs a contact block but has none",
         ),
         (
             "- {name: x, expected: [walked], reason: mine}\n- {name: x, expected: [walked], reason: mine}\n",
-            "cases.yaml:2:4: name: x is a case at .*cases.yaml:1:4 already",
+            "cases.yaml:2:4: name: x is already used at .*cases.yaml:1:4",
         ),
     ],
 )

@@ -85,7 +85,7 @@ def test_steps_of_an_impossible_duration_are_refused(tmp_path, factor):
     lines = table(simulated("rigid")).splitlines()
     rows = [line.split(",", 1) for line in lines[1:]]
     body = [f"{factor * float(time):.12g},{angles}" for time, angles in rows]
-    with pytest.raises(ConfigError, match=r"its steps take .* s, which no walker does"):
+    with pytest.raises(ConfigError, match=r"steps of .* s are implausible"):
         walkerlab.read_walk(written(tmp_path, "\n".join([lines[0], *body])))
 
 
@@ -191,7 +191,7 @@ def test_missing_rows_are_an_error_that_says_where(tmp_path, begin, end, why):
     kept = [row for row in rows if not begin < float(row.split(",")[0]) < end]
     with pytest.raises(ConfigError, match=why) as refusal:
         walkerlab.read_walk(written(tmp_path, "\n".join([head, *kept])))
-    assert "8 samples a step" in refusal.value.advice
+    assert "8 samples per step" in refusal.value.advice
 
 
 def test_a_few_missing_rows_and_a_last_time_that_jumps_change_nothing(tmp_path):

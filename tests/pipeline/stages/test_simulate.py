@@ -124,7 +124,7 @@ def test_what_outputs_do_not_ask_for_is_left_out_and_said():
     none = run(outputs=[])
     assert set(none.groups) == {"steps"}
     whys = [entry["why"] for entry in none.summary["left_out"]]
-    assert {f"outputs does not ask for {output}" for output in ("states", "energies", "forces")} <= set(whys)
+    assert {f"{output} are not in `outputs`" for output in ("states", "energies", "forces")} <= set(whys)
     energies = run(outputs=["energies"])
     assert set(energies["trajectory"].variables) == {
         "time",

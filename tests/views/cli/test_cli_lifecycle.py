@@ -73,7 +73,7 @@ def test_a_file_name_gives_a_safe_run_name(text, name, tmp_path):
 
 def test_a_longer_leg_whose_mass_stays_is_told():
     (warning,) = load(sets=["walker.leg_length_m=1.2"]).warnings
-    assert "walker.foot_to_mass_m stays 0.5 m" in warning
+    assert "walker.foot_to_mass_m is still 0.5 m" in warning
     assert load(sets=["walker.leg_length_m=1.2", "walker.foot_to_mass_m=0.6"]).warnings == ()
 
 
@@ -82,7 +82,7 @@ def test_a_mass_that_is_moved_along_a_leg_that_stays_is_what_was_asked_for(tmp_p
     path = tmp_path / "mine.yaml"
     path.write_text("extends: paper\nwalker: {foot_to_mass_m: 0.3}\n")
     assert load(path).warnings == ()
-    assert "walker.foot_to_mass_m stays 0.3 m" in load(path, ["walker.leg_length_m=1.2"]).warnings[0]
+    assert "walker.foot_to_mass_m is still 0.3 m" in load(path, ["walker.leg_length_m=1.2"]).warnings[0]
 
 
 def test_a_run_is_a_config_and_runs_again_in_its_own_folder(toy):
@@ -174,7 +174,7 @@ def test_init_makes_the_folder_and_advises_nothing_that_it_has_not(walker):
 def test_a_config_that_is_not_there_is_begun_with_init(walker):
     done = walker("fixedpoint", "-c", "mine.yaml")
     assert done.returncode == 3
-    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to begin with"
+    assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to start from"
 
 
 def test_a_film_needs_no_name(walker):
@@ -195,7 +195,7 @@ def test_advice_can_be_typed_back(toy):
 def test_the_slope_is_set_once(toy):
     done = toy("drop", "--set", "slope_deg=2", "--set", "slope_rad=0.1")
     assert done.returncode == 3
-    assert "the slope is given already, as slope_deg" in done.stderr
+    assert "slope already set by slope_deg" in done.stderr
 
 
 def test_clean_all_leaves_no_empty_folders(toy):

@@ -24,7 +24,7 @@ def test_files_beside_a_model_have_its_name(walker):
     assert "STEP" in (walker.folder / "mine.adm").read_text()
     done = walker("export", "level", "model", "--to", "mjcf", "-o", "driven.xml")
     assert done.stdout.split() == ["driven.xml", "driven.py"]
-    assert "the script driven.py applies them" in done.stderr
+    assert "the script driven.py applies instead" in done.stderr
 
 
 @pytest.mark.parametrize(("options", "file"), [
@@ -44,7 +44,7 @@ def test_the_format_is_named_or_follows_the_file(walker, options, file):
     (("round-feet", "--to", "mjcf"), "Set contact.terrain=checkerboard."),
     (("paper", "--to", "pdf"), "a model cannot be written as pdf."),
     (("paper", "--to", "adm", "-o", "x.xml"), "contradicts the ending"),
-    (("paper", "--to", "adm", "--law", "hertz"), "--law hertz: not a contact law."),
+    (("paper", "--to", "adm", "--law", "hertz"), "--law hertz: unknown contact law."),
     (("paper", "--to", "mjcf", "--law", "functions"), "--law chooses between contact laws of ADAMS."),
     (("rigid-only", "--to", "adm"), "contact"),
     (("nowhere", "--to", "adm"), "there is no config nowhere"),

@@ -48,8 +48,8 @@ OVER = "--over walker.foot_radius_m=0.1:0.7"
         ),
         (
             "design --minimise period_s --over walker.leg_mass_kg=5:1",
-            "--over walker.leg_mass_kg=5:1: design.over: a block has bounds for walker.leg_mass_kg, [5, 1], that are "
-            "not two numbers, the first below the second",
+            "--over walker.leg_mass_kg=5:1: design.over: a block has bounds for walker.leg_mass_kg, [5, 1]: "
+            "give two numbers, the lower one first",
         ),
         ("continuation --over slope_deg --from 2 --to 1", "--to 1: continuation.to: 1.0 must be above `from`, 2"),
         ("continuation --over foo --from 1 --to 2", "--over foo: continuation.over: foo is not a key of the config"),

@@ -214,7 +214,7 @@ def test_a_config_is_saved_as_what_differs_and_over_no_file(served):
     assert "slope_deg: 3.0" in said["text"]  # as it was typed
     status, said = served.asked("/api/save", {**asked, "name": "my walker"})
     assert (status, list(served.folder.glob("my walker*"))) == (422, [])
-    assert "not safe as a name" in said["error"]["message"]
+    assert "is not valid" in said["error"]["message"]
     assert served.walk({}, config="mine.yaml")[1]["command"].startswith("walkerlab fixedpoint -c mine.yaml\n")
 
 

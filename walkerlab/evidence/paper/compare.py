@@ -61,7 +61,7 @@ COLUMN_NAMES = {
     "unit": "unit of the row's values",
     "where": "location in the paper",
     "paper": "in the paper",
-    "used": "as used here",
+    "used": "value used here",
     "paper_matlab": "the paper's MATLAB model",
     "paper_adams": "the paper's MSC ADAMS model",
     "paper_percent": "difference rate as printed",

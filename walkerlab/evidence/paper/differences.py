@@ -67,7 +67,7 @@ def compare_motion(
 ) -> Comparison:
     """Compare two walks in time, in phase and as orbits, second minus first; `meaning` describes the difference."""
     if rigid is None or contact is None:
-        why = "there are no states of both walks: outputs omits them, or a walk ended at once"
+        why = "states of both walks are not available: outputs omits them, or a walk ended at once"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
     steps, orbit = min(rigid.steps, contact.steps), None
     time, raw = comparison.difference_in_time(contact, rigid)
@@ -86,7 +86,7 @@ def compare_motion(
         errors |= {"aligned": aligned, "between_impacts": select(aligned, smooth)}
         coordinates = {
             **numbered(len(aligned.angle), STEP, "step number"),
-            PHASE: Variable(phases, (PHASE,), "1", "time within the step over the step's period"),
+            PHASE: Variable(phases, (PHASE,), "1", "time within the step as a fraction of its period"),
             **legs(),
         }
         in_phase = differences("aligned", aligned, (STEP, PHASE, LEG), f"{meaning}, at the same phase")

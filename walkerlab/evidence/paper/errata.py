@@ -13,11 +13,11 @@ from walkerlab.labels import Label
 class Erratum:
     """Error in the paper."""
 
-    where: Annotated[str, Label("", "where the paper errs")]
-    printed: Annotated[str, Label("", "as printed")]
-    right: Annotated[str, Label("", "as it should be")]
-    evidence: Annotated[str, Label("", "by which argument")]
-    measured: Annotated[str, Label("", "numbers of that argument, from this run")]
+    where: Annotated[str, Label("", "location in the paper")]
+    printed: Annotated[str, Label("", "printed")]
+    right: Annotated[str, Label("", "correct")]
+    evidence: Annotated[str, Label("", "argument")]
+    measured: Annotated[str, Label("", "values from this run")]
 
 
 ERRATUM_PARTS = [field.name for field in fields(Erratum)]

@@ -100,7 +100,7 @@ def largest_of_recorded(summary: Mapping[str, Any]) -> tuple[str, list[tuple[str
 
 
 ALIGNED_ANGLE, NUMERICAL_ERROR, RUN_TIME = "angle_error_rad", "numerical_time_s", "wall_s"
-LIMITS: Final = (("limit/all", "(a) feet as they are"), ("limit/all-point-foot", "(b) point feet"))
+LIMITS: Final = (("limit/all", "(a) the config's feet"), ("limit/all-point-foot", "(b) point feet"))
 ERROR_LOOKS: Final = {
     "raw_angle_error_rad": Look("angle at the same time (rad)", VERMILLION, ":", 1.2, "v"),
     ALIGNED_ANGLE: Look("angle in phase (rad)", BLUE, "-", 1.6, "o"),

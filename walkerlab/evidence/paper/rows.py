@@ -108,7 +108,7 @@ class Judge:
         if (contradiction := contradictions().get(entry)) is not None:
             verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
         if differs and scene == "any":
-            evidence += f" The verdict refers to the paper's own numbers, not to this scene ({differs})."
+            evidence += f" The verdict is about the paper's own numbers, not this scene ({differs})."
         elif differs and verdict not in (INPUT, REPRODUCED):
             verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
         about, (as_printed, corrected) = (

@@ -327,7 +327,7 @@ def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
 def groups(tune: TuneRun) -> dict[str, Group]:
     stored, walker = {"map": map_group(tune)}, tune.scene.walker
     if tune.margins:
-        labels = {"name": Label("", "what is scaled"), "factor": Label("1", "the last that walks")}
+        labels = {"name": Label("", "what is scaled"), "factor": Label("1", "last factor that walks")}
         stored["margins"] = rows_group(tune.margins, labels, "margin", "number")
     if tune.gait.gait is not None:
         stored["gait"] = gait_group(tune.gait.gait, tune.scene)
@@ -359,7 +359,7 @@ def map_group(tune: TuneRun) -> Group:
     over = {
         "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),
         "steps": (cells.steps, "steps of the contact model"),
-        "settled": (cells.settled, "1 if the last step is the contact gait's within two percent"),
+        "settled": (cells.settled, "1 if the last step equals the contact gait's within two percent"),
         "rigid_outcome": (rigid.outcome, "outcome of the rigid model's walk"),
         "rigid_steps": (rigid.steps, "steps of the rigid model"),
     }

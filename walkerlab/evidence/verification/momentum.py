@@ -25,7 +25,7 @@ from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene
 from walkerlab.scene.parts import assembly_of
 
-MEASURE: Final = "momentum not from ground and gravity, over the walker's"
+MEASURE: Final = "momentum change not explained by ground and gravity, relative to the walker's momentum"
 BALANCE_STEPS: Final = 2  # enough for an impact and the motion after it
 INITIAL_INTERVALS: Final = 256
 MAX_PASSES: Final = 9  # refinements; each splits unsettled intervals into four
@@ -81,14 +81,14 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
         grid = np.union1d(grid, pushed[pushed < walk.end_time_s])
     for _ in range(MAX_PASSES):
         samples = scene.walk(start, steps, tolerances, with_middles(grid)).samples
-        assert samples is not None, "the walk was looked at"
+        assert samples is not None, "the walk is sampled"
         rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
         change = unsettled(samples.time_s, rates)
         wanting = change > SETTLED_IMPULSE_SHARE / grid.size
         if not wanting.any() or grid.size > MAX_INTERVALS:
             break
         grid = split(samples.time_s, wanting)
-    assert samples is not None, "it was looked at"
+    assert samples is not None, "the walk is sampled"
     momenta = momentum(samples, config) / scale
     differences = np.abs(momenta - momenta[0] - impulse(samples.time_s, rates))
     accepted = int(walk.work[ACCEPTED])

@@ -19,7 +19,7 @@ STICTION_COLUMNS = {
     "outcome": "how the walk ended, see attribute outcomes",
     "steps": "steps walked",
     "sharper_outcome": "outcome at a ten times tighter tolerance",
-    "error": "between both runs, in legs, radians, pendulum times, where they are compared",
+    "error": "difference between both runs, in legs, radians and pendulum times; missing if they cannot be compared",
     "rhs_evaluations": "right-hand sides evaluated",
 }
 """Values in a cell of the map over stiction velocity and stiffness, in order."""
@@ -67,7 +67,7 @@ def step_group(cells: int, results: Mapping[str, maps.Numbers]) -> Group:
     cells_by_axis = np.array([np.reshape(results[f"step {j}"], (cells, 2)) for j in range(cells)])
     verdicts, errors = cells_by_axis.transpose(2, 1, 0)
     dims = ("step_size", "stiffness")
-    text = "of the state at the end, in legs, radians, pendulum times"
+    text = "error of the final state, in legs, radians and pendulum times"
     variables = {
         **axis("step_size", maps.STEP_RANGE, cells, "s", "step size"),
         **axis("stiffness", maps.STIFFNESS_RANGE, cells, "N/m^2.2", "stiffness of the ground"),

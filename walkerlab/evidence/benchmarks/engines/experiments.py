@@ -81,7 +81,7 @@ def make_truth(scene: EngineScene) -> Truth | None:
     )
     end, second_end = sampled_end(reference), sampled_end(second)
     assert end is not None, "the walk goes on beyond that time"
-    assert second_end is not None, "so it does by the other method"
+    assert second_end is not None, "the other method's walk goes on, too"
     return Truth(until, end, reference.touch_time_s[:COMPARED_TOUCHES], float(np.max(np.abs(end - second_end))), walk)
 
 

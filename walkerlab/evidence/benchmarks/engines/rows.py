@@ -7,9 +7,9 @@ from walkerlab.labels import Label
 
 OURS = "walkerlab"
 SAME_LAW, OWN_LAW = "same-law", "own-law"
-TOLERANCE = Label("1", "relative tolerance where steps are adapted")
+TOLERANCE = Label("1", "relative tolerance of an adaptive integrator")
 RUN_TIME = Label("s", "run time", timing=True)
-FROM_REFERENCE = "difference of the end state (SI), or of the last period (s) on its own law, from the reference"
+FROM_REFERENCE = "difference from the reference in the end state (SI); on own contact, in the last period (s)"
 
 
 @dataclass(frozen=True)
@@ -20,10 +20,10 @@ class EngineRow:
     engine: Annotated[str, Label("1", "engine")]
     version: Annotated[str, Label("1", "version of the engine")]
     experiment: Annotated[str, Label("1", "experiment")]
-    integrator: Annotated[str, Label("1", "integrator, or contact model on its own law")]
-    start: Annotated[float, Label("1", "velocities of the start over those of the gait")]
+    integrator: Annotated[str, Label("1", "integrator, or the engine's own contact model")]
+    start: Annotated[float, Label("1", "start velocities relative to the gait's")]
     # for an adaptive run that was lost, the largest step allowed
-    step_s: Annotated[float, Label("s", "step size, the mean one where steps are adapted")]
+    step_s: Annotated[float, Label("s", "step size; the mean for adaptive integrators")]
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float | None, Label("1", FROM_REFERENCE)]  # the reference is our walk under ADAMS's law
     touch_error_s: Annotated[float | None, Label("s", "largest difference of a touch time from the reference")]
@@ -43,8 +43,8 @@ class SwingRow:
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]
     integrator: Annotated[str, Label("1", "integrator")]
-    promised_order: Annotated[int, Label("1", "order that the integrator promises")]
-    step_s: Annotated[float, Label("s", "step size, the largest one where steps are adapted")]
+    promised_order: Annotated[int, Label("1", "nominal order")]
+    step_s: Annotated[float, Label("s", "step size; the largest for adaptive integrators")]
     tolerance: Annotated[float | None, TOLERANCE]
     error: Annotated[float, Label("1", "largest difference of the end state, rad and rad/s")]
     energy_drift_j: Annotated[float, Label("J", "change of the mechanical energy")]
@@ -61,7 +61,7 @@ class TuningRow:
     contact: Annotated[str, Label("1", "contact model")]
     settings: dict[str, float]
     quantity: Annotated[str, Label("1", "quantity")]
-    unit: Annotated[str, Label("1", "its unit")]
+    unit: Annotated[str, Label("1", "unit of the quantity")]
     target: Annotated[float, Label("1", "target value, in the unit of the row")]
     reached: Annotated[float, Label("1", "measured value, in the unit of the row")]
 

@@ -57,7 +57,7 @@ SAME_LAW_COLUMNS = (
     RUN_COLUMN("step", "step_s", partial(number, digits=3), prefix="µ"),
     RUN_COLUMN("tolerance", "tolerance", lambda value: NONE if value is None else power_of_ten(value, 1)),
     RUN_COLUMN("error", "error", partial(number, digits=2)),
-    RUN_COLUMN("of touch times", "touch_error_s", partial(number, digits=2)),
+    RUN_COLUMN("touch time error", "touch_error_s", partial(number, digits=2)),
     RUN_COLUMN("run time", "wall_s", partial(number, digits=3), prefix="m"),
     Column("outcome", "outcome"),
 )
@@ -88,10 +88,10 @@ TUNING_COLUMNS = (
 SWING_COLUMN = partial(measured, labels=engines.SwingRow)
 SWING_COLUMNS = (
     Column("integrator", lambda swing: f"{engine_and_integrator(swing)}, {swing['scene']}"),
-    SWING_COLUMN("order promised", "promised_order", str),
+    SWING_COLUMN("nominal order", "promised_order", str),
     Column("orders observed", "orders"),
     SWING_COLUMN("smallest error", "error", partial(number, digits=2)),
-    SWING_COLUMN("energy drift there", "energy_drift_j", partial(number, digits=2)),
+    SWING_COLUMN("energy drift of that run", "energy_drift_j", partial(number, digits=2)),
 )
 
 
