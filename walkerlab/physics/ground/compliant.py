@@ -31,17 +31,17 @@ from walkerlab.physics.solvers.system import Floats
 class KneeRules:
     """Rules for locking and releasing knees on compliant ground."""
 
-    # With compliant stops, thigh and shank of a locked knee stay separate, at the angle at which the stop latched.
+    # With a compliant stop, thigh and shank of a locked knee stay separate bodies at the angle at which it latched.
 
     stop: KneeStop | IdealLock = IdealLock()  # noqa: RUF009 (immutable)
-    release_at_touch: bool = False  # whether knees are released at the touch, or when the leading foot stops sinking in
+    release_at_touch: bool = False  # release the trailing knee at the touch, not when the leading foot stops sinking in
 
 
 @dataclass(frozen=True)
 class Root:
     tree: Tree
-    numbers: dict[str, Any]  # fields that are equal in all forms about this root
-    rows: dict[str, Floats]  # (..., n) fields to be summed over bodies that turn together
+    numbers: dict[str, Any]  # fields with equal values in all forms that have this root
+    rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together
 
 
 def contact_walker(
@@ -55,8 +55,8 @@ def contact_walker(
 ) -> ContactWalker:
     """Assemble a walker on compliant ground; gravity in m/s^2, slope in rad. Foot k and knee k belong to leg k.
 
-    In the hinged forms, the hinge is the centre of the ball of `hinged_foot`, at along = 0. Raises ValueError, with a
-    message for the user, for parts that cannot walk on compliant ground.
+    In the hinged forms, the hinge is the centre of the ball of `hinged_foot`, at position 0 along the slope. Raises
+    ValueError, with a message for the user, if the parts cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
     check_walkable(assembly)
@@ -120,7 +120,7 @@ def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
 
 
 def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
-    """Write the walker about a root into `form`; if `merges`, thigh and shank of each `locked` knee become one body."""
+    """Fill a form with constants about a root; if `merges`, each knee in `locked` makes thigh and shank one body."""
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
     one_with = straight if merges else {}

@@ -72,7 +72,7 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
 
 @kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
-    """Compute the powers (W) dissipated under a foot by damping, (F_n - k d^e) d', and by friction, and F_n (N)."""
+    """Compute powers (W) that damping, (F_n - k d^e) d', and friction dissipate at a foot, and normal force F_n (N)."""
     motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0

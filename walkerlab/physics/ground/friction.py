@@ -19,7 +19,7 @@ class FrictionLaw(Protocol):
 
     @classmethod
     def of(cls, contact: Any) -> Self:
-        """Create the law from the parameters of a contact block in SI."""
+        """Create the law from the parameters (SI) of a contact block."""
 
     @property
     def largest(self) -> float:
@@ -31,7 +31,7 @@ class FrictionLaw(Protocol):
 
     @property
     def sliding_from(self) -> float:
-        """Slip velocity (m/s) above which the coefficient is that of a sliding foot."""
+        """Slip velocity (m/s) above which the coefficient is constant."""
 
     def with_creep(self, factor: float) -> Self:
         """Return the law with its slip velocities multiplied by a factor."""
@@ -60,7 +60,7 @@ class Coulomb(NamedTuple):
     """ADAMS contact friction with 'Coulomb: on', SI."""
 
     static: float  # [mu_s] coefficient at the stiction velocity
-    dynamic: float  # [mu_d] coefficient from the friction velocity on
+    dynamic: float  # [mu_d] coefficient at and above the friction velocity
     stiction_velocity: float  # [v_s] m/s
     friction_velocity: float  # [v_d] m/s
 
@@ -99,7 +99,7 @@ class Coulomb(NamedTuple):
 
 @friction_coefficient.case(Coulomb)
 def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
-    """Evaluate COULOMB_FRICTION = ON of Adams/Solver: a cubic up to v_s, another down to mu_d at v_d, then mu_d."""
+    """Evaluate COULOMB_FRICTION = ON of Adams/Solver: a cubic up to v_s, another down to mu_d at v_d, then constant."""
     # The cubic passes through zero, so under a tangential load T and a normal load N a foot creeps, at about
     # v_s (T/N) / (1.5 mu_s).
     v, v_s = abs(slip), law.stiction_velocity
@@ -112,7 +112,7 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
 
 @switching_count.case(Coulomb)
 def coulomb_switching_count(law: Coulomb) -> int:
-    """Return 4: two switching velocities in both directions."""
+    """Return 4: two switching velocities for each direction of slip."""
     return 4
 
 
@@ -169,7 +169,7 @@ def create_law(word: str, contact: Any) -> FrictionLaw:
 
 
 def missing_members(law: type) -> list[str]:
-    """List the members of `FrictionLaw` and the function cases that a law's class lacks."""
+    """List what a law's class lacks: members of `FrictionLaw`, and registered cases of the functions that need one."""
     asked = [name for name in vars(FrictionLaw) if not name.startswith("_")]
     missing = [name for name in asked if not hasattr(law, name)]
     switching = (switching_count, sample_switching)
@@ -179,5 +179,5 @@ def missing_members(law: type) -> list[str]:
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:
-    """Return an upper bound on the coefficient's change over a slip velocity range (m/s), from its slope at rest."""
+    """Return an upper bound on the coefficient's change over a range `slip` (m/s), from its slope at zero slip."""
     return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))

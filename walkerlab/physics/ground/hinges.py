@@ -39,7 +39,7 @@ def is_stopping(system: OnGround, row: int) -> bool:
 
 @kernel_part
 def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
-    """Compute the torque of spring, damper and drive at a hinge, and of the stop while a knee is in it."""
+    """Compute the torque of spring, damper and drive at a hinge, plus the torque of a knee's stop while it acts."""
     angle, rate = angle_at(system, row, y)
     own = hinge_torque(hinge_law(system.form, row), angle, rate)
     if not is_stopping(system, row):

@@ -11,7 +11,7 @@ from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_
 from walkerlab.physics.mechanics.impact import RootedTree, lock
 from walkerlab.physics.solvers.system import Floats
 
-FLEXED = 0.01  # rad, minimum flexion after which a knee locks again as it straightens
+FLEXED = 0.01  # rad, flexion that a released knee must exceed before it can lock again
 
 
 class IdealLock(NamedTuple):
@@ -19,7 +19,7 @@ class IdealLock(NamedTuple):
 
 
 class KneeStop(NamedTuple):
-    """Stop by the IMPACT law that pushes a knee back when it extends beyond straight."""
+    """Compliant stop that pushes a knee back, by the IMPACT law, when it extends beyond straight."""
 
     stiffness: float  # [k] N m/rad^e
     exponent: float  # [e]
@@ -35,7 +35,7 @@ def stop_law(stop: KneeStop) -> NormalLaw:
 
 @kernel_part
 def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
-    """Return the angle (rad) of a hinge's first body ahead of its second, or its rate if y[first] is the first rate."""
+    """Return the angle (rad) from a hinge's second body to its first, or its rate if y[first] is the first rate."""
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
 
@@ -64,7 +64,7 @@ def stop_energy(law: KneeStop, angle: float) -> float:
 
 
 class Locked(NamedTuple):
-    """State of all bodies about their root after a knee has locked."""
+    """Result of locking a knee: state of all bodies, and energy lost."""
 
     state: Floats  # (size,)
     lost: float  # J, kinetic energy lost

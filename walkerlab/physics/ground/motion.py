@@ -53,8 +53,8 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
 
 @forced_inline
 def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
-    """Compute the forces of ground and push-off along and normal to the slope (N); write M (n, n) and r (n,) in N m."""
-    # r sums the torques of feet, hinges and knee stops, the centrifugal torques and, about a hinged foot, gravity.
+    """Compute forces of ground and push-off (N, along and normal to the slope), mass matrix M and torques r (N m)."""
+    # r is the sum of the torques of feet, hinges, knee stops and centrifugal forces and, in a hinged form, of gravity.
     form = system.form
     n, half = form.bodies, half_size(form)
     for k in range(n):
@@ -95,7 +95,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Differentiate a foot's penetration, its rate and slip by state component j; F, U (n,) are projected levers."""
+    """Differentiate a foot's penetration, its rate, and slip by state component j; F, U (n,) are projected levers."""
     p, half = form.places, half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p
@@ -111,7 +111,7 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
 
 @kernel_part
 def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to the rows of J, not yet divided by mass or inertia."""
+    """Add the derivatives of a foot's force and torques to J; its rows are divided by mass and inertia later."""
     form, push = system.form, push_on(system, t, foot, s, c)
     motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
     inside, pushed = system.has_ground[foot] != 0 and motion.height < 0.0, push.above != 0.0
@@ -138,7 +138,7 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
 
 @kernel_part
 def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
-    """Add the derivatives of a foot's force, along and normal to the slope, and of its torques to column j of J."""
+    """Add derivatives of a foot's force (`along` and `normal` to the slope) and of its torques to column j of J."""
     p, half = form.places, half_size(form)
     if p > 0:
         J[half, j] += along

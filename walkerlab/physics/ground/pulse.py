@@ -1,7 +1,7 @@
 """Push-off on compliant ground: a pulse of force at the trailing foot, directed from its contact point to the hip.
 
-The pulse begins when the other foot touches and delivers the push-off's impulse P over a duration D. At the elapsed
-fraction u of D, its force is 30 u^2 (1 - u)^2 P / D, smooth at both ends.
+The pulse begins when the other foot touches and delivers the push-off's impulse P over a duration D. Its force is
+30 u^2 (1 - u)^2 P / D, smooth at both ends, where u is the elapsed fraction of D.
 """
 
 import math
@@ -33,7 +33,7 @@ class Push(NamedTuple):
     along: float  # N
     upward: float  # N
     ahead: float  # m, from the foot's contact point to the hip, along the slope
-    above: float  # m, normal to the slope
+    above: float  # m, from the contact point to the hip, normal to the slope
 
 
 @kernel_part
@@ -60,7 +60,7 @@ def lever_to_hip(form: GroundModel, foot: int, s: Any, c: Any, k: int) -> tuple[
 
 @kernel_part
 def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
-    """Compute derivatives (N/rad) of a push with respect to a body's angle, which turns it at constant magnitude."""
+    """Compute derivatives (N/rad) of a push with respect to a body's angle; the push turns, at constant magnitude."""
     forward, upward = lever_to_hip(form, foot, s, c, k)
     turned = (push.along * forward + push.upward * upward) / (push.ahead * push.ahead + push.above * push.above)
     return -turned * push.above, turned * push.ahead

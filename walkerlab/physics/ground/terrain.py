@@ -14,17 +14,17 @@ from walkerlab.physics.kernels import kernel_part
 
 REMOTE_EDGE = 1e9  # m, further than any walk gets
 STANCE_FOOT = 1  # foot that carries the first step
-EVEN = np.zeros(1)  # writable like unpickled arrays: kernels would be compiled again for a read-only one
+EVEN = np.zeros(1)  # writable, like unpickled arrays, because kernels would be compiled again for a read-only array
 
 
 class Terrain(NamedTuple):
     """Ground, as created by `checkerboard`, `after_mid_swing` or `plane`."""
 
-    pitch: float  # [S] m, length of pads, and the scale for judging steps and slides
-    lanes: tuple[float, float]  # m, position along the slope of the centre of each foot's pad 0
+    pitch: float  # [S] m, length of a pad, and scale of the criteria for steps and slides
+    lanes: tuple[float, float]  # m, position along the slope of the centre of pad 0 in each foot's lane
     has_pads: bool  # whether there are pads, over whose edges a foot can trip, or a plane
     order_matters: bool  # whether a foot can touch only after it was above the ground ahead of the other foot
-    heights: Any  # (footholds,) m above the slope, from the start's foothold on; the last one applies to all later ones
+    heights: Any  # (footholds,) m above the slope, the start's foothold first; later footholds have the last height
 
 
 def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
@@ -49,7 +49,7 @@ def is_uneven(terrain: Terrain) -> bool:
 
 @kernel_part
 def foothold_height(terrain: Terrain, foothold: int) -> float:
-    """Return the height (m) of a foothold above the slope; number 0 is the start's; earlier ones have its height."""
+    """Return the height (m) of a foothold above the slope; foothold 0 is the start's, earlier ones have its height."""
     return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
 
 
@@ -83,7 +83,7 @@ def has_ground_in_cell(cell: int) -> bool:
 
 @kernel_part
 def starts_with_ground(terrain: Terrain, is_stance: bool) -> bool:
-    """Whether the ground carries a foot at the start: always the stance foot, the other unless `order_matters`."""
+    """Whether the ground carries a foot at the start: the stance foot always, the other unless `order_matters`."""
     return is_stance or not terrain.order_matters
 
 

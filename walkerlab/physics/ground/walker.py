@@ -1,10 +1,10 @@
-"""Walker on compliant ground: an assembled tree with ball feet, in the forms that it takes while walking.
+"""Walker on compliant ground: a tree with ball feet, whose form depends on locked knees and a hinged foot.
 
-The state is (along, height, theta_1 .. theta_n) and the velocities of all these: the position (m) of the centre of mass
-along the slope (positive downhill) and above it, and the bodies' absolute angles (rad) from the vertical. While an
-ideal lock holds a knee, thigh and shank are one body: theta = S z with a column of S for the bodies that turn together.
-The constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and the form is an ordinary walker of
-fewer bodies. While the first stance foot is hinged, the root is the hinge and the state is the angles and their rates.
+The state is (along, height, theta_1 .. theta_n) and their rates: the position (m) of the centre of mass along the slope
+(positive downhill) and above it, and the bodies' absolute angles (rad) from the vertical. While an ideal lock holds a
+knee, thigh and shank are one body: theta = S z with a column of S for each group of bodies that turn together. The
+constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and the form is an ordinary walker of fewer
+bodies. While the first stance foot is hinged, the root is the hinge and the state is the angles and their rates.
 """
 
 import math
@@ -21,17 +21,17 @@ from walkerlab.physics.mechanics.tree import lever_motion
 from walkerlab.physics.solvers.system import Floats, Integers, State
 
 MAX_BODIES = 8
-OF_BODIES = (0.0,) * MAX_BODIES  # templates for scratch arrays of that length
+OF_BODIES = (0.0,) * MAX_BODIES  # templates for the length of scratch arrays
 OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
-FIRST_KNEE = HIP_ROW + 1  # row of its hinge in `hinges` and `laws`
+FIRST_KNEE = HIP_ROW + 1  # row of the first knee in `hinges` and `laws`
 # states of a knee
 RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 
 @tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """One form of the walker, SI: hinged or free, with certain knees locked; a structured scalar."""
+    """Constants (SI) of the walker in one form, free or hinged, with certain knees locked; a structured scalar."""
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
@@ -44,13 +44,13 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     release_at_touch: bool  # release the trailing knee at the touch, not when the leading foot stops sinking in
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
     foot_y: Floats
-    rolling: Floats  # (2, n) m, radius of each ball in the column of its body; otherwise zero
+    rolling: Floats  # (2, n) m, radius of each ball in the column of its body, zero in all others
     radius: Floats  # (2,) m, radii of the balls
     hip_x: Floats  # (n,) m, levers from the root to the hip
     hip_y: Floats
     push_off_duration: float  # s
-    onto: Integers  # (all bodies,) index in this form of each of the walker's bodies
-    first: Integers  # (n,) for each body of this form, the first of the walker's bodies merged into it
+    onto: Integers  # (bodies of the walker,) index of each of them in this form
+    first: Integers  # (n,) for each body of this form, index of the first of the walker's bodies merged into it
     root_along: float  # m, position of the hinge along the slope
     root_height: float  # m, height of the hinge above the slope
 
@@ -71,7 +71,7 @@ FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
-    forms: Any  # (2, 4) records of FORM: rows for free and hinged, columns by `locked_knees`
+    forms: Any  # (2, 4) records of FORM: row 0 with both feet free, row 1 with a foot hinged; columns by `locked_knees`
     normal: NormalLaw
     friction: Any  # a FrictionLaw
     stop: Any  # stop of both knees: IdealLock or a KneeStop
@@ -146,7 +146,7 @@ def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> Wa
 
 @by_reference
 class OnGround(NamedTuple):
-    """Walker in one form on the ground, with variables that the walk owns and may change within that form."""
+    """Walker in one form on the ground, with variables that the walk may change without changing the form."""
 
     form: GroundModel
     normal: NormalLaw
@@ -166,7 +166,7 @@ def on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """Return the walker in the form for its knees, by default standing on foot 1; `level` is the ground height (m)."""
+    """Return the walker in the form for its knees, by default on foot 1; `level` (2,) is the ground height (m)."""
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(hinged), locked_knees(knee)]
     progress = new_progress() if progress is None else progress
@@ -247,27 +247,27 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
 
 
 def to_form(form: GroundModel, x: Any) -> Floats:
-    """Convert a state of all bodies, or a variational column, to that of a form about the same root."""
+    """Convert a full state (of all bodies), or variational columns, to the state of a form with the same root."""
     # Merged bodies have equal angles and rates up to rounding; those of the first are used.
     return np.asarray(x)[places_in_whole(form, len(x))]
 
 
 def to_full(form: GroundModel, y: Any, size: int) -> Floats:
-    """Convert a form's state to that of all bodies (size,) about the same root."""
+    """Convert a form's state to the full state (size,) of all bodies with the same root."""
     p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
     onto = form.onto[:every]
     return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
 
 
 def places_in_whole(form: GroundModel, size: int) -> list[int]:
-    """Return the indices of a form's state in the state (size,) of all bodies about the same root."""
+    """Return the index of each entry of a form's state in the full state (size,) of all bodies with the same root."""
     p, half, first = int(form.places), size // 2, form.first[: form.bodies]
     return [*range(p), *(p + first), *range(half, half + p), *(half + p + first)]
 
 
 @kernel_part
 def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
-    """Write the state y of a form into `whole`, as a state of the free walker with all bodies."""
+    """Convert a form's state y to the state of the free walker with all bodies, and write it into `whole`."""
     n, p, half = form.bodies, form.places, half_size(form)
     middle = whole.size // 2
     for i in range(2, middle):
