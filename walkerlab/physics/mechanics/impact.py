@@ -34,7 +34,7 @@ from walkerlab.physics.solvers.system import Floats
 @kernel_part
 def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
     """Write the state just after heel strike, with the legs' roles exchanged, into `new`; y is the state before it."""
-    # Any number of variational columns may follow the state; their images are written into `new`.
+    # Any number of variational columns may follow the state; they are also mapped and written into `new`.
     strike(model, AT_STRIKE, True, y, new)
 
 
@@ -171,7 +171,7 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     n, E = len(model.arm_x), model.E[STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
-    # seen from the hip, the trailing leg has the constants of the leading one and carries no other body
+    # about the hip, the trailing leg has the same constants as the leading leg and carries no other body
     leg = [SWING] if model.shank == NO_SHANK else [SWING, int(model.shank)]
     own = A[np.ix_(leg, leg)].sum()
     for pairs in (A, B):
@@ -217,7 +217,7 @@ class Constraints(NamedTuple):
 def project(
     model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, p: Any
 ) -> None:
-    """Write angular velocities (rad/s) after an impact into p (n,); `twist` (N m s) is an impulse on the stance leg."""
+    """Write angular velocities (rad/s) after an impact into p (n,); `twist` (N m s) acts on the stance leg."""
     momenta(model, constraints.M, constraints.F, constraints.U, omega, along, upward, p)
     p[STANCE] += twist
     solve_linked(model, constraints.phase, constraints.factors, p)

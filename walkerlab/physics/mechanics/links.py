@@ -14,7 +14,7 @@ from walkerlab.physics.kernels import forced_inline
 class CountedModel(NamedTuple):
     """Model whose number of bodies is known only at run time, with the fields that the functions below read."""
 
-    # A model whose type fixes that number takes little more than half the time: the compiler unrolls its loops.
+    # If the type fixes the number, the compiler unrolls the loops, which then take little more than half the time.
 
     E: Any  # (phases, n, n)
     arm_x: Any  # (n,)

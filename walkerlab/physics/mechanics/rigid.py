@@ -76,7 +76,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
 
 
 def group_bodies(assembly: Assembly) -> BodyPlaces:
-    """Group the bodies in order: swing leg (or thigh), straight stance leg, swing shank, bodies shared by both legs."""
+    """Group the bodies in the model's order: swing leg (or thigh), straight stance leg, swing shank, shared bodies."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
     groups = [(swinging[0],), stance, *((name,) for name in swinging[1:]), *((name,) for name in shared)]

@@ -41,7 +41,7 @@ from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
 
 SWING, STANCE, SHANK = 0, 1, 2
-# index of E: swing knee bent, swing leg straight, heel strike
+# indices into E: swing knee bent, swing leg straight, heel strike
 BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
 
@@ -121,7 +121,7 @@ def on_slope(model: RigidModel, slope: float) -> RigidModel:
 
 
 class Mode(NamedTuple):
-    """System to integrate between events: a state (2 n,), followed by any number of variational columns (2 n,)."""
+    """System to integrate between events, for a state (2 n,) followed by any number of variational columns (2 n,)."""
 
     model: RigidModel
     phase: int  # BENT or STRAIGHT
@@ -317,7 +317,7 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
 
 
 def energy_at_touch(model: RigidModel, touched: Any) -> Any:
-    """Compute the potential energy (J) of the whole mass at the contact point of a leg at the angle `touched` (rad)."""
+    """Compute the potential energy (J) of the total mass at the contact point of a leg at the angle `touched` (rad)."""
     # zero is at the same height as in `energies`
     return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 
@@ -331,7 +331,7 @@ def swing_foot(model: RigidModel, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, float, float, float]:
-    """Compute the results of `swing_foot` and their changes due to `turn` (n,): m if in rad, m/s if in rad/s."""
+    """Compute the results of `swing_foot` and their changes due to `turn` (n,): m for angles (rad), m/s for rates."""
     n = len(model.arm_x)
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
