@@ -33,8 +33,8 @@ from walkerlab.physics.solvers.stepping import (
 )
 from walkerlab.physics.solvers.system import Floats, block, derivative
 
-# Hairer's code has a safety factor of 0.9: it rejects a fifth of a walk's steps and takes 11 % more work for the same
-# error.
+# With the safety factor of Hairer's code, 0.9, a fifth of a walk's steps are rejected, and the same error costs 11 %
+# more work.
 SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
 EXPONENT = 1.0 / 8.0
 STAGE_COUNT, EXTRA_STAGES = 12, 3
@@ -137,7 +137,7 @@ def scaled_norm(method: Dop853, v: Any) -> float:
 
 @kernel_part
 def change_of_step(error: float) -> float:
-    """Compute the ratio of the next step to a step with this error; three square roots give the eighth root."""
+    """Compute the factor for the step size after a step with this error; three square roots give the eighth root."""
     return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))
 
 

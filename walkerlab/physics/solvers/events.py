@@ -1,8 +1,8 @@
 """Zero crossings of event functions within a step, including several crossings in one step.
 
-An event function on a step is a polynomial through its values on the dense output. A polynomial in Bernstein form lies
-in the hull of its coefficients: coefficients of one sign prove that there is no crossing; otherwise bisection isolates
-the crossings. A sign check at the ends of a step would miss double crossings.
+Within a step, an event function is replaced by the polynomial through its values on the dense output. In Bernstein
+form, a polynomial lies in the hull of its coefficients, so coefficients of one sign prove that there is no crossing;
+otherwise bisection isolates the crossings. A sign check at the ends of a step would miss double crossings.
 
 A crossing is a change of sign; an event function that touches zero and turns back does not cross. The last event leaves
 its event function at zero. This zero at the start is divided out, so that it is not found again and does not hide a
@@ -140,7 +140,7 @@ def without_zero_at_start(stack: Any, size: int) -> int:
 
 @kernel_part
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Return the slope per step at which an event function leaves its zero at the start; 0 if not over `clearly`."""
+    """Return the slope (per step) at which an event function leaves its zero at the start; 0 if not over `clearly`."""
     # The error of the last event's time leaves a small value at the start, which is subtracted.
     size = set_root_piece(finder, event, False)
     for i in range(1, size):

@@ -1,6 +1,6 @@
 """Fused multiply-add, used only where the code calls for it.
 
-If the compiler were free to contract, code compiled twice could differ in the last bits.
+If the compiler could fuse operations freely, code compiled twice could give results that differ in the last bits.
 """
 
 from typing import Any

@@ -1,6 +1,6 @@
-"""Hermite interpolation of an event function over a step, for crossings that another step then refines.
+"""Hermite interpolation of an event function over a step, to find crossings that a repeated step then refines.
 
-It needs values and two derivatives at both ends, which an explicit method has anyway; dense output costs more stages.
+It needs values and two derivatives at both ends, which explicit methods compute anyway; dense output costs more stages.
 """
 
 from walkerlab.physics.kernels import kernel_part
@@ -16,7 +16,7 @@ Jet = tuple[float, float, float]
 """A value with its first two derivatives in time."""
 Quintic = tuple[float, float, float, float, float, float]
 """Bernstein coefficients of a quintic polynomial over a step."""
-LAST_MOVE = 1e-4  # fraction of the step; Newton's error is about the square of its last move
+LAST_MOVE = 1e-4  # Newton stops below this fraction of the step; its error is about the square of its last move
 MAX_ITERATIONS = 50
 
 

@@ -38,7 +38,7 @@ def _sums(builder: Any, weights: Any, vectors: Any, length: int) -> list[Any]:
 
 
 def match_lanes(builder: Any, number: Any, partner: Any) -> Any:
-    """Repeat a number in each lane if `partner` is lanes."""
+    """Repeat a number in each lane if `partner` holds lanes."""
     return spread_over(builder, number) if partner.type == VECTOR else number
 
 
@@ -87,7 +87,7 @@ def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tu
 
 @kernel_part
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
-    """Compute the sum of squares of each error divided by the tolerance; `method` holds rtol and atol."""
+    """Compute, for each error estimate, the sum of squares of error over tolerance; `method` holds rtol and atol."""
     error_5, error_3 = 0.0, 0.0
     for i in range(len(y)):
         scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))

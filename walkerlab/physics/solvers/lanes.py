@@ -79,7 +79,7 @@ def _is_number(kind: Any) -> bool:
 
 
 def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: Any) -> None:
-    """Extend a function of numbers to lanes; `build` receives the builder and all arguments as lanes."""
+    """Extend a scalar function to lanes; `build` receives the IR builder and the arguments as lanes."""
 
     class LaneTemplate(AbstractTemplate):  # type: ignore[misc]
         key = function

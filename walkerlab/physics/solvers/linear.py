@@ -27,7 +27,7 @@ compile_as(reciprocal, lambda x: (complex_reciprocal if isinstance(x, types.Comp
 
 @kernel_part
 def size(x: Any) -> float:
-    """Compute |Re x| + |Im x|, which chooses pivots without a square root."""
+    """Compute |Re x| + |Im x|, a magnitude for choosing pivots that needs no square root."""
     return abs(x.real) + abs(x.imag)
 
 

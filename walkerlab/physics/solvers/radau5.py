@@ -81,8 +81,8 @@ class Radau5(NamedTuple):
     real: Any  # (n, n) factors of gamma/h I - J
     pair: Any  # (n, n) complex factors of (alpha - i beta)/h I - J
     pivots: Any  # (2, n)
-    move: Any  # (n,) Newton's move in the real equations of the transformed system
-    move_pair: Any  # (n,) Newton's move in the complex equations
+    move: Any  # (n,) Newton's correction in the real equations of the transformed system
+    move_pair: Any  # (n,) Newton's correction in the complex equations
     control: Any  # (7,) variables of step control; see the indices above
 
 
@@ -139,7 +139,7 @@ def first_guess(method: Radau5, h: float) -> None:
 
 @kernel_part
 def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
-    """Do one simplified Newton iteration; returns the size of its move relative to the tolerance."""
+    """Do one simplified Newton iteration; returns the size of its correction relative to the tolerance."""
     y, z, w, f = method.y, method.z, method.w, method.f
     n = y.size
     for stage in range(3):

@@ -17,9 +17,9 @@ class Method:
     name: str  # name in configs
     # factory: (number of equations, rtol, atol, budget of right-hand sides)
     new: Callable[[int, float, float, int], Any]
-    stiff: bool  # whether it suits stiff problems
+    stiff: bool  # whether the method suits stiff problems
     orders: tuple[int, int]  # minimum and maximum order; equal unless the method varies its order
-    compiled: bool = False  # whether whole walks compile with it; walks with a library's method run in Python
+    compiled: bool = False  # whether walks compile as a whole; with a library's method, they run in Python
 
 
 def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
@@ -69,7 +69,7 @@ def method_named(name: str) -> Method:
 
 
 ENDLESS = 2**62
-"""Budget for a walk whose right-hand sides are limited per step instead."""
+"""Budget that is never exhausted, for walks that limit right-hand sides per step rather than per walk."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Integrators of SciPy and SUNDIALS behind the functions of `stepping`, for comparison and as a check.
+"""Integrators of SciPy and SUNDIALS with the interface of `stepping`, for comparison and as a check.
 
 The right-hand side is compiled; the walk itself runs in Python from the same source.
 """
@@ -32,7 +32,7 @@ from walkerlab.physics.solvers.stepping import (
 from walkerlab.physics.solvers.system import Integers, derivative, jacobian
 
 DENSE_DEGREE = 7
-"""Upper bound of the degree of all methods' dense output."""
+"""Upper bound on the degree of the dense output of these methods."""
 
 
 class OutOfBudgetError(Exception):
@@ -56,12 +56,12 @@ def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
 
 
 class ScipyMethod:
-    """Integrator of a library with the fields that `stepping` requires."""
+    """Integrator of another library, with the fields that `stepping` requires."""
 
     def __init__(
         self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
     ) -> None:
-        """Prepare for n equations; `begin` calls `new_solver`, with the signature of scipy.integrate's classes."""
+        """Prepare for n equations; `begin` calls `new_solver`, which has the signature of scipy's solvers."""
         self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
         self.rtol, self.atol = rtol, atol
         self.clock = np.zeros(3)
@@ -151,7 +151,7 @@ def step_solver(method: ScipyMethod) -> int:
 
 @rewind.case(ScipyMethod)
 def rewind_scipy(method: ScipyMethod, system: Any) -> None:
-    """Keep the dense output of the step; `advance` then evaluates it at the event."""
+    """Go back to the start of the step, but keep its dense output, which `advance` evaluates at the event."""
     method.clock[T] = method.clock[T_OLD]
     method.y[:] = method.y_old
 

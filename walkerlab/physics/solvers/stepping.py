@@ -45,12 +45,12 @@ def prepare_dense(method: Any, system: Any) -> None:
 
 @by_type
 def interpolate(method: Any, system: Any, fraction: float, y: Any) -> None:
-    """Write the state at `fraction` (0 to 1) of the last step, or its first components, into y."""
+    """Write the state at `fraction` (0 to 1) of the last step, or as many of its components as y holds, into y."""
 
 
 @by_type_or_default
 def sample(method: Any, system: Any, fractions: Any, states: Any) -> None:
-    """Write the states at fractions (m,) of the last step, or their first components, into rows of states (m, ...)."""
+    """Write the states at fractions (m,) of the last step, or their first components, into the rows of `states`."""
     for k in range(len(fractions)):
         interpolate(method, system, fractions[k], states[k, : method.y.size])
 
