@@ -1,7 +1,7 @@
-"""Compilation and caching of kernels with numba: one process compiles each kernel; parts get no code of their own.
+"""Compilation and caching of kernels with numba; processes that need the same kernel compile it only once.
 
-The module uses private parts of numba. If a version lacks one, `absent` lists it, and kernels use only numba's public
-interface, with the same results.
+The module uses private names of numba. If the installed version lacks some, `absent` lists them, and kernels use only
+the public interface, with the same results.
 """
 
 import functools
@@ -21,11 +21,11 @@ from walkerlab.physics.kernel_cache import PACKAGE, cache_folder, lock_of, watch
 compiling: list[tuple["KernelCache", str]] = []
 """Kernels that this process is compiling, with their signatures; each is called by the one before it."""
 absent: list[str] = []
-"""Private parts that this version of numba lacks; if there are any, kernels use only its public interface."""
+"""Private names that the installed numba lacks; if there are any, kernels use only its public interface."""
 
 
 def private_class(name: str, *members: str) -> Any:
-    """Import a private class of numba by its full name; list it in `absent` if it or one of `members` is missing."""
+    """Import a private class of numba by its full name; add it, or the `members` that it lacks, to `absent`."""
     module, _, kind = name.rpartition(".")
     try:
         imported = getattr(importlib.import_module(module), kind)
@@ -61,17 +61,17 @@ Record = private_class("numba.core.types.npytypes.Record", "mangling_args")
 
 def layout_symbol(record: Any) -> tuple[str, tuple[str, ...]]:
     """Return the name of a record type in the symbols of machine code; it is the same in every process."""
-    # Numba uses a counter instead: two processes can then give parts compiled for different records the same symbol,
-    # and a third process that loads both runs one in place of the other.
+    # Numba uses a counter instead. Two processes can then give the same symbol to code compiled for different records,
+    # and a third process that loads both would run the wrong code.
     return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:16],)
 
 
 if hasattr(Record, "mangling_args"):
     Record.mangling_args = property(layout_symbol)
 
-# With its first kernel, numba imports scipy.linalg to see whether it is installed, which takes longer than loading all
-# compiled kernels. Prevent that import and set the answer: it is installed. Numba imports it again where a function
-# multiplies matrices, which no kernel does.
+# For its first kernel, numba imports scipy.linalg just to see whether it is installed; that takes longer than loading
+# all compiled kernels. Prevent the import and record that it is installed. Numba needs it only to multiply matrices,
+# which no kernel does.
 BLAS = "scipy.linalg.cython_blas"
 if BLAS not in sys.modules:
     sys.modules[BLAS] = None  # type: ignore[assignment]
@@ -92,7 +92,7 @@ if absent:
 
 
 class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
-    """Locator of kernels in `cache_folder`; it depends on the content of the source file, not on its age or folder."""
+    """Locator of kernels in `cache_folder`; it identifies a source file by its content, not by its age or folder."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
         super().__init__(py_func, py_file)
@@ -137,7 +137,7 @@ class StoredKernel(FunctionCache):  # type: ignore[misc, valid-type]
 
 
 class KernelCache:
-    """Cache of a kernel, with numba's interface; if several processes call the kernel at once, only one compiles it."""
+    """Cache of a kernel, with numba's interface; if several processes need the kernel, only one compiles it."""
 
     def __init__(self, py_func: Any) -> None:
         self._function = py_func
@@ -167,7 +167,7 @@ class KernelCache:
 
     def save_overload(self, signature: Any, data: Any) -> None:
         try:
-            with lock_of(self.kernel):  # one index for all signatures
+            with lock_of(self.kernel):  # all signatures share one index
                 self.stored.save_overload(signature, data)
         finally:
             self.finish(str(signature))
@@ -190,7 +190,7 @@ def _release(lock: Any) -> None:
 class QuickFlags(Flags):  # type: ignore[misc, valid-type]
     """Compiler flags that are equal if the same flags are set."""
 
-    # Numba looks up operators by their flags; its own comparison goes through every flag that exists.
+    # Numba looks up operators by their flags, and its own comparison goes through all flags, even those not set.
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, QuickFlags) and self._values == other._values
@@ -265,7 +265,7 @@ class _WithoutEnvironment:
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]
-    """Code of a kernel part, without machine code of its own: it is linked into kernels and optimised with them."""
+    """Code of a kernel part; it is linked into kernels, and becomes machine code only together with them."""
 
     # Numba itself also optimises and emits every part separately, which takes a third of the compile time.
 

@@ -1,4 +1,4 @@
-"""Folder of compiled kernels: one for each state of the sources, version of numba and processor.
+"""Folder of compiled kernels; each state of the sources, version of numba and processor has its own.
 
 Numba's cache does not notice changes in a function that a kernel calls from another file. The folder's name therefore
 contains a digest of all sources that kernels can use, so stale code never runs. Caches of other programs are untouched.
@@ -22,7 +22,7 @@ from walkerlab.code_digest import Sources, digest_of
 
 PHYSICS = Path(__file__).parent
 PACKAGE = PHYSICS.parent
-# the only packages that may hold compiled functions (tested)
+# the only packages that may hold compiled functions; a test checks this
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
 KEPT_GENERATIONS = 8
@@ -70,7 +70,7 @@ def processor_name() -> str:
 
 
 def cache_root() -> Path:
-    """Return the folder of all compiled code: $WALKERLAB_CACHE, the user's cache, or else a temporary folder."""
+    """Return the folder of compiled code: $WALKERLAB_CACHE or the user's cache if writable, else a temporary folder."""
     chosen = os.environ.get("WALKERLAB_CACHE")
     usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
     return _first_usable((Path(chosen), usual) if chosen else (usual,))

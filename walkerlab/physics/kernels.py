@@ -32,7 +32,7 @@ FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": Fa
 PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 if not absent:
     PART_FLAGS["pipeline_class"] = PartCompiler
-# passing lanes through memory costs as much as the arithmetic on them
+# inlined, because passing lanes through memory costs as much as the arithmetic on them
 ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
@@ -43,7 +43,7 @@ def kernel(function: F) -> F:
     if absent:
         return cast(F, cached_plainly(function, FLAGS))
     compiled = numba.njit(pipeline_class=KernelCompiler, **FLAGS)(function)
-    # as enable_caching does, but with the kernels' own cache
+    # like enable_caching, but with a KernelCache
     compiled._cache = KernelCache(function)
     return cast(F, compiled)
 
@@ -55,7 +55,7 @@ def kernel_part(function: F) -> F:
 
 
 def callable_kernel(function: F) -> F:
-    """Declare a `kernel_part` that Python also calls as a kernel."""
+    """Declare a function that kernels call as a `kernel_part`, and Python as a `kernel`."""
     whole = kernel(function)
 
     @functools.wraps(function)
@@ -74,7 +74,7 @@ def forced_inline(function: F) -> F:
 
 def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], dict[str, Any]]]) -> None:
     """Let compiled calls of `function` use a body chosen from the argument types; each body is compiled once."""
-    # `body_for` returns the body and its compiler flags for numba's types of the arguments
+    # `body_for` receives numba's types of the arguments, and returns the body and its compiler flags
     parts: dict[Any, Any] = {}
     compiled: dict[Any, Any] = {}
 
@@ -155,7 +155,7 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
 
 
 def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
-    """Declare as `by_type`; the declaration's own body serves all types without a registered one."""
+    """Declare a function as `by_type` does; types without a registered body use the body of the declaration."""
     chosen = by_type(declaration)
     chosen.default(declaration)
     return chosen
@@ -170,7 +170,7 @@ class ByAddress(types.Type):
 
     @property
     def mangling_args(self) -> tuple[str, tuple[()]]:
-        """A short symbol name. The full one, with all field types, is longer than most functions."""
+        """Short symbol name; the full one, with all field types, would be longer than most functions."""
         return f"{self.instance_class.__name__}_{hashlib.sha256(self.name.encode()).hexdigest()[:16]}", ()
 
 
@@ -213,8 +213,8 @@ def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
 
 
 def vector(like: Any) -> Any:
-    """Allocate scratch memory (n,) for the calling function, as long as the tuple or record array `like`."""
-    # filled with NaN in Python, so that a read of unwritten scratch memory shows up
+    """Allocate scratch memory (n,) for the calling function; n is the length of `like`, a tuple or an array."""
+    # filled with NaN in Python, so that reading an entry before writing it shows up
     return np.full(len(like), np.nan)
 
 
