@@ -227,7 +227,7 @@ def project(
 def project_change(
     model: Any, constraints: Constraints, rate: Any, along: float, upward: float, twist: float, turned: Any, p: Any
 ) -> None:
-    """Project a change of velocities as in `project`; `turned` (n,) is the momentum change due to the angles."""
+    """Project a change of velocities as `project` does; `turned` (n,) is the momentum change due to the angles."""
     momenta(model, constraints.M, constraints.F, constraints.U, rate, along, upward, p)
     for k in range(len(model.arm_x)):
         p[k] -= turned[k]
