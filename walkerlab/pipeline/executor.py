@@ -1,4 +1,4 @@
-"""The executor: decides for each stage whether to reuse its result, run it or leave it out, and does so."""
+"""Executor that reuses, runs or leaves out each stage of a pipeline."""
 
 import importlib
 import time
@@ -49,9 +49,9 @@ class Executor:
     stages    stages to bring up to date, each after the stages that it needs
     force     run every stage that is not left out, even if its result is current
     jobs      maximum number of processes, for independent stages and for independent work units of a stage
-    again     whether to repeat walks at tighter tolerances for their numerical error
+    again     whether to repeat walks at tighter tolerances to measure their numerical error
     answers   results so far, by stage
-    left_out  reason for each stage that is left out
+    left_out  reasons why stages are left out, by stage
     done      outcomes so far
     """
 
@@ -81,7 +81,7 @@ class Executor:
         self._total = 0
 
     def plan(self) -> tuple[Step, ...]:
-        """Decide on all stages on the assumption that each step succeeds; changes no file."""
+        """Decide on all stages, assuming that each step succeeds; changes no file."""
         steps = []
         for stage in self.stages:
             step = self._decide(stage)
@@ -114,7 +114,7 @@ class Executor:
         self.reporter.note(outcome_line(done))
 
     def inputs(self, stage: Stage) -> dict[str, Content]:
-        """Return the results that a stage gets: those that it needs, and optional ones that are current."""
+        """Return the available results that a stage uses, required or optional, by stage."""
         available = self.answers.keys() - self.left_out.keys()
         return {name: self.answers[name] for name in stage.results(self.config) if name in available}
 
@@ -124,7 +124,7 @@ class Executor:
         return tuple(omission_of(name, self._why_absent(name)) for name in missing)
 
     def _decide(self, stage: Stage) -> Step:
-        """Decide whether to reuse, run or leave out a stage, after the decisions on its inputs.
+        """Decide whether to reuse, run or leave out a stage whose inputs have been decided on.
 
         Optional inputs outside this plan are looked up first; a damaged one is recorded as left out.
         """
@@ -148,12 +148,12 @@ class Executor:
 
     def _identity(self, stage: Stage) -> Identity:
         keys = {name: self._keys[name] for name in stage.results(self.config) if name in self._keys}
-        # a drawing states why results are left out
+        # a drawing states why results are left out, so the reasons are part of its identity
         keys |= {absent.what: f"left out: {absent.why}" for absent in self.missing_inputs(stage)}
         return self.results.keys.identity(stage, self.config, keys, self.again)
 
     def _expect(self, step: Step) -> None:
-        """Assume that a step succeeds, so that a stage that is to run will have a result."""
+        """Record the expected outcome of a step, assuming that it succeeds."""
         if step.identity is None:
             self.left_out[step.stage.name] = step.reason
         elif step.action == "reuse" and step.found is not None:
@@ -226,7 +226,7 @@ class Executor:
         future.add_done_callback(lambda ended: self._events.put(partial(self._ended, ended)))
 
     def _hear(self, reporter: StageReporter, message: tuple[str, Any]) -> None:
-        """Queue a worker's message, which arrives in another thread, for this thread."""
+        """Pass a worker's message from the thread that receives it to this thread, through the event queue."""
         call, *arguments = message
         self._events.put(lambda: bool(getattr(reporter, call)(*arguments)))
 
@@ -261,7 +261,7 @@ class Executor:
         return Begun(step, task, reporter, time.perf_counter())
 
     def _finish(self, future: Future[Any] | None, answer: Content) -> None:
-        """Store a stage's result, which is partial if the stage found no answer, and report the end of the stage."""
+        """Store a stage's result (partial if the stage found no answer) and report that the stage has ended."""
         running_stage = self._running[future]
         step, name = running_stage.step, running_stage.task.name
         awaited = any(name in stage.results(self.config) for stage in self._waiting)
@@ -314,7 +314,7 @@ def answer_in_memory(
 ) -> Content:
     """Compute a stage's result without files, reusing inputs from memory.
 
-    again  whether to repeat walks at tighter tolerances for their numerical error
+    again  whether to repeat walks at tighter tolerances to measure their numerical error
 
     Raises ConfigError as `Graph.needed_in_memory` does.
     """
@@ -342,7 +342,7 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
 
 
 def short_reason(why: str) -> str:
-    """Cut a reason where it quotes another stage's reason or an error; the quoted text has a line of its own."""
+    """Cut a reason off before it quotes another stage's reason or error, which is shown on a line of its own."""
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 

@@ -57,7 +57,7 @@ def walks_and(*names: str) -> Inputs:
 
 
 def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """Require the known problems and, for a walker that belongs to no study, the inputs for a start in its scene."""
+    """Require the known problems and, for a walker that belongs to no study, what `gait_for_start_or_pads` requires."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 
@@ -92,14 +92,14 @@ class Stage:
     if_current: tuple[str, ...] = ()  # stages whose results it uses only if they are current
     options: tuple[Option, ...] = ()  # options of its command in addition to those of all stages
     requires: tuple[str, ...] = ()  # config blocks that it needs; it is left out if one is missing
-    # "times" runs alone; "draws" writes files in addition to its artifact, from the results that exist
+    # "times": measures run times, so it runs alone; "draws": also writes files, from the results that exist
     work: Literal["computes", "times", "draws"] = "computes"
     # function of its module that compiles its kernels while an earlier stage runs; empty if that does not pay
     precompile: str = ""
-    # the only command that runs it (its own or `STAGE --full`); other results stay current without its result
+    # the only command that runs it (its own or `STAGE --full`); empty if any command that needs it runs it
     only_by: str = ""
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
-    does_without: Lacks = nothing  # returns what its scene lacks under a config: name, reason and saving of each part
+    does_without: Lacks = nothing  # returns the parts that it omits under a config: name, reason and saving
     takes_of_scene: type | None = None  # replaces `takes` for a walker that belongs to no study
     takes_of_paper: type | None = None  # type of the slice of the built-in paper config that its own cases use
     # returns the versions of other programs that its result depends on, by name

@@ -14,7 +14,7 @@ from walkerlab.pipeline.store.key import Identity
 
 
 def takes_again(stage: Stage) -> bool:
-    """Whether a stage's `run` can skip the second walk, which gives the numerical error."""
+    """Whether a stage's `run` can skip the second walk, which measures the numerical error."""
     return "again" in signature(import_module(stage.module).run).parameters
 
 
@@ -29,7 +29,7 @@ class Keys:
         self._fixed: dict[str, dict[str, Any]] = {}
 
     def of(self, config: Config, target: str) -> dict[str, str]:
-        """Return the keys of a stage and of all it needs, by name; raises what `Graph.needed_in_memory` raises."""
+        """Return the keys of a stage and of all its inputs, by stage; raises as `Graph.needed_in_memory` does."""
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
             input_keys = {name: keys[name] for name in stage.inputs(config)}
@@ -40,7 +40,7 @@ class Keys:
         """Return the identity of a stage's result under a config.
 
         input_keys  keys of its inputs, by stage
-        again       whether walks are repeated for their numerical error, as they are for every stored result
+        again       whether walks are repeated to measure their numerical error, as for every stored result
         """
         if stage.name not in self._fixed:
             fixed = self._fixed[stage.name] = {}

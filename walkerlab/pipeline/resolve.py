@@ -35,10 +35,10 @@ def resolve(
 ) -> ResolvedRun:
     """Resolve `--config`: a file, a built-in config, or a run by its name, its folder or one of its artifacts.
 
-    text     tried as each of these in that order; None for the built-in paper config
+    text     value of `--config`; None for the built-in paper config
     sets     `--set` options, KEY=VALUE, in order
     strides  value of `--strides`, which overrides everything else
-    runs     folder of all runs; a run given by its path stays in its own folder of runs
+    runs     folder of all runs; a run given by its path stays where it is
     name     name of the run's folder; None to derive it from the settings
 
     Raises ConfigError if `text` matches nothing or the config is invalid.

@@ -115,19 +115,19 @@ def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]
 
 
 def input_digest(stage: Stage, result: Content) -> str:
-    """Return the digest that a result records of an input; drawings also show timings, so theirs covers the file."""
+    """Return the digest of an input that a result records; for drawings, which show timings, it covers the file."""
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 
 class LoadedCodeKeys(Keys):
-    """Builds identities for use within this process, whose code does not change, so they need no code digest."""
+    """Builds identities for this process only; its code does not change, so they need no code digest."""
 
     def code_digest(self, target: str) -> str:  # noqa: ARG002
         return ""
 
 
 class MemoryResults:
-    """Results in memory: the latest results that other stages need."""
+    """Latest results that other stages need, kept in memory."""
 
     folder = None
 

@@ -29,7 +29,7 @@ class StageReport:
     left_out: tuple[LeftOut, ...]  # results that were not computed, with the reasons
     summary: dict[str, Any]  # summary of the result; empty if there is no result
     steps: tuple[StageDone, ...]  # outcome of each stage
-    # error of the stage, or else of the first other stage, that has no answer; None if all have one
+    # error of the stage if it has no answer, otherwise of the first stage without one; None if all have answers
     no_answer: NoAnswer | None = None
     # summaries of all stages with a complete result, by stage
     results: Mapping[str, dict[str, Any]] = field(default_factory=dict)
@@ -136,7 +136,7 @@ def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) ->
 
 
 def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]]) -> tuple[LeftOut, ...]:
-    """List the stages that were left out, the results missing in a drawing, and the parts that scenes do without.
+    """List what was left out: stages, results missing in a drawing, and parts that stages omit under this config.
 
     Optional results that nobody requested are not listed.
     """
@@ -152,7 +152,7 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
 
 
 def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | None:
-    """Return the error of the target, or else of the first stage, that has no answer; None if all have one.
+    """Return the error of the target if it has no answer, otherwise of the first stage without one, or else None.
 
     message  message and advice of the target's error; None if it has an answer
     """

@@ -118,7 +118,7 @@ def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
 
 
 def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
-    """Select a stage's result among those of its run; raises StaleError if it is missing."""
+    """Return a stage's result from the results of its run; raises StaleError if it is missing."""
     if stage not in results:
         raise StaleError(f"{folder.path} has no result of {stage}.", f"{command(folder, graph[stage])} computes it.")
     return results[stage]
@@ -199,7 +199,7 @@ def claim(folder: RunFolder, config: Config) -> None:
 
 
 def refuse_another_config(folder: RunFolder, config: Config) -> None:
-    """Raise ConfigError if a folder has results of another config, unless that is an earlier state of the same file.
+    """Raise ConfigError if a folder has results of another config, unless it is an earlier state of the same file.
 
     The name and the `sweep` block are not compared, since no result depends on them.
     """
@@ -238,7 +238,7 @@ def comes_from(record: Record, folder: RunFolder) -> bool:
 
 @dataclass(frozen=True)
 class Pair:
-    """Values of a quantity in two runs, and the change relative to the first; None if that is undefined."""
+    """Values of a quantity in two runs, and the change relative to the first (None if undefined)."""
 
     name: str
     first: Any

@@ -1,4 +1,4 @@
-"""Tasks: stages with their arguments, run in this or another process, and kernels compiled ahead of them."""
+"""Tasks: stages with their arguments, to run in this or another process; and compilation of kernels in advance."""
 
 import contextlib
 import importlib
@@ -32,7 +32,7 @@ class StageTask:
     # optional arguments of its `run`, by name:
     #   jobs        maximum number of processes for independent work units
     #   checkpoint  work units that an interrupted run has computed
-    #   again       whether to repeat walks for their numerical error
+    #   again       whether to repeat walks to measure their numerical error
     #   folder      run folder that the stage draws into
     #   left_out    results that are missing in a drawing, with the reasons
     offered: Mapping[str, Any]
@@ -101,7 +101,7 @@ class Precompiler:
         self._begun: dict[str, Future[None]] = {}
 
     def begin(self, stage: Stage, only_first: bool) -> Future[None] | None:
-        """Start to compile a stage's kernels; return None if it has no `precompile` function or was started before.
+        """Start compiling a stage's kernels; return None if it has no `precompile` function or this was done before.
 
         only_first  compile only if the worker finds that no kernel has been compiled yet
         """

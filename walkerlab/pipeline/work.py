@@ -19,7 +19,7 @@ SCOUTS: Final = 2
 MIN_BATCH_S: Final = 0.5
 MAX_BATCH: Final = 1000
 SHARES: Final = 3
-"""A batch is at most 1/SHARES of a worker's share of the remaining work, so that all workers end together."""
+"""A batch is at most 1/SHARES of the work left per worker (or MIN_BATCH_S long), so that all workers end together."""
 BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, LookupError, NameError, TypeError)
 """Errors that indicate a bug; a retry would only repeat them."""
 MAX_DEATHS: Final = 12
@@ -41,10 +41,10 @@ Timed = tuple[Any, float]
 
 
 class InPlace(Executor):
-    """Executor that runs each call at once in this process."""
+    """Executor that runs each call immediately, in this process."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run a call; any error is raised at once."""
+        """Run a call; any error is raised immediately."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
@@ -60,7 +60,7 @@ def compute(units: Batch) -> list[Timed]:
 
 @dataclass
 class Spread:
-    """Distributes work units over an executor and retries those of a worker that died."""
+    """Distributes work units over an executor's workers and retries the units of a worker that died."""
 
     todo: Iterator[WorkUnit]  # units that are not handed out yet
     left: int  # number of these units
@@ -76,7 +76,7 @@ class Spread:
     def run(self, executor: Executor, workers: int) -> None:
         """Compute all units; `workers` is 0 if the executor works in this process.
 
-        Raises NoAnswer if workers keep dying before they compute anything; re-raises bugs at once.
+        Raises NoAnswer if workers keep dying before they compute anything; re-raises bugs immediately.
         """
         while self.left or self._again or self._running:
             # one batch more than there are workers, so that no worker waits
@@ -116,7 +116,7 @@ class Spread:
         self.keep(batch, results)
 
     def _failed(self, batch: Batch, failures: int, error: BaseException) -> None:
-        """Retry a batch, then split it, then give up its unit; re-raise an error that is a bug."""
+        """Retry a failed batch, then its halves, and give up a unit that keeps failing; re-raises bugs."""
         if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not isinstance(error, WorkerDiedError)):
             raise error
         self._deaths += 1
@@ -146,9 +146,9 @@ def complete(
 ) -> tuple[list[Numbers], int]:
     """Compute the units that the checkpoint lacks, and store each in it.
 
-    checkpoint   units of an earlier run
+    checkpoint   units that an earlier run computed
     jobs         maximum number of processes
-    shared_from  total size from which starting processes pays
+    shared_from  minimum total size for which starting processes saves time
     compiled     whether all kernels are compiled; if not, the first unit runs alone and compiles them once
 
     Returns the numbers of each unit, and the total size of the units computed now.

@@ -98,7 +98,7 @@ class Worker:
         quiet        whether to discard its output
         """
         self._line, theirs = Pipe()
-        # entries of sys.path are strings; '' is the current folder
+        # `os.path`, because entries of sys.path are strings and '' is the current folder
         path = [os.path.abspath(entry) for entry in sys.path]  # noqa: PTH100
         code = START.format(path=path, line=theirs.fileno(), modules=tuple(modules))
         output = subprocess.DEVNULL if quiet else None
@@ -178,7 +178,7 @@ class WorkerPool(Executor):
         self._closed = False
 
     def start_all(self) -> None:
-        """Start all workers now, so that they import their modules in the meantime."""
+        """Start all workers now, so that they import their modules before the first call."""
         with self._lock:
             self._idle += [self._new_worker() for _ in range(self.size - len(self._idle) - len(self._busy))]
 
@@ -229,7 +229,7 @@ def in_order(
 
     jobs   maximum number of processes
     first  indices of calls to run first and in this process, so that kernels are compiled once
-    rank   rank of an index; calls of low rank start early, so that no long call runs alone at the end
+    rank   rank of an index; low ranks start first, as long calls should, so that none runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:

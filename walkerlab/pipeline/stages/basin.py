@@ -54,7 +54,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 HALF_WIDTH = (0.15, 0.25, 0.25)  # half width of the default window, rad and sqrt(g/L)
-REPEATED_CELLS = 100  # number of cells whose walks are repeated for the numerical error
+REPEATED_CELLS = 100  # number of cells whose walks are repeated to measure the numerical error
 SEARCHED_STARTS = 4_000  # number of starts in the search for attractors
 SIGMAS = 3.0  # distance from the centre of the window to its sides, in standard deviations of the Gaussian weights
 FAILED = UNREACHED - 1  # class of a cell whose walk fails
@@ -65,7 +65,7 @@ TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angula
 def run(
     config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
 ) -> Content:
-    """Walk from every cell that the checkpoint lacks, then from subcells of cells at the basin's edge.
+    """Walk from every cell that the checkpoint lacks, then from the subcells of cells at the basin's edge.
 
     checkpoint  cells that an earlier run completed
     jobs        maximum number of processes
@@ -115,7 +115,7 @@ def run(
 
 
 def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str, int]:
-    """Count the cells of an even sample whose walks end differently at tighter tolerances."""
+    """Repeat the walks of evenly spread cells at tighter tolerances, and count those that end differently."""
     cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
     again = question.tightened().walk_to_ends(window.starts(cells))
     otherwise = (again.outcome != ends.outcome[cells]) | (again.attractor != ends.attractor[cells])
@@ -228,7 +228,7 @@ def summary(
 
 
 def gaussian(window: Window) -> Floats:
-    """Return weights of the cells that sum to 1, from a normal distribution around the window's centre."""
+    """Return weights of the cells, with sum 1, from a normal distribution around the window's centre."""
     off = ((np.arange(cells) + 0.5 - 0.5 * cells) / (0.5 * cells / SIGMAS) for cells in window.cells)
     weights = reduce(np.multiply.outer, (np.exp(-0.5 * sigmas**2) for sigmas in off))
     return np.asarray(weights / weights.sum())
@@ -255,7 +255,7 @@ class RigidQuestion:
     steps: int
     cells_at_once: int = 10_000
     edges_at_once: int = 1_000
-    shared_from: int = 200_000  # number of walks above which starting processes pays
+    shared_from: int = 200_000  # minimum number of walks for which starting processes saves time
     tolerances: tuple[float, float] = (RTOL, ATOL)
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
@@ -315,7 +315,7 @@ def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[fl
 
 
 def shares_of(question: Question, window: Window, refine: int, cells: Sequence[int]) -> list[float]:
-    """Return the fraction of each cell that walks, from walks that start at the centres of its subcells."""
+    """Return the fraction of each cell that leads to walking, from walks that start at the centres of its subcells."""
     inside = subcell_centres(refine, len(window.axes))
     ends = question.walk_to_ends(window.starts(np.repeat(cells, len(inside)), np.tile(inside, (len(cells), 1))))
     walking = (ends.outcome == Outcome.WALKED).reshape(len(cells), -1)

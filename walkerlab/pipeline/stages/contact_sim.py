@@ -54,7 +54,7 @@ SCUFFED = (
 def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Walk `config.strides` strides; raises NoAnswer if the solver fails.
 
-    again  whether to repeat the walk for its numerical error, which takes about twice as long as the walk itself
+    again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
     scene = scene_on_pads(config, rigid_step, rigid_state)

@@ -35,8 +35,8 @@ from walkerlab.scene.walk_outcomes import ground_causes, without_pads
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds, and a function that returns a config's step map over the parameter."""
 LOOKED_AT = 5  # number of values in the span, ends included, at which the search looks for gaits
-TIGHTEST = Effort(1e-13)  # effort of Newton's method for the numerical error
-OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities of a gait with a numerical error
+TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
+OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
 
 
 @dataclass(frozen=True)
@@ -88,11 +88,11 @@ def question_over(block: Span, config: ContinuationConfig, *path: str) -> Family
 
 
 def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Follow the requested families.
+    """Follow the requested families of gaits.
 
-    again  whether to solve some gaits a second time for the numerical error
+    again  whether to solve for some gaits a second time to measure the numerical error
 
-    Raises ConfigError for a key that is no parameter of a requested model, NoAnswer if the span holds no gait.
+    Raises ConfigError for a key that affects no requested model, NoAnswer if no gait is found in the span.
     """
     block, families, isolated = config.continuation, [], []
     question = question_over(block, config, "continuation")
@@ -123,8 +123,8 @@ def refuse(config: ContinuationConfig) -> None:
 def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     """Return the models whose gaits are followed.
 
-    Raises ConfigError if the config lacks a requested model, for keys that affect no model or whose spans have invalid
-    ends, and for a second key that equals the first or whose range excludes the config's own value.
+    Raises ConfigError if the contact model is requested but not configured, a key affects no requested model, an end
+    of a span is invalid, or the second key equals the first or has a range without the config's own value.
     """
     config, second = question.config, question.second
     if question.models != (RIGID,) and config.contact is None:
@@ -233,7 +233,7 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
 
 
 def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of a model's branches: their ranges of values, stable ranges and ends."""
+    """Yield a row for each branch of a model: its range of values, stable ranges and ends."""
     for branch in family.branches:
         ranges = branch.stable_ranges
         widest = max(ranges, key=lambda pair: pair[1] - pair[0], default=None)
@@ -249,7 +249,7 @@ def branch_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of a model's bifurcations, branch by branch."""
+    """Yield a row for each bifurcation of a model, branch by branch."""
     for number, branch in enumerate(family.branches):
         for bifurcation in branch.bifurcations:
             yield {
@@ -274,7 +274,7 @@ def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
 
 
 def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of the points where a model's assumptions cease to hold."""
+    """Yield a row for each point where one of a model's assumptions ceases to hold."""
     for branch in family.branches:
         for crossing in branch.crossings:
             monitor = crossing.monitor
@@ -283,8 +283,8 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
-    """Return the changes of an even sample of gaits at tighter tolerances; None if there are no gaits."""
-    # the gaits are solved for again, so that the residual of Newton's method counts as well
+    """Solve for evenly spread gaits at tighter tolerances; return the largest changes, or None if no gait exists."""
+    # the gaits are solved for, not only walked again, so that the residual of Newton's method counts as well
     step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
         return None
@@ -334,7 +334,7 @@ def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None
 
 
 def cascade_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of period-doubling cascades, with the ratios of the distances between flips."""
+    """Yield a row for each period-doubling cascade, with the ratios of the distances between its flips."""
     for first in family.branches:
         if any(is_born_in(first, flip, parent) for parent in family.branches for flip in parent.bifurcations):
             continue
@@ -389,7 +389,7 @@ def attractor_summary(family: Family) -> dict[str, Any]:
 
 
 def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return rows of bifurcation curves in the plane of both parameters: their ends and the reasons."""
+    """Yield a row for each bifurcation curve in the plane of both parameters: its two ends, and why it ends there."""
     for curve in family.curves:
         points = list(zip(curve.first.tolist(), curve.second.tolist(), strict=True))
         yield {
@@ -403,7 +403,7 @@ def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def region_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Return the fraction of the plane of both parameters that each period of attractor occupies."""
+    """Yield a row for each period of attractors: the fraction of the plane of both parameters that it occupies."""
     if family.regions is not None:
         periods, counts = np.unique(family.regions.period, return_counts=True)
         for period, cells in zip(periods.tolist(), counts.tolist(), strict=True):

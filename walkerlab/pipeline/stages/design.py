@@ -1,4 +1,4 @@
-"""Optimise parameters of a walker within bounds for a quantity of its gait."""
+"""Optimise a quantity of a walker's gait by varying parameters within bounds."""
 
 from __future__ import annotations
 
@@ -167,13 +167,13 @@ class Gaits:
     ) -> None:
         self.config, self.model, self.parameters, self.progress = config, design.model, parameters, progress
         self.wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
-        self.counts = np.zeros(2, int)  # number of evaluations, and of those without a gait
+        self.counts = np.zeros(2, int)  # numbers of evaluations: all, and those without a gait
         self.sections: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
         self.z = find_model_gait(design.model, config, gait, progress.note).z
 
     def gait_at(self, x: Floats) -> Point | None:
-        """Return the gait at parameter values (parameters,); None without a gait or if the config rejects them."""
+        """Return the gait at parameter values (parameters,); None if no gait is found or the config rejects them."""
         self.counts[0] += 1
         self.progress.advance()
         changed = config_with(self.config, self.parameters, x.tolist())

@@ -1,4 +1,4 @@
-"""Contents of the `identify` block and their checks: parameters to estimate, priors and models."""
+"""The `identify` block as `identify` and `plan` read it: parameters to estimate, priors, models and their checks."""
 
 from __future__ import annotations
 

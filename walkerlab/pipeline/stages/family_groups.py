@@ -115,7 +115,7 @@ def groups(
 
 
 class Mark(NamedTuple):
-    """Bifurcation on a branch: the index of the point before it, and the gait's steps."""
+    """Bifurcation on a branch, with the index of the branch's point before it and the steps of the gait there."""
 
     after: int
     kind: str
@@ -134,7 +134,7 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return the flip where a branch begins, with the steps of the parent's gait repeated twice."""
+    """Return the flip where a branch begins, with the steps of the parent's gait listed twice; empty if none."""
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:

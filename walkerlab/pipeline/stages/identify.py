@@ -41,7 +41,7 @@ LABELS: Final = {
     "standard_error": Label("SI", "standard error; absent if the walk does not determine the parameter"),
     "start": Label("SI", "value in the config"),
 }
-UNTOUCHED: Final = 1e-3  # a walk that reduces a prior's variance by a smaller fraction adds no information to it
+UNTOUCHED: Final = 1e-3  # a smaller relative reduction of a prior's variance counts as no information
 SHOWN_STEPS, SHOWN_SAMPLES = 10, 800
 """Number of steps, and approximate number of samples, that the motion player shows."""
 FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
@@ -222,13 +222,13 @@ def step_group(result: Identification) -> Group:
 
 
 def angle_residuals(result: Identification, measured: MeasuredAngles) -> Floats:
-    """Return measured minus predicted angles (samples, 2), given the most probable floor."""
+    """Return measured minus predicted angles (samples, 2) on the most probable floor."""
     about = result.fitted.data.residuals - result.fitted.data.G @ result.fitted.heights_m
     return about[-measured.angles_rad.size :].reshape(-1, 2)
 
 
 def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
-    """Build the group of angle residuals over the phase of a step, those of the swing leg first."""
+    """Build the group of angle residuals (swing leg, stance leg) over the phase of a step."""
     swing_first = reorder_by_leg(angle_residuals(result, measured), 1 - measured.step % 2)
     return Group(
         {
@@ -247,7 +247,7 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
 
 
 def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAngles) -> dict[str, Group]:
-    """Build the identified and measured motions of the first steps; empty for kneed walkers (no shank angles).
+    """Build the identified and measured motions of the first steps; empty for kneed walkers (no shank angles are read).
 
     Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
 

@@ -34,7 +34,7 @@ STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad"
 MIN_STEPS: Final = 2
 MOST_STEPS: Final = 500  # each step adds an unknown floor height; memory grows as steps squared, time as steps cubed
 SLOPE_KEY: Final = "slope_deg"
-SAME_TOUCHES: Final = 0.002  # rad, largest difference of sums of leg angles that hardly moves the heel strikes
+SAME_TOUCHES: Final = 0.002  # rad, largest change of the sum of leg angles at heel strike that counts as no change
 NO_DATA_FILE: Final = "there is no such file"
 
 Measured = MeasuredSteps | MeasuredAngles
@@ -51,7 +51,7 @@ def digests(config: Config) -> Mapping[str, str]:
 
 
 def read_measured(block: Identify, config: RigidConfig) -> Measured:
-    """Read the block's file at the level that the block names; raises ConfigError if it holds no such walk."""
+    """Read the block's file as steps or angles, as `block.level` says; raises ConfigError if it holds no such walk."""
     return next(read_divisions(block, config))
 
 
@@ -108,13 +108,13 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
 
 
 def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredAngles:
-    """Divide the angles of the block's file at the heel strikes where the leg angles have this sum (rad)."""
+    """Divide the angles in the block's file into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
     walk = as_walk(read_recording(Path(block.data)), block.columns, block.units)
     return divide_angles(walk, config, block.data, touch_sum_rad)
 
 
 def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float) -> MeasuredAngles:
-    """Divide angles over time at the heel strikes of the config's walker, where the leg angles have this sum (rad)."""
+    """Divide angles of the config's walker into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
     steps = divide_into_steps(walk, rigid_walker(config), source, touch_sum_rad)
     if steps.touch_time_s.size < MIN_STEPS:
         raise ConfigError(f"{source} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")

@@ -12,9 +12,9 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 LEAST_RTOL: Final = 1e-14  # minimum that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
 MORE_WORK: Final = 10  # factor on the evaluation budget at tighter tolerances
-SAMPLE: Final = 16  # number of walks to repeat out of many
+SAMPLE: Final = 16  # maximum number of walks to repeat
 USUAL: Final = TIGHTER[100.0]
-ROUNDING: Final = 1e-6  # relative rounding error that a divided tolerance may have
+ROUNDING: Final = 1e-6  # relative rounding error allowed in a divided tolerance
 
 Summary = Mapping[str, Any]
 
@@ -27,8 +27,8 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
     walk        repeats the walk with other tolerances and returns its summary
 
     Returns the largest change of each step quantity, named as in `ERROR_OF_EACH_STEP`, the change of `end_time_s` (s)
-    and, for a driven walk, that of `cost_of_transport`. `by` describes the tighter settings unless they are the usual
-    ones. If the two walks end differently, only `reason` is returned.
+    and, for a driven walk, the change of `cost_of_transport`. `by` describes the tighter settings unless they are the
+    usual ones. If the two walks end differently, only `reason` is returned.
     """
     tighter, by = tightened(tolerances)
     return change(first, walk(tighter), by)
@@ -57,7 +57,7 @@ def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
         if apart and any(first[key]):  # skip a list of zeros, such as the rolling of point feet
             changes[name] = max(apart)
     changes["end_time_s"] = abs(first["end_time_s"] - again["end_time_s"])
-    # a passive walk's cost of transport is the sine of the slope, however large the walk's error
+    # a passive walk's cost of transport is always the sine of the slope, so its change says nothing about the error
     if any(work for giver, work in first.get("work_per_step_J", {}).items() if giver != "gravity"):
         changes["cost_of_transport"] = abs(first["cost_of_transport"] - again["cost_of_transport"])
     return changes if by == USUAL else {**changes, "by": by}

@@ -60,7 +60,7 @@ def read_walk(block: RecordedFile) -> RecordedWalk:
 
 
 def read_artifact(path: Path) -> Recording:
-    """Read the trajectory of a walk that a run has stored; raises ConfigError if it stored no trajectory."""
+    """Read the trajectory of a stored walk; raises ConfigError if the file has none."""
     try:
         groups = artifact.read(path).groups
     except FileNotFoundError:
@@ -83,7 +83,7 @@ def read_artifact(path: Path) -> Recording:
 
 
 def content_of(block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps) -> Content:
-    """Build the content with the names of computed walks; energies and forces only if they were recorded."""
+    """Build the content, with the same names as for computed walks; energies and forces only if they were recorded."""
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)
     columns = step_columns(steps.touch_time_s, period_s=periods, length_m=steps.length_m, touch_along_m=along)

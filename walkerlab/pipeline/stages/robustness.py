@@ -50,9 +50,9 @@ Rows = list[dict[str, Any]]
 WALKS_AT_ONCE: Final = 25
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
-"""Maximum number of steps of all walks together on ground of one roughness, by model."""
+"""Maximum total number of steps of all walks on ground of one roughness, by model."""
 GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
-"""Names of the ground reactions during and after a push that `RigidMap.ground_after_push` returns, in its order."""
+"""Names of the two values that `RigidMap.ground_after_push` returns: ground reactions during and after a push."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "model that walks")}
@@ -184,7 +184,7 @@ def models_of(config: RobustnessConfig) -> tuple[str, ...]:
 
 
 def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
-    """Return rows of sensitivity norms, one for each disturbance and indicator."""
+    """Yield a row with the sensitivity norm for each disturbance and indicator."""
     for disturbance in DISTURBANCES:
         answer, units, disturbance_unit = sensitivity(gait, disturbance), gait.units, UNITS[disturbance]
         if answer is None:
@@ -204,7 +204,7 @@ def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
 
 
 def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """Return work units that search for the largest floor drop and hip push, each in both directions."""
+    """Yield the work units that search for the largest floor drop and hip push, each in both directions."""
     for disturbance in DISTURBANCES:
         for sign in (1.0, -1.0):
             run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
@@ -212,7 +212,7 @@ def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUn
 
 
 def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """Return the largest disturbance of one sign that the gait survives, and the rigid model's reactions to a push."""
+    """Return the largest survived disturbance of one sign; for the rigid model's hip push also ground reactions."""
     size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
     if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
         return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
@@ -220,7 +220,7 @@ def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int
 
 
 def rough(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """Return work units, each a batch of walks on rough ground."""
+    """Yield work units, each a batch of walks on rough ground."""
     block, most = config.robustness, cap(subject.model, config)
     for roughness in block.roughness_m:
         for first in range(0, block.walks, WALKS_AT_ONCE):
@@ -300,7 +300,8 @@ def sensitivities(
 
 
 def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
-    """Return derivatives by one key, except that of a passive walker's cost of transport (the sine of the slope)."""
+    """Return the derivatives with respect to one key, without cost of transport for a passive walker."""
+    # a passive walker's cost of transport is the sine of the slope
     omitted = () if drives_of(subject.config) else ("cost_of_transport",)
     names = [name for name in GAIT_QUANTITIES if name not in omitted]
     return subject.gradients(parameter_of(key, subject.config), names)

@@ -28,16 +28,16 @@ from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.footholds import UNEVEN
 
 FIRST_STEPS, LAST_STEPS = 200, 20
-"""Numbers of steps at the beginning and end of a walk of which every sample is stored."""
+"""Numbers of first and last steps of a walk for which every sample is stored."""
 MAX_BETWEEN = 50_000
-"""Maximum number of samples of the steps between, in addition to both sides of every heel strike."""
+"""Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
 STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
 OF_STEPS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
     "period_s": Label("s", "time from touch to touch"),
     "length_m": Label("m", "distance along the slope from touch to touch"),
     "touch_along_m": Label("m", "position of the touch along the slope from the first foothold"),
-    UNEVEN: Label("m", "height of the touch's foothold above the slope"),
+    UNEVEN: Label("m", "height above the slope of the foothold that is touched"),
     "knee_strike_time_s": Label("s", "time at which the swing leg's knee locked"),
     "slip_m": Label("m", "net material slip of the stance foot from its touch to its lift"),
     "rolling_m": Label("m", "rolling distance of the stance foot from its touch to its lift"),
@@ -102,9 +102,9 @@ def content_of_walk(
     progress: Progress,
     again: bool,
 ) -> Content:
-    """Walk, store samples (thinned for long walks), and repeat the walk for the numerical error.
+    """Walk, store samples (thinned for long walks), and repeat the walk to measure the numerical error.
 
-    walk     simulates with tolerances, optionally sampled, and returns a `WalkRecord` with `samples`
+    walk     called with tolerances and whether to sample; returns a `WalkRecord` with `samples`
     groups   returns the groups of a walk to store
     summary  returns the summary of a walk
     again    whether to repeat the walk, which takes two to three times as long as the walk itself
@@ -184,7 +184,7 @@ def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[st
 
 
 def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build the columns of a walk's steps: those common to both models, and those in `values`."""
+    """Build the columns of a walk's steps: the columns common to both models, and `values`."""
     common = {
         "period_s": walk.periods_s,
         "length_m": walk.lengths_m,

@@ -28,11 +28,11 @@ SEAL_BYTES = 83
 
 
 NESTED = ("config_slice", "input_keys", "library_versions", "input_digests")
-"""Fields of an identity and a provenance that are stored as JSON."""
+"""Fields of `Identity` and `Provenance` that are stored as JSON."""
 ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Provenance))) | {
     "title", "Conventions", "stage_key", "summary_json", "summary_timed", "content_digest", "complete"
 }  # fmt: skip
-"""Attributes at the root of every artifact; a content with arrays at the root may add others."""
+"""Attributes at the root of every artifact; content with arrays at the root may add others."""
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
@@ -54,7 +54,7 @@ class Stored(Content):
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on whether a file is the artifact of a key."""
+    """Verdict on whether a file is the artifact with a given key."""
 
     accepted: bool
     reason: str  # reason for rejecting it; empty if accepted
@@ -92,7 +92,7 @@ class InTurn:
 def write_in_turn(
     path: Path, content: InTurn, identity: Identity, provenance: Provenance, complete: bool = True
 ) -> None:
-    """Store a content as `write` does, but one variable at a time.
+    """Store content as `write` does, but one variable at a time.
 
     Raises StorageError if that fails; the old file is then intact.
     """
@@ -145,7 +145,7 @@ def read(path: Path) -> Stored:
 
 
 def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdict:
-    """Check that the file at `path` is intact and belongs to `key` and `stage`, if given; never raises."""
+    """Check that the file at `path` is intact and belongs to `key` and `stage`, if these are given; never raises."""
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):

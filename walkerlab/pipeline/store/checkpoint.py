@@ -16,7 +16,7 @@ Numbers = list[float]
 
 
 class Checkpoint:
-    """Numbers that the completed work units of one result computed, by name of the unit."""
+    """Numbers computed by the completed work units of one result, by name of the unit."""
 
     def __init__(self, path: Path | None, key: str) -> None:
         """Resume from the journal at `path` if its key matches; otherwise start over with the first unit.

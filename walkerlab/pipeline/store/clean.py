@@ -18,7 +18,7 @@ COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
-    """Return existing files: artifacts of these stages, files listed in them, and leftovers of killed writers."""
+    """Return the existing files of a run: results of these stages, drawings, sweeps and leftovers of killed writers."""
     files = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
     inside = folder.path.resolve()
     for stage in stages:
@@ -30,7 +30,7 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
-    """Return the run that a file belongs to, as a result, listed file or record; None for the user's own files."""
+    """Return the run that a result, drawing or record belongs to; None for the user's own files."""
     resolved = path.resolve()
     for place in (resolved.parent, resolved.parent.parent):
         folder = RunFolder.at(place)

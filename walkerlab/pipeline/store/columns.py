@@ -12,7 +12,7 @@ from walkerlab.pipeline.store.content import Group, Variable
 
 
 def labelled(values: ArrayLike, label: Label, *dims: str, gaps: bool = False) -> Variable:
-    """Build a variable from values of many rows; the label's own dimensions come last."""
+    """Build a variable from values with dimensions `dims`, followed by those of the label."""
     return Variable(np.asarray(values), (*dims, *label.dims), label.unit, label.text, label.timing, gaps)
 
 
@@ -36,7 +36,7 @@ def column(values: Sequence[Any], label: Label, dim: str) -> Variable:
 
 
 def numbered(count: int, dim: str, text: str) -> dict[str, Variable]:
-    """Build the coordinate 0, 1, 2, ... of a dimension."""
+    """Build the coordinate 0, 1, 2, ... for a dimension."""
     return {dim: Variable(np.arange(count), (dim,), "1", text)}
 
 

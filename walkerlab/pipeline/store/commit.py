@@ -16,7 +16,7 @@ SHIPPED = ("walkerlab", "configs")
 
 def commit_of_checkout(root: Path) -> str | None:
     """Return the commit of a source tree, with '-dirty' if its package files changed; None outside a git checkout."""
-    # only the package's own repository: an environment may lie inside another checkout
+    # look only at the package's own repository: its environment may lie inside another checkout
     if not (root / ".git").exists():
         return None
     commit = git(root, "rev-parse", "HEAD")

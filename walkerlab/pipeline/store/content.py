@@ -143,7 +143,7 @@ class Content:
 
 
 class Digest:
-    """Digest of a content; the content is added group by group and variable by variable, ordered by name."""
+    """Digest of content that is added group by group and variable by variable, in order of names."""
 
     def __init__(self, summary: Mapping[str, Any], timed: tuple[str, ...]) -> None:
         self._sha256 = hashlib.sha256()

@@ -112,7 +112,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
-    """Raise OSError if the disk has no room for a new file of `size` bytes; the trial file is removed."""
+    """Raise OSError if the disk has no room for `size` bytes; tries this with a file that is removed afterwards."""
     with path.open("xb") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -136,7 +136,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        # `read` allocates the memory at once, so pass the actual size
+        # `read` allocates memory for the size that it is given, so pass the actual size
         return file.read(status.st_size)
 
 

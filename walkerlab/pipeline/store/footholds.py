@@ -7,12 +7,12 @@ from walkerlab.pipeline.store.content import Group
 
 Array = NDArray[np.float64]
 
-UNEVEN = "foothold_height_m"  # variable that is stored for each step on uneven ground
+UNEVEN = "foothold_height_m"  # name of the variable with the foothold heights, stored only on uneven ground
 FAR = 1e6  # m; the first level begins this far behind the first foothold, outside any drawing
 
 
 def ground_levels(steps: Group) -> tuple[Array, Array] | None:
-    """Return where each level of a walk's ground begins along the slope, midway between footholds, and its height (m).
+    """Return the start along the slope and the height (m) of each ground level; levels meet midway between footholds.
 
     steps  stored group of the walk's steps
 

@@ -1,4 +1,4 @@
-"""Conversion of contents to and from the bytes of an HDF5 file that xarray opens."""
+"""Conversion of content to and from the bytes of HDF5 files that xarray can open."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
@@ -121,7 +121,7 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
 
 
 class Budget:
-    """Bytes that the contents of a file may still declare, given its size."""
+    """Number of bytes that the datasets not yet read may declare; a file may not declare more than it holds."""
 
     def __init__(self, size: int) -> None:
         """Start with the size of the file, in bytes."""
@@ -162,7 +162,7 @@ def is_bare_dimension(dataset: Any) -> bool:
 
 
 def names_of(members: Mapping[str, Any]) -> dict[int, str]:
-    """Map addresses to names, since HDF5 would search the whole file for the name of a referenced scale."""
+    """Map members' addresses to their names, since HDF5 would search the whole file for the name of a scale."""
     return {h5py.h5o.get_info(member.id).addr: name for name, member in members.items()}
 
 
@@ -201,7 +201,7 @@ def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """Read the strings of a dataset, a few at a time: many may point to one long text."""
+    """Read the strings of a dataset, a few at a time, so that the budget stops many references to one long string."""
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
     values = np.empty(dataset.shape, dtype=object)
@@ -229,7 +229,7 @@ def read_attributes(holder: Any) -> dict[str, Attribute]:
 
 
 def read_text(holder: Any, name: str, default: str | None = None) -> str:
-    """Read a text attribute; `default` if it is absent."""
+    """Read a text attribute; return `default` if it is absent."""
     if default is not None and name not in holder.attrs:
         return default
     value = holder.attrs[name]

@@ -20,7 +20,7 @@ RECORD_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Record:
-    """Record of the run whose results a folder holds; results taken over from another run name that run instead."""
+    """Record of a folder's run and config, since results taken over from another run hold the config of that run."""
 
     run: str  # name of the folder when the record was written
     source: str  # origin of the config, as in `RunFolder`
@@ -92,7 +92,7 @@ class RunFolder:
 
         Creates the folder if needed and removes leftovers of killed writers.
 
-        wait  whether to wait for another process, after a call of `say` with a message
+        wait  whether to wait for another process; `say` is then called with a message
 
         Raises LockedError if another process holds the lock and `wait` is false, StorageError if the folder or
         the lock file cannot be created.

@@ -72,7 +72,7 @@ def compute_point(config: Config, key: str, graph: str, target: str, again: bool
 
     key     stage key of the point's result
     graph   import path of the pipeline, module:NAME
-    again   whether to repeat its walk for the numerical error
+    again   whether to repeat its walk to measure the numerical error
     forced  identifies a sweep that reuses no earlier result; empty for other sweeps
     """
     memory = memory_for(graph, forced)
@@ -89,7 +89,7 @@ def compute_point(config: Config, key: str, graph: str, target: str, again: bool
 
 
 def join_points(points: Sequence[tuple[Chunk, float]]) -> Chunk:
-    """Join chunks of one point each, adding their run times (s)."""
+    """Join chunks of one point each, and record each point's run time (s)."""
     rows = tuple(replace(row, wall_s=wall_s) for point, wall_s in points for row in point.rows)
     return Chunk(rows, {name: label for point, _ in points for name, label in point.labels.items()})
 
@@ -103,7 +103,7 @@ def chunk_of(key: str, answer: Content) -> Chunk:
 
 
 def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Flatten a summary to numbers, texts and lists of numbers with dotted names, such as `dissipated_J.friction`."""
+    """Flatten a summary to numbers, strings and lists of numbers with dotted names, such as `dissipated_J.friction`."""
     flat: dict[str, Any] = {}
 
     def take(name: str, value: Any) -> None:
@@ -166,9 +166,9 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
 def stored_chunks(
     runs_dir: Path, stage: str, code_digest: str, keys: Mapping[str, Any], warn: Callable[[str], None]
 ) -> Iterator[Chunk]:
-    """Iterate over a stage's stored results that the present code computed, in all run folders.
+    """Iterate over a stage's results that the present code has computed and stored, in all run folders.
 
-    keys  stage keys of the sweep; a single run's result is included if its key is among them, chunks always are
+    keys  stage keys of the sweep; chunks are all included, results of single runs only if their keys match
     warn  called with a message about each damaged chunk
     """
     for path in sorted(runs_dir.glob(f"*/{FOLDER}/{stage}-{code_digest[:8]}-*.h5")):

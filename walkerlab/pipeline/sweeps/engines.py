@@ -43,12 +43,12 @@ class Pool:
 class SweepEngine:
     """Engine that computes the chunks of a sweep."""
 
-    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]  # gives a pool and closes it
+    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]  # opens a pool and closes it afterwards
     chunk_s: float  # target duration of a chunk, s: long compared with the engine's overhead
 
     @contextlib.contextmanager
     def start_early(self, order: Order) -> Iterator[SweepEngine]:
-        """Give the engine for one sweep; its local workers import their modules while the points are prepared."""
+        """Give the engine for one sweep; local workers start now and import modules while the points are prepared."""
         if self.opened is not local:
             yield self
             return

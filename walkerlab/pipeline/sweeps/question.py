@@ -38,7 +38,7 @@ class Axis:
     key: str  # dotted config key
     values: tuple[Value, ...]  # values in order; for a list of points, one per point
     source: str  # origin of the values, for messages
-    ends: tuple[float, float] | None = None  # bounds of an interval to sample; None if the values are given
+    ends: tuple[float, float] | None = None  # bounds of the range, for sampling; None for a list of values
 
     def setting(self, index: int) -> ConfigSetting:
         """Return one value as a `--set` option."""
@@ -95,7 +95,7 @@ class SweptStage:
 
 
 def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
-    """Return the shortest endings of dotted keys that distinguish them."""
+    """Return the shortest suffix of each dotted key that distinguishes it from the others."""
     shortest = []
     for key in keys:
         parts = key.split(".")
@@ -170,7 +170,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
 
 
 def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
-    """Build the error for an invalid parameter, option or key; `source` names it instead of a position in a file."""
+    """Build the error for an invalid parameter, option or key; its message gives `source`, not a file position."""
     return problem_error(Position(source, 0, 0), text, allowed, near)
 
 
@@ -210,7 +210,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
 
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
-    """Convert whole numbers to integers for an integer key; the schema rejects all others."""
+    """Convert whole numbers to int if the key takes integers; the schema rejects other numbers."""
     field = key_fields().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
@@ -262,7 +262,7 @@ def values_at(axis: Axis, column: Any) -> Iterator[Value]:
 
 
 def described(config: Config, key: str) -> tuple[str, str]:
-    """Return unit and meaning of a key; a unit that depends on the config is the one in this config."""
+    """Return the unit of a key under a config (units may depend on it), and the meaning of the key."""
     *above, last = key.split(".")
     block = value_at(config, above)
     # the config may have a block of another type than the schema's default, with other keys

@@ -31,11 +31,11 @@ OWN: Final = {
 """Columns that every point has in addition to the stage's quantities."""
 STATES: Final = ("state", "start_state", "final_state")
 TEXT_BYTES: Final = 6
-"""Size of a short text in a file, relative to the size of its pointer in memory."""
+"""Size of a short string in a file, relative to the size of its pointer in memory."""
 
 
 class SweepVariable:
-    """Column of sweep results: a number, a list of numbers or a text for each of `size` results."""
+    """Column of sweep results: a number, a list of numbers or a string for each of `size` results."""
 
     def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
         """Start with gaps only; `shape` is the shape of one value."""
@@ -44,9 +44,9 @@ class SweepVariable:
         self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
 
     def put(self, places: Integers, values: Sequence[Any]) -> None:
-        """Store values at some places; the column grows to fit a value of a larger shape."""
+        """Store values at these indices; the column grows if a value has a larger shape."""
         if self.text:
-            # equal texts share one object
+            # equal strings share one object, to save memory
             self.values[places] = [sys.intern(value) for value in values]
             return
         try:
@@ -56,7 +56,7 @@ class SweepVariable:
                 self.put(places[k : k + 1], [value])
             return
         if array.ndim != self.values.ndim:
-            return  # a list where others have a number cannot be stored
+            return  # a list where other points have a number cannot be stored
         self.kinds.update(types_in(values) if array.dtype.kind == "i" else {array.dtype.type})
         shape = tuple(max(old, new) for old, new in zip(self.values.shape[1:], array.shape[1:], strict=True))
         if shape != self.values.shape[1:]:
@@ -128,7 +128,7 @@ class Merge:
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
     def content(self) -> InTurn:
-        """Return the content to store; call it once."""
+        """Return the content to store; call it only once, because storing the content removes the columns."""
         question = self.question
         parameters = dict(coordinates(question, self.config))
         statuses = self.columns["status"].values[self.inverse]

@@ -47,7 +47,7 @@ class SweepWork:
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
     graph: str = PIPELINE_AT  # import path of the pipeline, module:NAME
-    # called with the names of all quantities so far after each chunk that has an answer; may raise
+    # called after each chunk with an answer, with the names of all quantities so far; may raise an error
     check: Callable[[Collection[str]], None] = lambda _names: None
 
 
@@ -60,7 +60,7 @@ class Swept:
     summary: Mapping[str, Any]  # summary stored in the file
     reused: int  # number of points whose result existed
     wall_s: float  # total time
-    bugs: tuple[str, ...] = ()  # tracebacks of bugs that stopped points
+    bugs: tuple[str, ...] = ()  # tracebacks of bugs that stopped the computation of points
 
     @property
     def content(self) -> Content:
@@ -259,7 +259,7 @@ class SweepRun:
         return tuple(bugs.values())
 
     def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
-        """Iterate over the points to compute; a sample of their walks is repeated for the numerical error."""
+        """Iterate over the points to compute; a sample of their walks is repeated to measure the numerical error."""
         stage, forced = self.question.stage, token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
