@@ -63,7 +63,7 @@ WALK_LABELS = {
     "numerical_time": Label(
         "s", "change of the last touch at a hundred times tighter tolerance", name="numerical_time_s"
     ),
-    "evaluations": Label("1", "right-hand sides of the walk", name="rhs_evaluations"),
+    "evaluations": Label("1", "number of right-hand-side evaluations in the walk", name="rhs_evaluations"),
     "wall_s": Label("s", "processor time of the walk", timing=True),
 }
 

@@ -68,7 +68,10 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
             findings.add(measured)
             progress.advance()
     if not findings.truths:
-        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start closer to a gait (start: fixed-point).")
+        raise NoAnswer(
+            "engines: under ADAMS's contact law, the walk ends too early in every scene",
+            "Start closer to a gait (start: fixed-point).",
+        )
     return make_content(findings, rigid)
 
 
