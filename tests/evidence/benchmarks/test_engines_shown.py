@@ -79,7 +79,7 @@ def test_a_panel_without_a_finished_walk_says_so():
 
 
 def test_captions_say_what_was_concluded_and_what_did_not_walk(results):
-    assert "this multiple of walkerlab's run time" in ERRORS.caption(results)
+    assert "Run time for an error of" in ERRORS.caption(results)
     assert "Incomplete walks: mujoco soft at 0.0005 s" in PERIODS.caption(results)
 
 

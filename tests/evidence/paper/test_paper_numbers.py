@@ -326,5 +326,5 @@ def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
 
 def test_no_step_is_not_called_a_step_of_no_length(rows):
     row = next(row for printed, row in rows(models={}, step_length=None).items() if printed == STEP_LENGTH)
-    assert "no model has a step" in row.evidence
+    assert "No model takes a step" in row.evidence
     assert "times the printed length" not in row.evidence

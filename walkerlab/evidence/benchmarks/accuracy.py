@@ -31,7 +31,7 @@ from walkerlab.scene.rigid import rigid_walker
 
 ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_TRIAL_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
-SLOW_CONTACT_STEPS = 4  # for walkers other than the compass, whose right-hand side takes several times as long
+SLOW_CONTACT_STEPS = 4  # steps of walkers other than the compass; their right-hand sides take several times as long
 OMISSIONS_OFF_COMPASS = (
     {"what": "accuracy of the scene contact-near-rigid", "why": "only the compass has it", "saves": "a minute"},
     {"what": "libraries' longest runs on the contact model", "why": "they run in Python", "saves": "minutes"},

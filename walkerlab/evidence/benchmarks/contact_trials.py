@@ -18,7 +18,7 @@ def contact_trial(config: ContactConfig, state: State, length_m: float, steps: i
 
 
 def near_rigid_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
-    """Set up a walk on much stiffer ground that creeps less, which is harder for integrators."""
+    """Set up a walk that is harder to integrate: on much stiffer ground with less creep."""
     trial = contact_trial(config, state, length_m, steps)
     law, friction = trial.walker.normal, trial.walker.friction.with_creep(CREEP_FACTOR)
     normal = law._replace(stiffness=STIFFNESS_FACTOR * law.stiffness, damping=STIFFNESS_FACTOR * law.damping)

@@ -35,7 +35,7 @@ class Reference:
 
     @property
     def from_outside(self) -> bool:
-        """Whether the first end is independent of this project's solvers, event search and equations."""
+        """Whether the first end state is independent of this project's solvers, event search and equations."""
         return self.first.method == taylor_reference.TAYLOR_METHOD
 
     @property

@@ -20,7 +20,7 @@ def is_installed() -> bool:
 
 
 def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats | None:
-    """Return the state after `steps` heel strikes; None if one does not occur."""
+    """Return the state after `steps` heel strikes, or None if one of them does not occur."""
     limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
     passing, striking = integrators(walker)
     state = np.array(start)

@@ -228,7 +228,9 @@ def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapp
             rows_with_value = [row for row, value in enumerate(values) if value is not None]
             if rows_with_value:
                 dim = f"{name}_{ROW}"
-                variables[dim] = Variable(np.array(rows_with_value), (dim,), "1", f"rows with a number: {meaning}")
+                variables[dim] = Variable(
+                    np.array(rows_with_value), (dim,), "1", f"indices of the rows that have a value: {meaning}"
+                )
                 variables[name] = Variable(
                     np.array([values[row] for row in rows_with_value], float), (dim,), unit, meaning
                 )

@@ -32,7 +32,7 @@ def times_of_steps(walk: Content, name: str) -> comparison.Array:
 
 
 def motion_of(walk: Content) -> comparison.Motion | None:
-    """Return the motion of the legs in a stored walk; None if states were not stored or the walk ended at once."""
+    """Return the motion of the legs in a stored walk; None if states were not stored or the walk ended immediately."""
     angle = stored_variable(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
         return None
@@ -46,14 +46,14 @@ def motion_of(walk: Content) -> comparison.Motion | None:
 class Comparison:
     """Difference between the walks of both models."""
 
-    errors: Errors  # differences by alignment, where there is something to compare
+    errors: Errors  # differences by alignment; alignments that cannot be compared are absent
     orbit: list[float] | None = None  # distance between the orbits of each leg; None without a complete stride
     groups: Mapping[str, Group] = field(default_factory=dict)
     left_out: tuple[dict[str, str], ...] = ()  # omitted comparisons, with reasons
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Largest errors of both legs by alignment; None where there is nothing to compare."""
+        """Largest errors of both legs by alignment; None for an alignment without a comparison."""
         errors: dict[str, Any] = {}
         for name, quantity in QUANTITY_KEYS.items():
             per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in ALIGNMENTS}

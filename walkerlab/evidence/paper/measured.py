@@ -22,7 +22,7 @@ ENERGY_STEPS = 5  # steps over which the paper averages the energy
 
 @dataclass(frozen=True)
 class Characteristics:
-    """Quantities of Table 3, SI units; None where the walk or its record is too short."""
+    """Quantities of Table 3, SI units; None if the walk or its record is too short."""
 
     t_left: float | None  # period of the first step of the last completed stride
     t_right: float | None  # period of the second step of that stride

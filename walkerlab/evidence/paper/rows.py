@@ -25,14 +25,14 @@ class NumberVerdict(StrEnum):
 
     INPUT = "input"  # used as given
     REPRODUCED = "reproduced"  # agrees to the printed digits
-    EXPLAINED = "explained"  # does not agree, for a measured reason or because the scene is another
+    EXPLAINED = "explained"  # does not agree, for a measured reason or because the scene is not the paper's
     CONTRADICTED = "contradicted"  # contradicted by other values of the paper; overrides all other verdicts
     NOT_REPRODUCED = "not-reproduced"  # does not agree; includes values of ADAMS, which was not run
 
 
 @dataclass(frozen=True)
 class JudgedNumber:
-    """Printed number and the measured ones, in the printed unit; None where a model has no such value."""
+    """Printed value and the models' values, in the printed unit; None if a model has no such value."""
 
     where: str
     quantity: str
@@ -241,7 +241,7 @@ def verdict_if(agrees: bool) -> NumberVerdict:
 
 
 Table = dict[str, dict[str, Any]]
-"""Rows by name, each with its values by column; None where a model has no such value."""
+"""Rows by name, each with its values by column; None if a model has no such value."""
 
 MIDDLE = "section 2: 'in the middle of the legs'"
 
@@ -267,7 +267,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 
 def table_2(measured: Measured) -> Table:
-    """Return the initial values, with their differences in percent of either column."""
+    """Return the initial values, with their differences as percentages of either column."""
     table, start = {}, measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.STATE_NAMES, printed.TABLE_2, strict=True)):
         states = {name: model.state[place] for name, model in measured.models.items()}

@@ -34,7 +34,7 @@ class PaperStudy:
     corrected: measured.RigidMeasurements
     # Table 3 for five gait cycles from the printed x_p, with the equations as printed
     from_x_p: measured.Characteristics
-    five_steps_energy: float  # J, time mean of the energy over the first five of these ten steps
+    five_steps_energy: float  # J, time mean of the energy over the first five of the ten steps of `from_x_p`
     fastest: float  # rad/s, largest angular velocity of the gait as printed
     largest_jump: float  # rad/s, largest change of an angular velocity at its heel strike
     swing_foot_height: float  # m, height above the slope at which (A.55) as printed places the swing foot of x_p
@@ -82,7 +82,7 @@ def settle(walker: RigidWalker) -> State:
 
 
 def kinetic_energy_by_order(walker: RigidWalker) -> dict[str, float]:
-    """Return kinetic energies (J) at x_p with a moving foot: of the masses, and by D_e with angles or foot first."""
+    """Return the kinetic energy (J) at x_p with a moving foot: from masses, and from D_e with angles or foot first."""
     theta_1, theta_2, omega_1, omega_2 = printed.fixed_point_as_printed()
     D = inertia_at_impact(walker, theta_1, theta_2)
     angles_first = np.array([omega_1, omega_2, *FOOT_VELOCITY])

@@ -67,7 +67,7 @@ WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengt
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Adjust the start; the result may be that none walks. Raises NoAnswer if the pads need a gait that is missing."""
+    """Adjust the start; possibly no start walks. Raises NoAnswer if the pads need a gait that does not exist."""
     rigid_step, rigid_state = rigid_start(config, inputs)
     rigid_gait = inputs["fixedpoint"].summary  # gait of the rigid model; the start may be far from it
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
@@ -223,7 +223,7 @@ def papers_start(paper: AdamsWalk) -> dict[str, Any]:
 
 
 def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
-    """Tabulate the start before and after adjustment, percentages and, for the paper's compass, the printed values."""
+    """Tabulate the start before and after adjustment, its change and, for the paper's compass, the printed values."""
     rows, adjusted = {}, tune.adjusted_state
     for k, (name, value) in enumerate(zip(tune.names, tune.rigid_state, strict=True)):
         row: dict[str, Any] = {"unit": "rad" if k < len(tune.names) // 2 else "rad/s"}

@@ -34,7 +34,7 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.scene.contact import SAMPLES_PER_PENDULUM_TIME, ContactScene, apply_drives, knee_rules, start_state
 from walkerlab.scene.parts import assembly_of
 
-SAMPLING_FACTOR = 4  # times as many samples as contact-sim, so that interpolation errors stay far below the model error
+SAMPLING_FACTOR = 4  # factor on contact-sim's sampling rate; keeps interpolation errors far below the model error
 COMPASS_SERIES = STICTION_SERIES, STIFFNESS_SERIES, DAMPING_SERIES, NORMAL_SERIES
 GAIT_SERIES = STICTION_SERIES, NORMAL_SERIES
 COARSE_STRIDE = 3  # use every third setting for walkers that are slower to simulate than the compass
@@ -63,16 +63,16 @@ WALK_LABELS = {
     "numerical_time": Label(
         "s", "change of the last touch at a hundred times tighter tolerance", name="numerical_time_s"
     ),
-    "evaluations": Label("1", "right-hand sides of the walk", name="rhs_evaluations"),
+    "evaluations": Label("1", "number of right-hand-side evaluations in the walk", name="rhs_evaluations"),
     "wall_s": Label("s", "processor time of the walk", timing=True),
 }
 
 
 @dataclass(frozen=True)
 class LimitFindings:
-    """Distances from the rigid limit by series, and the limit without creep."""
+    """Gaits (and walks) of each series, compared with those of the rigid model, and the limit without creep."""
 
-    walk_series: tuple[str, ...]  # series in which whole walks are compared, too
+    walk_series: tuple[str, ...]  # series in which whole walks are compared as well as gaits
     rigid_period: float  # s, period of the rigid gait
     contact_period: float  # s, period of the contact gait
     series: dict[str, list[Distance]]
@@ -181,7 +181,7 @@ def causes(findings: LimitFindings) -> dict[str, Any]:
 
 
 def limit_groups(findings: LimitFindings) -> dict[str, Group]:
-    """Build one group per series: its settings and distances, including whole walks where they are compared."""
+    """Build one group per series: each setting, and how its gait and (if compared) walk differ from the rigid ones."""
     groups = {}
     for name, rows in findings.series.items():
         complete = [distance for distance in rows if distance.angle is not None and name in findings.walk_series]

@@ -1,4 +1,4 @@
-"""Catalogues of extreme cases: one of the paper's compass, and one of variations of any scene.
+"""Catalogues of extreme cases: one for the paper's compass, and one of variations of any scene.
 
 The variations change the ground, the slope, the start, the knees or the solver's settings.
 """
@@ -46,7 +46,7 @@ def read_catalogue(path: Path) -> Any:
 
 
 def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
-    """Return a catalogue's cases (default: the package's), then a config's; raises ConfigError if names repeat."""
+    """Return a catalogue's cases (default: the package's), then a config's; raises ConfigError if two share a name."""
     catalogue = package_cases() if catalogue is None else catalogue
     shared = {case.name for case in catalogue} & {case.name for case in own}
     if shared:
@@ -69,7 +69,7 @@ def config_of(case: Case) -> Config:
 
 
 def scene_cases(config: Config) -> list[tuple[Case, Config]]:
-    """Return a scene's cases with their configs: for the rigid model and, if it has contact, the contact model.
+    """Return a scene's cases with their configs: for the rigid model and, if the scene has contact, the contact model.
 
     config  the scene, with a numeric start and, on pads, a numeric pad pitch
     """

@@ -1,4 +1,4 @@
-"""Judgement of cases. Each is walked again at a ten times tighter tolerance, by another method and as a scaled twin."""
+"""Judgement of cases; walks are repeated at a ten times tighter tolerance, by another method and as scaled twins."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +21,7 @@ from walkerlab.pipeline.workers import in_order
 TIGHTER_FACTOR = 0.1
 SAMPLED_STEPS = 100  # walks of more steps are not sampled
 LIBRARY_METHODS: Final = ("scipy-bdf", "scipy-radau")
-"""Tried if our own other method fails. The multistep method comes first, because both of ours are one-step methods."""
+"""Libraries' methods, tried if our own fail; the multistep method comes first, because ours are one-step methods."""
 LIBRARY_BUDGET: Final = 30_000  # right-hand sides; small, because the libraries' solvers run in Python
 
 
@@ -48,7 +48,7 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile; the others start by falling budget."""
+    """Yield results in case order. One case per model runs first, to compile; then the largest budgets start first."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)

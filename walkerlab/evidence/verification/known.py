@@ -47,7 +47,7 @@ PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 
 @dataclass(frozen=True)
 class ParticleRun:
-    """Sampled trajectory of the first body."""
+    """Result of a rig's run: samples, end state and dissipated energy."""
 
     times: Floats  # (samples,) s
     states: Floats  # (samples, 8) states of both bodies
@@ -63,7 +63,7 @@ def rig(
     feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
     slope: float = 0.0,
 ) -> ContactWalker:
-    """Build a walker that acts as one rigid body; `feet`: its point feet, relative to its centre of mass (m).
+    """Build a walker that acts as one rigid body; `feet`: its point feet (m from its centre of mass).
 
     The idle second body is hinged at the centre of mass and has the same inertia but no mass.
     """
@@ -190,7 +190,7 @@ ROUNDS = 14
 def rimless_wheel_speed() -> float:
     """Return the angular speed (rad/s) of a steadily rolling wheel when a spoke is normal to the slope.
 
-    A run models two spokes, from one being normal to the slope to the other; the next run starts with its final speed.
+    A run models two spokes and turns the wheel from one to the other; the next run starts with its final speed.
     """
     turn = 2.0 * math.pi / SPOKES
     ahead = (math.sin(turn), -math.cos(turn))
@@ -209,7 +209,7 @@ ROD_ANGLE, ROD_FRICTION, ROD_STIFFNESS = 1.0, 4.0, 1.0e8
 
 
 def painleve_growth_rate() -> float:
-    """Compute the rate s (1/s) at which the end of a sliding rod digs in, from evenly spaced penetrations d.
+    """Compute the rate s (1/s) at which the end of a sliding rod digs in, from penetrations d at equal time intervals.
 
     For d = a + b cosh(s t), the differences D of d over a time tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
     """

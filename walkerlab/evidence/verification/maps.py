@@ -59,8 +59,8 @@ def prepare_on_ground(
 def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
     """Walk with the default method at one stiffness and stiction velocity.
 
-    Returns the outcome, the step count, the outcome at a ten times tighter tolerance, the difference of both walks in
-    legs, radians and pendulum times (`ERROR_MISSING` if outcome or step count differ), and the right-hand sides.
+    Returns the outcome, the step count, the outcome at a ten times tighter tolerance, the difference of both walks (in
+    leg lengths, rad, pendulum times; `ERROR_MISSING` if outcome or step count differ), and the right-hand sides.
     """
     case, config, start = prepare_on_ground(stiffness, stiction_velocity, WALK_STEPS, CELL_BUDGET)
     walk = again = start.walk(case, case_tolerances(start, case))
@@ -78,7 +78,7 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
     """Walk two steps at one stiffness by semi-implicit Euler with each step size (s); compare with a tight reference.
 
-    Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error in legs, radians, pendulum times.
+    Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error, in the units of `stiction_cell`.
     """
     case, config, start = prepare_on_ground(stiffness, None, COMPARED_STEPS, REFERENCE_CELL_BUDGET)
     walk = start.walk(case, Tolerances(*REFERENCE_SETTINGS, case.budget))

@@ -60,7 +60,7 @@ class Moving:
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
 
     def about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
-        """Return the angular momentum about a point (kg m^2/s), with weights for the masses and the bodies."""
+        """Return the angular momentum (kg m^2/s) about a point; `on_masses`, `on_bodies`: weights of their terms."""
         arm = self.place - point
         orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
         return float(on_masses @ orbital + on_bodies @ (self.inertia * self.rate))
@@ -70,7 +70,7 @@ class RigidMasses:
     """Momenta and energy of a walker in states of the rigid model, computed from its point masses."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
-        """Take levers from the centre of the stance foot's arc; slope in rad."""
+        """Measure levers from the centre of the stance foot's arc; slope in rad."""
         foot, trailing, hip = assembly.feet[STANCE], assembly.feet[SWING], find_hip(assembly)
         root = Anchor(foot.body, foot.centre_m)
         self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
@@ -93,8 +93,8 @@ class RigidMasses:
     def momenta(self, state: Floats, new: bool) -> tuple[float, float]:
         """Return the two angular momenta that a heel strike conserves (kg m^2/s).
 
-        The first is that of the walker about the new foothold; the second is that of the lifting leg, with its share of
-        coupled bodies, about the hip.
+        The first is the walker's about the new foothold; the second is the lifting leg's about the hip, including the
+        leg's share of coupled bodies.
 
         new  whether the state is after heel strike, with the roles of the legs exchanged
         """
@@ -115,7 +115,7 @@ class RigidMasses:
         return float(moving.contact[1] * along - moving.contact[0] * up)
 
     def momentum_change(self, before: Floats, after: Floats, push_off: float = 0.0) -> float:
-        """Return the largest relative change of conserved momenta; before, after: (strikes, 2 n), push_off: N s."""
+        """Return the largest relative change of the conserved momenta; before, after: (strikes, 2 n), push_off: N s."""
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
             momenta_before, momenta_after = (

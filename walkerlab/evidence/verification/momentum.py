@@ -1,8 +1,8 @@
 """Momentum balance on compliant ground: a walk's change of momentum compared with the impulse of ground and gravity.
 
 Momenta are computed from positions and velocities of the masses, not from the equations of motion. Impulses are
-integrated from the ground's forces at sampled states; sampling is refined until the integrals settle, since a touch
-lasts only milliseconds.
+integrated from forces at sampled states; sampling is refined until the integrals settle, because an impact lasts only
+milliseconds.
 """
 
 from dataclasses import dataclass
@@ -39,17 +39,14 @@ MAX_UNKNOWN: Final = 1e-3  # fraction of the walker's momentum; a balance with m
 class Balance:
     """Result of a momentum balance, in fractions of the walker's momentum."""
 
-    residual: float  # largest difference of momentum change and impulse, over time and components
-    unsure: float  # error bound of the integrated impulse
-    unresolved: float  # impulse of friction that depends on slip velocities below the tolerance
+    residual: float  # largest difference between momentum change and impulse, over time and components
+    unsure: float  # estimated error of the integrated impulse
+    unresolved: float  # error of the friction's impulse, since slip velocities are known only to the tolerance
     steps: int  # solver steps
 
 
 def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Measure | NotMeasured:
-    """Measure the momentum balance of a case's walk, or state why it cannot be judged.
-
-    The walk does not magnify the errors of single steps, because the balance holds along the computed path.
-    """
+    """Measure the momentum balance of a case's walk, or state why it cannot be judged."""
     if scene.pinned:
         return NotMeasured(MEASURE, "the hinge transmits forces as well")
     balance = momentum_balance(config, scene, start, case)
@@ -61,6 +58,7 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
         }
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
+    # step errors add up without growing, because the balance holds along the computed path: no factor MAGNIFIED
     limit = promised(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
     return Measure(MEASURE, finite(balance.residual), limit)
 
@@ -111,7 +109,7 @@ def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
 
 
 def impulse(times: Floats, rate: Floats) -> Floats:
-    """Integrate a rate (times, components) by Simpson's rule up to each interval's end: (ends, components)."""
+    """Integrate a rate (times, components) by Simpson's rule up to each interval's end; returns (ends, components)."""
     widths = np.diff(times[::2])[:, None]
     pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])
@@ -125,9 +123,9 @@ def unsettled(times: Floats, rate: Floats) -> Floats:
 
 
 def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConfig, touches: Floats) -> Floats:
-    """Return the force along and normal to the slope (N) and the torque about a point of the slope (N m): (times, 3).
+    """Return (times, 3): force along and normal to the slope (N), and torque about a point of the slope (N m).
 
-    It sums the ground, gravity and push-offs; push-offs start at the touch times, `touches` (steps,) in s.
+    Ground, gravity and push-offs contribute; push-offs start at the touch times, `touches` (steps,) in s.
     """
     along, height, normal, friction, _ = np.moveaxis(sample_feet(scene.walker, samples), 2, 0)
     slope = config.slope_rad
@@ -149,7 +147,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 
 
 def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
-    """Return the momentum along and normal to the slope (kg m/s) and about a point of it (kg m^2/s): (ends, 3)."""
+    """Return (ends, 3): momentum along and normal to the slope (kg m/s), and about a point of the slope (kg m^2/s)."""
     y = samples.states[::2]
     n, walker_masses = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
     rate = y[:, 4 + n :]

@@ -1,8 +1,8 @@
 """Ordinary methods on the same cases: SciPy at its default tolerances, and a game engine's method with fixed steps.
 
-A contact scene is one differential equation without events, as written by somebody unaware of switching points and pad
-edges. It is integrated up to the end of our own walk, which is recomputed at a tight tolerance for the comparison. A
-rigid scene is a user's script with an event function.
+A contact scene is one differential equation without events, as a user unaware of switching points and pad edges would
+write it. It is integrated up to the end of our own walk, which is recomputed at a tight tolerance for the comparison.
+A rigid scene is run by a user's script with an event function.
 """
 
 import time
@@ -34,8 +34,8 @@ from walkerlab.physics.solvers.stepping import BUDGET, COUNTS, RHS
 from walkerlab.physics.solvers.system import Floats
 
 MAX_ORDINARY_EVALUATIONS: Final = 20_000  # right-hand sides
-FINE_ERROR: Final = 1e-2  # largest error of a fine result, in legs, radians and pendulum times
-SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # tolerances of solve_ivp
+FINE_ERROR: Final = 1e-2  # largest error of a fine result, in leg lengths, rad and pendulum times
+SCIPY_DEFAULT: Final = (1e-3, 1e-6)  # default rtol and atol of solve_ivp
 DIVERGED_ERROR: Final = 10.0  # error above which a result has diverged, in the same units
 COMPARED_STEPS: Final = 2
 SCIPY_CHOICES: Final = ("RK45", "LSODA", "Radau")
@@ -63,7 +63,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     The result is empty for a walker other than a passive compass, for a case without a start or without motion, and for
     ground that needs events (a hinge, or `after-mid-swing`).
     """
-    # the locking of a knee is an event, and Appendix A describes no other walker
+    # knees need an event to lock, and the script for rigid scenes covers only the walker of Appendix A
     if not is_passive_compass(config):
         return ()
     short = case.model_copy(
@@ -98,7 +98,7 @@ class Arrival:
     units: Floats  # unit of each component of the state
 
     def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
-        """Judge a method by its end state y (None if it was not reached); count: right-hand sides."""
+        """Judge a method by its end state y (None if it was not reached); count: number of right-hand sides."""
         if y is None:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))
@@ -115,14 +115,14 @@ def arrival_of(case: str, walk: ContactWalkResult, units: Floats) -> Arrival:
 
 
 def natural_units(config: RigidConfig) -> Floats:
-    """Return the units of the state's components: legs and radians, and for rates these per pendulum time."""
+    """Return the units of the state's components: leg length and radian, divided by the pendulum time for rates."""
     lengths = np.array([config.walker.leg_length_m] * 2 + [1.0] * 2)
     return np.concatenate([lengths, lengths / pendulum_time(config)])
 
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Suppress the libraries' warnings, and the exceptions by which they give up."""
+    """Suppress the libraries' warnings, and the exceptions with which they give up."""
     with (
         warnings.catch_warnings(),
         np.errstate(all="ignore"),

@@ -43,7 +43,7 @@ def restitution(mass: float, speed: float, law: tuple[float, float, float, float
 
 
 def creep_speed(slope: float, static: float, stiction_velocity: float) -> float:
-    """Return the slip velocity (m/s) at which the cubic friction law holds a block on a slope (rad)."""
+    """Return the slip velocity (m/s) at which the cubic friction law balances a block's weight along a slope (rad)."""
     from scipy.optimize import brentq
 
     def excess(slip: float) -> float:

@@ -44,7 +44,7 @@ def section(results: Results, summary: Row) -> Section | None:
 
 
 def finding(summary: Row) -> str:
-    """State how many cases ended as expected, and how many of these have no answer."""
+    """State how many cases ended as expected, and how many of those were expected to end without an answer."""
     return words("stability.finding", summary, len([row for row in summary["cases"] if row["ok"] and gave_up(row)]))
 
 

@@ -25,14 +25,14 @@ from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker
 
 CENTRE_HEIGHT = 1  # index of the height of the centre of mass in the free walker's state
-STRIKE_TOLERANCE = 1e-9  # largest relative error of the quantities that must hold at a heel strike
+STRIKE_TOLERANCE = 1e-9  # largest relative error of the conditions at a heel strike
 SAMPLE_RATE = 40  # samples per pendulum time
-REGAIN_TOLERANCE = 1e-3  # fraction of the allowed residual; quadrature errors may lower the dissipated energy by this
+REGAIN_TOLERANCE = 1e-3  # fraction of the allowed residual by which quadrature errors may lower the dissipated energy
 
 
 @dataclass(frozen=True)
 class JudgedWalk:
-    """A walk in either model to be judged; times are in pendulum times of its walker.
+    """Walk to be judged, in either model; times are in units of the walker's pendulum time.
 
     end         end time; None in the rigid model, whose walks end at a heel strike
     residual_J  residual of the energy balance or, in the rigid model without springs, energy drift within a swing
@@ -53,7 +53,7 @@ class JudgedWalk:
 class CaseStart:
     """A walker in the initial state of a case."""
 
-    residual_name: ClassVar[str]  # name of the residual
+    residual_name: ClassVar[str]  # description of `JudgedWalk.residual_J`
     config: WalksConfig
     start: State
     energy: float  # J, m g L plus kinetic and stored energy at the start; the scale of residuals
@@ -65,7 +65,7 @@ class RigidStart(CaseStart):
     walker: RigidModel
 
     def again(self, case: Case) -> Case:
-        """Shorten a repeated walk to the steps whose times are compared."""
+        """Return the case for a repeated walk, with only the steps whose times are compared."""
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
@@ -102,7 +102,7 @@ class ContactStart(CaseStart):
     scene: ContactScene
 
     def again(self, case: Case) -> Case:
-        """Repeat the whole walk, since outcomes are compared too."""
+        """Return the case unchanged, because the outcomes of complete walks are compared as well."""
         return case
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
@@ -124,7 +124,7 @@ class ContactStart(CaseStart):
         return [Measure("energy regained from friction and damping", back, REGAIN_TOLERANCE * case.balance)]
 
     def momentum(self, walk: JudgedWalk, case: Case) -> Measure | NotMeasured:
-        """Measure the momentum balance, if the walk has an answer and a duration."""
+        """Measure the momentum balance, unless the walk has no answer or no duration."""
         if not walk.outcome.answered or walk.record.end_time_s <= 0.0:
             return NotMeasured(MEASURE, f"the walk ended as {walk.outcome.label}")
         return momentum_finding(self.config, self.scene, self.start, case)

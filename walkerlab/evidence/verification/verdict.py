@@ -15,7 +15,7 @@ MAGNIFIED: Final = 10.0  # factor by which a walk may magnify the errors of its 
 
 @dataclass(frozen=True)
 class Measure:
-    """An independent, dimensionless measure of a walk."""
+    """Dimensionless measure of a walk's correctness or cost, with its largest acceptable value."""
 
     measure: str
     value: float

@@ -17,7 +17,7 @@ Forces = Callable[[float, Floats, Floats], Floats]
 class Integrator:
     """Properties of an engine's integrator."""
 
-    order: int  # nominal order
+    order: int  # nominal order of convergence
     most_steps: int  # step budget of a run
     adapts: bool = False  # whether the step size follows a tolerance
     for_contact_only: bool = False  # whether it differs from another integrator only on the engine's own contact
@@ -32,7 +32,7 @@ class OwnContact:
 
 
 OnStep = Callable[[float, Floats, Floats], bool]
-"""Called with time (s), coordinates and velocities after every step of an engine; returns whether to continue."""
+"""Function called after every engine step with time (s), coordinates and velocities; returns whether to continue."""
 
 
 @dataclass(frozen=True)

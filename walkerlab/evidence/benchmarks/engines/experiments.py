@@ -1,6 +1,6 @@
-"""Three experiments in other engines, each compared with our own solution: same law, own law and no contact.
+"""Experiments in other engines, each compared with our own solution: same law, own law, and a swing without contact.
 
-Same law: our contact law in the engine's integrators. Own law: the engine's own contact model.
+Under the same law, an engine integrates our contact forces; under its own law, it computes contact by its own model.
 """
 
 import math
@@ -42,7 +42,7 @@ SWING_S = 0.48
 RUN_TIMEOUT_S = 120.0  # time limit of a run, after which its process is killed
 OUR_METHOD = "radau5"
 OUR_LADDER = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-ADAMS_RTOL = 1e-7  # relative tolerance of our walk under ADAMS's law, with which engines' own contact is compared
+ADAMS_RTOL = 1e-7  # relative tolerance of our walk for comparison with engines' own contact
 REFERENCES = (("radau5", 1e-11), ("dop853", 1e-12))
 UNLIMITED_BUDGET = 100_000_000  # right-hand sides
 UNLIMITED_S = 1e9
@@ -52,13 +52,13 @@ OUR_REPEATS = 3
 
 @dataclass(frozen=True)
 class Truth:
-    """Our walk of a scene at a tight tolerance, by two methods."""
+    """Reference for a scene: our own walk at a tight tolerance, by two methods."""
 
     until_s: float
     end: Floats  # state at `until_s`
     touches_s: Floats
-    agreement: float  # largest difference between the two methods
-    walk: ContactWalkResult  # ten steps, for the comparison of periods
+    agreement: float  # largest difference between the end states of the two methods
+    walk: ContactWalkResult  # walk of up to ten steps, for the comparison of periods
 
 
 def simulate(
@@ -105,8 +105,8 @@ class EngineExperiment:
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
     ) -> EngineRow:
         """Evaluate a run, or record why it was lost; `start`: initial velocities as a multiple of the gait's."""
-        # under our law, the errors are those of the end state and the touch times; on the engine's own contact, the
-        # error is that of the last period, for completed walks from the gait
+        # under our law, the errors are those of the end state and the touch times; on the engine's own contact, it is
+        # the error of the last period, and only completed walks that start from the gait have one
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
         step_s, tolerance = stepping.step_s, stepping.tolerance
         if isinstance(answer, TaskLost):
@@ -148,7 +148,7 @@ def our_walk(
 
 
 def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineRow]:
-    """Yield our runs over a ladder of tolerances, then our walks with which engines' own contact is compared."""
+    """Yield our runs over a ladder of tolerances, then our walks for comparison with engines' own contact."""
     same_law = EngineExperiment(scene, OURS, version, SAME_LAW, truth)
     our_walk(scene, OUR_LADDER[0], COMPARED_TOUCHES, truth.until_s)
     for rtol in OUR_LADDER:
@@ -179,7 +179,7 @@ class EngineOnScene:
     def walk(
         self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
-        """Walk under our law, or on the engine's own contact if given, for at most `most` engine steps."""
+        """Walk under our law or, if `own` is not None, on the engine's own contact, for at most `most` engine steps."""
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.started(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)

@@ -42,7 +42,7 @@ class RuleFollower:
 
     scene       scene with the currently locked knees
     walk_state  state of the walk apart from its coordinates
-    outcome     None while the walk continues
+    outcome     outcome of the walk; None while it continues
     turn        lock or release of a knee within the last step; such a step is discarded
     watches     whether knees are monitored
     """

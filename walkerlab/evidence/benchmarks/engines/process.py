@@ -42,7 +42,7 @@ class OwnProcess:
         self._folder.cleanup()
 
     def do(self, task: Callable[[], R], timeout_s: float) -> R | TaskLost:
-        """Run a picklable task; returns its result, or `TaskLost` without a result; RuntimeError after `abandon`."""
+        """Run a picklable task; returns its result, or `TaskLost` if it has none; RuntimeError after `abandon`."""
         if self._abandoned:
             raise RuntimeError("the process was abandoned")
         if self._worker is None:

@@ -18,7 +18,7 @@ EXTRA = "pip install 'walkerlab[engines]'"
 class Engine:
     """A physics engine with which our walks are compared."""
 
-    name: str  # name in output, and of its adapter module
+    name: str  # name in output and name of the adapter module
     module: str  # import name of its package
     package: str  # distribution name
 

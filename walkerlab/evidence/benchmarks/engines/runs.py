@@ -18,7 +18,7 @@ from walkerlab.physics.hybrid.contact_state import steps_with_lift
 from walkerlab.physics.mechanics.assembly import Anchor
 from walkerlab.physics.solvers.system import Floats
 
-TIME_ROUNDING = 1e-9  # relative
+TIME_ROUNDING = 1e-9  # relative tolerance for times
 UNLIMITED_STEPS = 10_000_000
 STEADY_STEP_FACTOR = 5  # factor on the step size if only a steady end state is needed
 
@@ -30,7 +30,7 @@ class WalkAnswer:
     outcome: str
     end: Floats | None  # final state of the free walker; None unless the walk was completed
     touches_s: Floats  # (steps,) touch times
-    along_m: Floats  # (steps,) footholds along the slope
+    along_m: Floats  # (steps,) positions of the footholds along the slope
     slips_m: Floats  # (steps,) net slips; the last step has none if its foot has not lifted
     steps: int  # engine steps
     time_s: float  # simulated time
@@ -188,10 +188,10 @@ class TuningAnswer:
     """Measured properties of an engine's own contact, to compare with the target."""
 
     own: OwnContact
-    penetration: float  # m, of the ball at rest
+    penetration: float  # m, penetration of the ball at rest
     damping_ratio: float  # damping ratio of the ball's oscillation about rest
     friction: float  # friction coefficient of the sliding block
-    creep_velocity: float  # m/s, of the block that stands on an incline
+    creep_velocity: float  # m/s, creep velocity of the block that stands on an incline
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class Bench:
     """A heavy ball that cannot turn, on level or inclined ground; it serves as bouncing ball and sliding block."""
 
     def __init__(self, task: TuningTask, own: OwnContact) -> None:
-        """Derive from the target `omega` (rad/s) and `settling_s`, eight times the slower time constant."""
+        """Derive `omega` (rad/s) and `settling_s`, eight times the slower time constant, from the target."""
         self.task, self.own, self.target = task, own, task.target
         self.omega, ratio = math.sqrt(self.target.gravity / self.target.penetration), self.target.damping_ratio
         slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
@@ -243,7 +243,7 @@ class Bench:
         return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
-        """Fit an oscillator to the ball's accelerations and return its damping ratio; depth at rest in m."""
+        """Fit an oscillator to the ball's accelerations; returns its damping ratio. depth: penetration at rest (m)."""
         omega = self.omega
         motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)

@@ -68,7 +68,10 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
             findings.add(measured)
             progress.advance()
     if not findings.truths:
-        raise NoAnswer("engines: no scene walks under ADAMS's law", "Start closer to a gait (start: fixed-point).")
+        raise NoAnswer(
+            "engines: under ADAMS's contact law, the walk ends too early in every scene",
+            "Start closer to a gait (start: fixed-point).",
+        )
     return make_content(findings, rigid)
 
 
@@ -113,7 +116,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
 
 
 def make_content(findings: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
-    """Build groups and summary; `rigid`: summary of the stage `fixedpoint`, if the start or the pads depend on it."""
+    """Build groups and summary; `rigid`: summary of `fixedpoint`, or None if neither the start nor the pads need it."""
     rows, truths = findings.rows, findings.truths
     stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
     groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
@@ -217,7 +220,8 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
 
 
 def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
-    """Return the last refinement's effect: the errors' ratio (same law), or the change of the period (s, own law)."""
+    """Return the effect of each series' last refinement, by experiment and name."""
+    # same law: factor by which the error fell; own law: change of the period (s)
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():
         for name, runs in series_by_name(rows, scene, experiment).items():

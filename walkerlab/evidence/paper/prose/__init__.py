@@ -1,6 +1,6 @@
 """Templates for texts about the paper, which can use its printed values and quantities derived from them.
 
-This is a package of its own so that only results of modules that import it depend on its words.
+This is a package of its own, so that its words affect only the results of modules that import it.
 """
 
 import math
