@@ -33,7 +33,7 @@ COUPLED = 1e-12  # smaller weights of a coupling count as zero
 
 @dataclass(frozen=True)
 class Pad:
-    """Ground for one foot: the whole floor, or a pad of the foot's lane."""
+    """Ground for one foot: a floor for the entire walk, or one pad of the foot's lane."""
 
     foot: int
     centre_m: float

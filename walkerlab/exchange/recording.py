@@ -404,7 +404,7 @@ def read_c3d(path: Path) -> Recording:
 
 def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Read labels, rate, units and marker positions (3 or 4, markers, frames) with ezc3d."""
-    with path.open("rb"):  # raises OSError, which ezc3d does not
+    with path.open("rb"):  # raises OSError for an unreadable file; ezc3d does not
         pass
     # Damaged files end ezc3d in segmentation faults, so a child process runs it.
     try:
