@@ -159,7 +159,7 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List each key in which `changed` differs from `base` as KEY=VALUE; a `slope_deg` replaces slope_rad."""
+    """List each key in which `changed` differs from `base` as KEY=VALUE; slope_deg, if given, replaces slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:

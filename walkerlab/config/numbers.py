@@ -5,7 +5,7 @@ from decimal import Decimal
 from typing import Any, Final
 
 SAME: Final = 1e-9
-"""Maximum relative difference between numbers that count as equal, because unit conversion rounds them."""
+"""Maximum relative difference between numbers that count as equal; unit conversion rounds numbers by less."""
 
 
 def short_number(number: float) -> str:

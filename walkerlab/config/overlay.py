@@ -13,7 +13,7 @@ from walkerlab.config.validation import align_start, validate_tree
 
 
 def paper_config_with(lines: Keys[str, Any], source: str = "the paper's") -> Config:
-    """Build the paper config with changes, values by nested key; error messages name the `source` of the changes.
+    """Build the paper config with changes (nested keys with values); error messages name their `source`.
 
     Raises ConfigError if the result is invalid; a start is moved onto its constraints without a warning.
     """
