@@ -1,4 +1,4 @@
-"""Python interface: runs stored in folders as by the command line, or computed in memory."""
+"""Python interface: runs in folders, like those of the command line, or in memory."""
 
 import itertools
 import json
@@ -43,14 +43,14 @@ MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
     ),
     "contact": ((Contact,), "walkerlab.contact() makes one."),
 }
-"""Arguments that are config blocks: the allowed types, and advice on how to build them."""
+"""Allowed types of arguments that are config blocks, and advice on how to build a block."""
 
 
 class Combined(TypedDict, total=False):
     """Options for combining the values of a sweep's parameters; by default they form the full grid.
 
     zip     whether to combine the n-th values into the n-th point
-    sample  method and number of points to sample from the intervals instead, such as "sobol:64"
+    sample  how to draw points from the intervals, and how many, instead of using the grid, such as "sobol:64"
     seed    seed of the sampled points; by default from the config
     """
 
@@ -64,7 +64,7 @@ class Result:
     """Result of a stage; its repr shows the headline values.
 
     stage      name of the stage
-    summary    keys that `--json` prints, in SI units
+    summary    values that `--json` prints, in SI units
     content    all labelled arrays, by group
     no_answer  reason if there is no answer, otherwise None
     artifact   file of the result; None if it was computed in memory
@@ -301,7 +301,7 @@ def contact(**keys: Any) -> Contact:
 def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Gait:
     """Find the periodic gaits of a walker on a slope, in memory; `summary` has the chosen gait, `dataset` all of them.
 
-    Here and in the functions below, omitted arguments have their values from the built-in `paper` config.
+    Here and in the functions below, omitted arguments have the values of the built-in `paper` config.
 
     walker     built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
@@ -415,7 +415,7 @@ def explore(
 
 
 def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
-    """Find the walker that minimises or maximises a quantity of its gait, in memory; `summary` has `best`, `value`, …
+    """Find, in memory, the walker with the smallest or largest gait quantity; `summary["best"]` has the optimal values.
 
     walker  built by `compass`, `kneed` or `walker`
     over    bounds (low, high) of the parameters to vary, in the key's unit
@@ -455,7 +455,7 @@ def identify(
     prior: Mapping[str, Sequence[float]] | None = None,
     **keys: Any,
 ) -> Result:
-    """Estimate parameters of a walker from a measured walk, in memory; `summary` has `estimates`, …
+    """Estimate, in memory, a walker's parameters from a measured walk; `summary["estimates"]` has one row for each.
 
     walk    file, or columns by name: period_s and optionally length_m of each step, or time, angle 1 and angle 2
     config  known properties of the walker: a Config, a config file or built-in name, or a run
@@ -482,7 +482,7 @@ def plan_measurements(
     model: str = "rigid",
     **keys: Any,
 ) -> Result:
-    """Find which measurements would determine a walker's parameters, in memory; `summary` has `measurements`, …
+    """Find, in memory, which measurements would determine a walker's parameters; see `summary["measurements"]`.
 
     config  known properties of the walker: a Config, a config file or built-in name, or a run
     fit     keys to estimate
@@ -517,7 +517,7 @@ def export_model(
     walker     built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
     contact    ground of the contact model, built by `contact`; by default the paper's, on pads
-    law        contact force in ADAMS: `contact` for its own, `functions` for exactly walkerlab's
+    law        contact force in ADAMS: `contact` for ADAMS's, `functions` for exactly walkerlab's
     keys       other config keys, such as start, strides, push_off
 
     Raises ConfigError for an unknown format or a walker that the format cannot express, NoAnswer if no gait is found.
@@ -530,7 +530,9 @@ def export_model(
     path = Path(path)
     kind = export.ENDINGS.get(path.suffix.removeprefix("."))
     if kind is None:
-        raise ConfigError(f"{path}: not a model.", f"Its ending is one of .{', .'.join(export.ENDINGS)}.")
+        raise ConfigError(
+            f"{path}: not a model.", f"Choose a file name that ends in one of .{', .'.join(export.ENDINGS)}."
+        )
     ground = contact or Contact(terrain="checkerboard")
     config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": ground}, keys)
     inputs = {}

@@ -22,8 +22,8 @@ IMPORT = re.compile(
     r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
 )
 
-# Not data of the code: in a wheel the built-in configs are inside the package, but a stage's key already contains the
-# part of the config that it reads.
+# Folders that do not count as data: in a wheel, the built-in configs are inside the package, but a stage's key already
+# contains the part of the config that the stage reads.
 INPUT_FOLDERS = ("config/builtin",)
 
 

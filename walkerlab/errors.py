@@ -4,11 +4,11 @@ import re
 from typing import Any, ClassVar, Final
 
 COMMAND_PATTERN: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
-"""Commands in a text, except those that do not act on a run."""
+"""Pattern for commands in a message, except those that do not act on a run."""
 
 
 def add_run_options(text: str, typed: str) -> str:
-    """Append the options that select the run, `typed` with a leading space, to every command in a text."""
+    """Append the options that select the run, `typed` with a leading space, to every command in a message."""
     return COMMAND_PATTERN.sub(lambda match: f"`{match[1]}{typed}`", text) if typed else text
 
 

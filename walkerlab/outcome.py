@@ -1,11 +1,11 @@
-"""Outcomes of walks, with texts, advice and a colour for each; an outcome is a value, never an exception."""
+"""Outcomes of walks, each with descriptions, advice and a colour; an outcome is a value, never an exception."""
 
 from enum import IntEnum
 from typing import NamedTuple
 
 
 class Outcome(IntEnum):
-    """Ending of a walk; kernels return the integer."""
+    """Outcome of a walk; kernels return its integer."""
 
     WALKED = 0
     FELL = 1

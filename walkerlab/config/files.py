@@ -1,4 +1,4 @@
-"""Finding and reading config files, user-written or built in."""
+"""Find and read config files, written by users or built in."""
 
 import contextlib
 import stat
@@ -14,13 +14,13 @@ from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
 
 _INSTALLED: Final = Path(__file__).parent / "builtin"
 BUILTIN_FOLDER: Final = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "configs"
-"""Folder of the built-in configs: next to this file in an installed wheel, at the top of a checkout."""
+"""Folder of the built-in configs: next to this file in a wheel, otherwise at the top of the checkout."""
 DEFAULT: Final = "paper"
 SUFFIXES: Final = (".yaml", ".yml")
 MAX_EXTENDS: Final = 16
 SHOWN_PATH: Final = 240
 STORED_IS_COMPLETE: Final = "every key with its value; a stored config extends nothing"
-read_cached = lru_cache(maxsize=32)(read)  # callers change only copies of the trees
+read_cached = lru_cache(maxsize=32)(read)  # safe, because callers change only copies of the trees
 
 
 @dataclass(frozen=True, slots=True)

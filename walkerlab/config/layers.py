@@ -76,7 +76,7 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
 
 
 def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
-    """Apply settings in order, replacing lists and blocks whole; ConfigError if a key's parent is not a block."""
+    """Apply settings in order; lists and blocks are replaced, not merged. ConfigError if a key's parent is no block."""
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:

@@ -119,7 +119,7 @@ def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
     length = short_number(walker.leg_length_m)
     if isinstance(walker, CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
         leg, mass, stays = places["leg_length_m"], places["foot_to_mass_m"].source, walker.foot_to_mass_m
-        moved = leg.source.startswith("built-in") or mass.startswith("--")  # changed the mass, not the leg
+        moved = leg.source.startswith("built-in") or mass.startswith("--")  # the user changed the mass, not the leg
         if leg.source != mass and not moved and stays != walker.leg_length_m / 2:
             yield (
                 f"{leg}: walker.leg_length_m is {length} m, and walker.foot_to_mass_m is still {short_number(stays)} m "
@@ -154,12 +154,12 @@ def numbers_in(path: Location, value: Any) -> Iterator[tuple[Location, float]]:
 
 
 MAX_NAME: Final = 40
-"""Maximum number of characters of a run folder's name that spells out its changes."""
+"""Maximum length of a run folder's name that spells out the changes."""
 UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List the keys in which `changed` differs from `base`, as KEY=VALUE; `slope_deg` is passed if it was typed."""
+    """List each key in which `changed` differs from `base` as KEY=VALUE; slope_deg, if given, replaces slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:

@@ -1,11 +1,11 @@
-"""Shortest exact texts for numbers, and comparison of numbers up to rounding."""
+"""Shortest exact notation of numbers, and comparison of numbers up to rounding."""
 
 import math
 from decimal import Decimal
 from typing import Any, Final
 
 SAME: Final = 1e-9
-"""Maximum relative difference of two numbers that count as equal, since converting units rounds them."""
+"""Maximum relative difference between numbers that count as equal; unit conversion rounds numbers by less."""
 
 
 def short_number(number: float) -> str:

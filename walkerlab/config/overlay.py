@@ -13,16 +13,16 @@ from walkerlab.config.validation import align_start, validate_tree
 
 
 def paper_config_with(lines: Keys[str, Any], source: str = "the paper's") -> Config:
-    """Build the paper config with the changes in `lines`, nested keys with values; error messages name their `source`.
+    """Build the paper config with changes (nested keys with values); error messages name their `source`.
 
-    Raises ConfigError if the result is invalid; theta_1 of a start is moved onto the slope without a warning.
+    Raises ConfigError if the result is invalid; a start is moved onto its constraints without a warning.
     """
     return paper_config_with_tree(tree_of(lines, Position(source, 1, 1)))
 
 
 def paper_config_with_tree(upper: Mapping) -> Config:
     """Build the paper config with a block of keys on top; ConfigError with positions if the result is invalid."""
-    # With SI units, keys missing in the contact block keep the paper's physical value, not its value in N, mm, s.
+    # With SI units, keys missing in the contact block keep the paper's physical value, not its number in N, mm, s.
     layers = read_layers(builtin_config(DEFAULT))
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, Mapping) else None
@@ -59,7 +59,7 @@ def check_ground(case: Case, config: Config, lines: Mapping) -> None:
         raise problem_error(where, f"contact: case {case.name} needs a contact block but has none", "model: rigid")
     if isinstance(config.start, str):
         return
-    # Other terrains, too, judge steps by the length of the start's step, which therefore must not be 0.
+    # Steps are judged by the length of the start's step even where it lays no pads, so it must not be 0.
     by_start = config.contact.pad_pitch == "rigid" or config.contact.terrain == "after-mid-swing"
     if by_start and config.start[0] == config.start[1]:
         where = lines.keys.get("start", lines.position)

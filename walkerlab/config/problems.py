@@ -15,7 +15,7 @@ SHOWN_PROBLEMS = 20
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    position: Position | None  # None for a value that is not in a text
+    position: Position | None  # None for a value passed from Python
     text: str  # description with key and value
     allowed: str = ""  # valid values; empty if `text` names them
     nearest: str = ""  # word that was probably meant; empty if nothing is similar
@@ -33,7 +33,7 @@ BEYOND_SCOPE: Final = {
     r"3-?d\b|three-?d|spatial|lateral": "walkerlab is planar: its walkers move in one vertical plane",
     r"quadruped|four-?leg|hexapod|monoped": "walkerlab's walkers have two legs",
 }
-"""Patterns of names that users may try, and why walkerlab has nothing of the kind."""
+"""Patterns of words for features that walkerlab lacks, and the reason for each."""
 KEYS_ARE_LISTED = "`walkerlab schema` lists every key with its unit, bounds and default"
 
 
@@ -53,7 +53,7 @@ def problem_error(
 
 
 def beyond_scope(word: str) -> str:
-    """Explain in a sentence why walkerlab does not offer what a word names; empty if the word matches no pattern."""
+    """Explain in a sentence why walkerlab lacks the feature that `word` names; empty if no pattern matches."""
     return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 
 
@@ -71,13 +71,13 @@ def suggestion(word: str, candidates: Iterable[str]) -> str:
 
 
 def printable(text: str, length: int = SHOWN_LENGTH) -> str:
-    """Shorten an untrusted text and escape control characters and lone surrogates."""
+    """Shorten untrusted text, and escape control characters and lone surrogates."""
     cut = text if len(text) <= length else f"{text[: length - 1]}…"
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in cut)
 
 
 def format_node(node: Node) -> str:
-    """Format a value as in the config, quoted if it is text."""
+    """Format a value as in the config; strings are quoted."""
     if isinstance(node, Mapping):
         return "a block" if node.entries else "an empty block"
     if not isinstance(node, Scalar):

@@ -1,8 +1,8 @@
-"""Parser that converts YAML texts to trees with positions.
+"""Parser that converts YAML to trees with positions.
 
-ruamel.yaml splits the text; plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no` is
-a text. Anchors, aliases, tags, duplicate keys, deep nesting and large texts are errors, so that the cost of parsing is
-proportional to the length of the text.
+ruamel.yaml splits the input; plain scalars follow the core schema of YAML 1.2 (section 10.3.2): 1e7 is a number, `no`
+is a string. Anchors, aliases, tags, duplicate keys, deep nesting and very long input are errors, so that the cost of
+parsing is proportional to the length of the input.
 """
 
 import math
@@ -39,7 +39,7 @@ def value_of(text: str) -> str | int | float | bool | None:
     if _OTHER_BASE.fullmatch(text) and len(text) <= MAX_DIGITS:
         return int(text, 0)
     if _FLOAT.fullmatch(text):
-        return float(text) + 0.0  # no negative zero, so that equal numbers have equal texts and keys
+        return float(text) + 0.0  # no negative zero, so that equal numbers have equal strings and keys
     return text
 
 
@@ -64,7 +64,7 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
 
     try:
         yield from YAML(typ="safe", pure=True).parse(text)
-    except Exception as error:  # arbitrary text makes the parser fail in many ways; each of them means a bad config
+    except Exception as error:  # arbitrary input makes the parser fail in many ways, which all mean a bad config
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)
         reason = getattr(error, "problem", None) or getattr(error, "context", None) or type(error).__name__
@@ -78,7 +78,7 @@ def _position(mark: Any, source: str, column: int) -> Position:
 
 
 class _Composer:
-    """Builds a tree of limited depth from parser events."""
+    """Builder of a tree of limited depth from parser events."""
 
     def __init__(self, source: str, column: int, events: Iterator[Any]) -> None:
         self._source, self._column, self._events = source, column, events

@@ -1,7 +1,7 @@
 """Types for the parts of a config that stages and their helpers may read; mypy enforces them.
 
 Each type lists its keys, and a config satisfies all types. A stage gets an object with only the keys of its type, and
-these determine the key of its result. Meaning, unit and bounds of the keys are in config/schema.py.
+their values determine the key of its result. Meaning, unit and bounds of the keys are in config/schema.py.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @cache
 def keys_of(takes: type) -> dict[str, type | None]:
-    """Map each key of a type (base classes first) to the type of the part that is read, or to None if read whole."""
+    """Map each key of a type (base classes first) to the type of the part that is read, or to None if all is read."""
     members = (item for base in reversed(takes.__mro__) for item in vars(base).items())
     return {name: _part(member) for name, member in members if isinstance(member, property)}
 
@@ -38,18 +38,18 @@ def keys_of(takes: type) -> dict[str, type | None]:
 def _part(member: property) -> type | None:
     getter: Any = member.fget
     result_type = getter.__globals__.get(getter.__annotations__.get("return"))
-    # config blocks, which are not Protocols, are read whole
+    # config blocks, which are not Protocols, are read completely
     return result_type if Protocol in getattr(result_type, "__mro__", ()) else None
 
 
 def dotted_keys(takes: type) -> Iterator[str]:
-    """Yield the keys of a type, dotted inside partly read blocks, e.g. `solver.rigid`."""
+    """Yield the keys of a type; keys in a block that is read only in part are dotted, e.g. `solver.rigid`."""
     for name, part in keys_of(takes).items():
         yield from (name,) if part is None else (f"{name}.{key}" for key in dotted_keys(part))
 
 
 def only(config: Any, takes: type | None) -> Any:
-    """Return an object with only the keys of a type; the config itself for None."""
+    """Return an object with only the keys of a type; the config itself if the type is None."""
     if takes is None:
         return config
     return SimpleNamespace(**{name: only(getattr(config, name), part) for name, part in keys_of(takes).items()})

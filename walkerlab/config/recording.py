@@ -14,7 +14,11 @@ class RecordedFile(Block):
         default_in_words="none",
     )
     name: str = key(
-        "", "", "name of the walk in figures and tables", bounds="any text", default_in_words="file name without ending"
+        "",
+        "",
+        "name of the walk in figures and tables",
+        bounds="any text",
+        default_in_words="file name without extension",
     )
     columns: dict[str, str] = key(
         dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"

@@ -19,14 +19,14 @@ from walkerlab.errors import ConfigError
 
 COLUMNS: Final = 79
 OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
-"""Kind of a block in a key's name, such as `(kneed)`; only this reference has it, configs do not."""
+"""Kind of the block that a key's name may contain, such as `(kneed)`; it appears only in this reference."""
 SCHEMA_REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 
 
 @dataclass(frozen=True, slots=True)
 class KeyReference:
-    """Description of one config key; every fact is a text."""
+    """Description of one config key; every field is text."""
 
     key: str
     type: str

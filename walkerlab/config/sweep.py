@@ -19,7 +19,7 @@ class Sweep(Block):
     sample: str = key(
         "",
         "",
-        "sample points from the intervals instead of the grid",
+        "how to draw points from the intervals, and how many, instead of using a grid",
         bounds="latin-hypercube:N, sobol:N, random:N, or empty",
         default_in_words="empty",
     )

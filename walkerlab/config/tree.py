@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Place in a config text: file or option, line and column from 1; line 0 for the whole source."""
+    """Place in a config text: file or option, line and column from 1; line 0 means the entire source."""
 
     source: str
     line: int
@@ -25,7 +25,7 @@ class Position:
 
 
 NOWHERE = Position("", 0, 0)
-"""Position of values passed from Python, which are not in a text."""
+"""Position of values passed from Python, which no file or option contains."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Validation of a config tree against the schema, which reports all problems at once with positions."""
+"""Validation of a config tree against the schema; all problems are reported together, with positions."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -54,7 +54,7 @@ JUDGED_BY: Final = {
     "dynamic_friction": {"static_friction": "set contact.dynamic_friction too"},
     "friction_velocity": {"stiction_velocity": "set contact.friction_velocity too", **BY_UNITS},
 }
-"""For keys of the contact block: the other keys that limit them, and advice if only the other key was changed."""
+"""Other keys that limit a key of the contact block, and advice if only the other key was changed."""
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
@@ -258,7 +258,7 @@ def _keys_of_another_kind(
 
 
 def _elsewhere(name: str, exactly: bool) -> str:
-    """Return the path of a key with a similar name (`exactly`: the same name) in any block, or an empty text."""
+    """Return the path of the key with the nearest name (`exactly`: the same name) in any block, or an empty string."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
     if "." in name:
         *blocks, last = nearest(name, paths.values()).split(".")

@@ -58,7 +58,7 @@ def parts(of: type[Block], meaning: str, default: Any = ..., number: str = "") -
 
 
 def check_arc(name: str, of: str, limit: Callable[[Any], float] = float) -> Any:
-    """Validate that the foot radius is below a limit computed from the value of key `of`; errors call it `name`."""
+    """Validate that the foot radius is below a limit computed from the value of key `of`, which errors call `name`."""
     return check_against(
         "foot_radius_m", of, lambda arc, owner: "" if arc < limit(owner) else f"must be below {name}, {limit(owner):g}"
     )
@@ -212,7 +212,10 @@ class KneeJoint(Block):
         HSU_CHEN,
     )
     release: Literal["compression", "touch"] = key(
-        "compression", "", "contact model: released when the leading foot stops sinking in, or at its first touch"
+        "compression",
+        "",
+        "contact model: the trailing knee is released when the leading foot stops sinking in (compression), or at its "
+        "first touch",
     )
     stop_stiffness: float = key(1.0e5, "N m/rad", "stiffness of a compliant stop", ge=1.0, le=1e12)
     stop_damping: float = key(90.0, "N m s/rad", "damping of a compliant stop", ge=0.0, le=1e9)

@@ -1,4 +1,4 @@
-"""Writing a config as YAML, with or without comments, that loads back to an equal config."""
+"""Write a config as YAML, with or without comments; loading it gives an equal config."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from walkerlab.config.reader import value_of
 from walkerlab.config.schema import Config, Source
 
 PUNCTUATION = re.compile(r"""^[^\w./]|[:#,\[\]{}"'\n]|^$""")
-"""Characters that make a YAML value need quotes."""
+"""Pattern of YAML values that need quotes."""
 LINE_WIDTH: Final = 110
 ELSEWHERE: Final = "left out; `walkerlab schema {}` has its keys"
 
@@ -24,7 +24,7 @@ def to_yaml(config: Config) -> str:
 
 
 def to_extending_yaml(start: str, base: Config, changed: Config, name: str) -> str:
-    """Write a config as YAML with only the keys that differ from `base`, which it extends by the name `start`."""
+    """Write only the keys that differ from `base` as YAML that extends `base` by the name `start`."""
     different = _different(base.model_dump(mode="json"), changed.model_dump(mode="json"))
     blocks = {"extends": start, "name": name, **{key: value for key, value in different.items() if key != "name"}}
     degrees = slope_in_degrees(changed.slope_rad)
@@ -53,7 +53,7 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
 
 
 def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
-    """Write a config as YAML with meaning, bounds and unit above each key, leaving out the top keys `left_alone`."""
+    """Write a config as YAML with meaning, bounds and unit above each key, without the top-level keys `left_alone`."""
     values = config.model_dump(mode="json", exclude=set(left_alone))
     lines = [*_commented(config, values, ""), *(f"# {name}: {ELSEWHERE.format(name)}" for name in left_alone)]
     return "".join(f"{line}\n" for line in lines)

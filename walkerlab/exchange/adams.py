@@ -143,7 +143,7 @@ def contact_arguments(contact: AdamsContact, shapes: Mapping[str, int]) -> Itera
 
 
 def command_text(export: Exported, dataset: str) -> str:
-    """Write the commands that simulate a dataset as long as walkerlab's walk takes, including a pinned first step."""
+    """Write the commands that simulate walkerlab's walk to its end; a pinned foot is released at the first touch."""
     lines = [dataset, dataset.removesuffix(".adm")]
     lines.append(f"integrator/hht, error = {finite(ERROR)}, hmax = {finite(MAX_STEP_S)}")
     if export.pinned and export.touches_s:

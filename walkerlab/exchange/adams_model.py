@@ -78,7 +78,7 @@ class AdamsContact:
 
 @dataclass(frozen=True)
 class Force:
-    """Force on a marker in the plane (N) and torque about it (N mm), as expressions; the ground takes the reaction."""
+    """In-plane force (N) and torque (N mm) on a marker, as expressions; the ground takes the reaction."""
 
     i: str
     reaction: str
@@ -122,7 +122,7 @@ class AdamsModel:
 def adams_model(export: Exported, law: str) -> AdamsModel:
     """Build the ADAMS model of an export, with ADAMS contact (law `contact`) or walkerlab's law (`functions`).
 
-    Raises ConfigError for a ground or coupling that cannot be expressed.
+    Raises ConfigError for a contact law, ground or coupling that cannot be expressed.
     """
     planar = export.model
     gravity = MM * planar.gravity_along, -MM * planar.gravity_down
@@ -179,7 +179,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         weights = zip((f"hinge_of_{names[link]}" for link in coupling.links), coupling.weights, strict=True)
         model.couplers[f"coupler_{number + 1}"] = tuple(weights)
     for foot, ball in enumerate(planar.balls):
-        # a part's frame turns with the part, so a lane's distance from the plane is the same at every angle
+        # parts turn only about the normal of the plane, so a ball stays at its distance from the plane, in its lane
         x, y = ball.centre_m
         name = names[ball.link]
         model.markers[f"{name}.foot"] = Marker(name, (MM * x, MM * y, 0.0))
@@ -199,7 +199,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
 def carried(
     place: tuple[float, float], angle: float, motion: tuple[float, float], spin: float, point: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the position and velocity of a point of a body, given those of its origin."""
+    """Return position and velocity of a point of a body; `place` and `motion` are those of the body's origin."""
     s, c = math.sin(angle), math.cos(angle)
     x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]
     return (place[0] + x, place[1] + y), (motion[0] - spin * y, motion[1] + spin * x)
@@ -237,7 +237,7 @@ class FootTerms:
 
     @property
     def slip(self) -> str:
-        """Velocity (mm/s) along the slope of the material at the foot's lowest point."""
+        """Slip velocity (mm/s), along the slope, of the material at the foot's lowest point."""
         rolling = f"+{finite(self.radius)}*WZ({{{self.marker}}},{{{ORIGIN}}})" if self.radius else ""
         return f"VX({self.motion}){rolling}"
 
@@ -275,7 +275,7 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
 
 
 def laws(export: Exported) -> tuple[NormalLaw, Coulomb | None]:
-    """Return the normal-force and friction laws (None if frictionless) in N, mm, s; ConfigError for other friction."""
+    """Return normal-force law and Coulomb friction (None: no friction) in N, mm, s; ConfigError for other friction."""
     normal, friction = export.scene.ours.normal, export.scene.ours.friction
     in_mm = NormalLaw(
         normal.stiffness / MM**normal.exponent,
@@ -338,7 +338,7 @@ def friction_function(leg: str, law: Coulomb) -> str:
 
 
 def add_push_offs(model: AdamsModel, export: Exported) -> None:
-    """Add the push-off pulses on each trailing foot, which begin at the touchdown times of walkerlab's walk."""
+    """Add the push-off pulses on the trailing feet; they begin at the touchdown times of walkerlab's walk."""
     impulse, duration = export.config.push_off.impulse_N_s, export.config.push_off.duration_s
     if impulse == 0.0:
         return

@@ -46,11 +46,11 @@ OF_WALKER: Final = {
     "kinetic_J": "energy", "potential_J": "energy", "mechanical_J": "energy", "total_energy_J": "energy",
 }  # fmt: skip
 QUANTITY_KINDS: Final = OF_WALKER | {f"{name} {leg}": kind for name, kind in OF_LEG.items() for leg in (1, 2)}
-"""Kind of unit of each quantity; a leg's quantities end in its number, 1 for the leg that swings first."""
+"""Kind of unit by quantity; names of a leg's quantities end in the leg's number, 1 or 2."""
 NEEDED: Final = (TIME, "angle 1", "angle 2")
 UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
-"""Angle of the line from one marker to another, as in `angle 1=HIP>HEEL`."""
+"""Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class RecordedWalk:
     sources: dict[str, str] = field(default_factory=dict)
 
     def both_legs(self, name: str) -> Array | None:
-        """Return a quantity of both legs (samples, 2); None unless both are recorded."""
+        """Return a quantity of both legs (samples, 2); None unless it is recorded for both."""
         both = [self.quantities.get(f"{name} {leg}") for leg in (1, 2)]
         return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
 
@@ -70,7 +70,7 @@ class RecordedWalk:
 def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str, str]) -> RecordedWalk:
     """Return the quantities of a recorded walk in SI units.
 
-    columns  column of each quantity that its name does not identify; `HIP>FOOT`: angle of the line between markers
+    columns  columns that the user names, by quantity; `HIP>FOOT` is the angle of the line between two markers
     units    units that the file does not state, by kind ('angle', 'length', ...), by quantity or by column
 
     Raises ConfigError for a column or unit that is unknown or missing, and for gaps.
@@ -90,7 +90,7 @@ def plain(name: str) -> str:
 
 
 def matches(recording: Recording, named: set[str]) -> dict[str, str]:
-    """Return the column of each quantity: the one with its name, otherwise the only one whose name ends in it.
+    """Return a column by quantity: the column with the quantity's name, otherwise the only one whose name ends in it.
 
     named  quantities to skip, because the user names their columns
     """
@@ -110,7 +110,7 @@ def matches(recording: Recording, named: set[str]) -> dict[str, str]:
 
 
 def leg_names(name: str) -> list[str]:
-    """Return a leg quantity's name in exported models, such as leg_1.angle for 'angle 1'; empty for the others."""
+    """Return a leg quantity's name in exported models, e.g. leg_1.angle for 'angle 1'; empty for other quantities."""
     quantity, blank, leg = name.rpartition(" ")
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
@@ -144,7 +144,7 @@ def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str,
 
 
 def missing(recording: Recording, name: str) -> ConfigError:
-    """Return the error for a quantity without a column, which suggests the column with the most similar name."""
+    """Build the error for a quantity without a column; it suggests the column with the most similar name."""
     near = get_close_matches(plain(name), [plain(column) for column in recording.columns], 1, 0.2)
     nearest = next((column for column in recording.columns if near and plain(column) == near[0]), "NAME")
     there = ", ".join(column for column in list(recording.columns)[:12])

@@ -21,18 +21,18 @@ from walkerlab.physics.mechanics.parts import Assembly, Knee
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
-CREEP_LOAD = 0.1  # ratio of tangential to normal force, about its mean over a walk
+CREEP_LOAD = 0.1  # ratio of tangential to normal force of a standing foot; about the mean over a walk
 
 
 @dataclass(frozen=True)
 class EngineScene:
-    """Walker on its ground, in the forms that an engine and our walking rules need."""
+    """Walker on its ground, described for an engine and for walkerlab's walking rules."""
 
     assembly: Assembly  # parts of the walker
     base: Anchor  # root of the engine's tree: the hip point of the first stance leg
-    ours: ContactWalker  # the walker in our contact model
+    ours: ContactWalker  # the walker in walkerlab's contact model
     walker: ContactWalker  # the same walker, with the levers of feet and hip measured from the base
-    ground: JudgedGround  # terrain, and the frame in which the walking rules judge a walk
+    ground: JudgedGround  # terrain, and the walker's dimensions by which the walking rules judge a walk
     start: State  # start of the walk, a state of the free walker (not hinged to the ground)
     locked: tuple[Knee, ...] = ()  # locked knees, which have no hinge in the engine
 
@@ -63,7 +63,7 @@ class EngineScene:
 
     @cached_property
     def centre_levers(self) -> Floats:
-        """Levers (bodies, 2) in m from the base to the centre of mass."""
+        """Vectors (bodies, 2) in body frames (m); rotated, they add up to the vector from base to centre of mass."""
         weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
         return np.asarray(sum(weighted) / total_mass(self.assembly))
 
@@ -96,7 +96,7 @@ class EngineScene:
 
 
 def engine_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """Build the scene of a config: pads at the rigid step length, stance foot not hinged, no knee locked."""
+    """Build a config's scene, no foot hinged and no knee locked; pad_pitch `own` becomes the rigid step length."""
     scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m)
     return scene_for_engines(replace(scene, pinned=False), rigid_state)
 

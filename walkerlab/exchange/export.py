@@ -51,8 +51,8 @@ def export_model(
     commit               commit of walkerlab, for the header of the file
     stem                 stem of the file names; by default the config's name
 
-    Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if pads are to follow a
-    contact gait that does not exist.
+    Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
+    pads depends on a contact gait and none is found.
     """
     export = prepare_export(config, rigid_step_length_m, rigid_state)
     stem = stem or export.model_name

@@ -1,4 +1,4 @@
-"""Walker to export: on its pads, at the start of a walk, with the walk that walkerlab takes from that start."""
+"""Walker to export, on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ COUPLED = 1e-12  # smaller weights of a coupling count as zero
 
 @dataclass(frozen=True)
 class Pad:
-    """Ground for one foot: the whole floor, or a pad of the foot's lane."""
+    """Ground for one foot: a floor for the entire walk, or one pad of the foot's lane."""
 
     foot: int
     centre_m: float
@@ -43,7 +43,7 @@ class Pad:
 
 @dataclass(frozen=True)
 class HingeCoupling:
-    """Constraint: the hinge angles of the links, multiplied by the weights, add up to zero."""
+    """Constraint that the weighted sum of the links' hinge angles is zero."""
 
     links: tuple[int, ...]
     weights: tuple[float, ...]
@@ -51,12 +51,12 @@ class HingeCoupling:
 
 @dataclass(frozen=True)
 class Exported:
-    """Walker on its ground at the start of a walk, with walkerlab's own walk."""
+    """Walker on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
     config: Config
     scene: EngineScene  # walker and ground as other programs see them
-    steps: int  # number of steps that the walk attempts
-    walk: ContactWalkResult  # the contact model's own walk from that start
+    steps: int  # maximum number of steps of the walk
+    walk: ContactWalkResult  # walk of the contact model from that start
     heights: Floats | None  # (footholds,) heights of uneven ground (m); None on even ground
     pinned: bool  # whether the stance foot is hinged until the first touchdown
 
@@ -91,7 +91,7 @@ class Exported:
 
     @cached_property
     def couplings(self) -> tuple[HingeCoupling, ...]:
-        """Couplings of the hinges of bodies whose angles follow those of others."""
+        """Couplings of the hinges of bodies that follow other bodies."""
         found = []
         for row in coupling_rows(self.scene.assembly, self.model):
             if abs(row[0]) > COUPLED:
@@ -123,7 +123,7 @@ class Exported:
         return self.scene.ground.terrain._replace(heights=self.heights)
 
     def lane_across_m(self, foot: int) -> float:
-        """Signed distance (m) of a foot's lane from the plane of the walk; no ball reaches the other foot's pads."""
+        """Signed distance (m) of a foot's lane from the plane of the walk; no ball reaches the other foot's lane."""
         distance = self.half_lane_m + 0.01 * self.config.walker.leg_length_m
         return -distance if foot == STANCE_FOOT else distance
 

@@ -103,7 +103,7 @@ def body_text(
 
 
 def joint_texts(model: PlanarModel, link_number: int, hip: HipJoint | None) -> Iterator[str]:
-    """Yield the joints of a link, named after their coordinates: the base's freedoms, or a hinge."""
+    """Yield the joints of a link: one for each freedom of the base, or the hinge between a link and its parent."""
     link = model.links[link_number]
     x, z = link.point_m
     for freedom in model.freedoms if link.parent < 0 else ("turn",):
@@ -124,7 +124,7 @@ def foot_text(ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
 
 
 def walker_text(export: Exported, head: Iterable[str]) -> str:
-    """Write a model with pads and the keyframe `gait`, from which plain `mj_step` walks if there are no drives.
+    """Write a model with pads and a keyframe `gait`; a walker without drives walks from it under plain `mj_step`.
 
     head  lines of the header comment
 

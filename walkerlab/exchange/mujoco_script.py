@@ -53,7 +53,7 @@ class Walk:
 
 
 def main(path: str, steps: int, view: bool) -> None:
-    """Walk for a number of touchdowns, but at most ten seconds."""
+    """Walk for `steps` touchdowns, but at most for ten simulated seconds."""
     walk, viewer = Walk(mujoco.MjModel.from_xml_path(path)), None
     if view:
         from mujoco.viewer import launch_passive

@@ -14,8 +14,8 @@ Freedom = Literal["along", "height", "turn"]
 FLOATING: tuple[Freedom, ...] = ("along", "height", "turn")
 HINGED: tuple[Freedom, ...] = ("turn",)
 UPRIGHT: tuple[Freedom, ...] = ("along", "height")
-SMALLEST_INERTIA = 1e-13  # in units of mass x length^2; engines reject a body without inertia
-SMALLEST_BALL_M = 5e-4  # radius of the ball for a point foot, which engines lack; larger than any penetration
+SMALLEST_INERTIA = 1e-13  # as a multiple of mass x length^2; engines reject bodies without inertia
+SMALLEST_BALL_M = 5e-4  # radius of the ball that replaces a point foot in engines; larger than any penetration
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class Ball:
     link: int
     centre_m: Position
     radius_m: float
-    ground_m: float  # height of the ground; a point foot gets a tiny ball, and ground lower by the ball's radius
+    ground_m: float  # height of the ground; a point foot gets a tiny ball, and its ground is lower by the ball's radius
 
 
 @dataclass(frozen=True)
 class PlanarModel:
-    """Tree of links under gravity (m/s^2), along the slope and towards it."""
+    """Tree of links under gravity, whose components (m/s^2) are along the slope and towards it."""
 
     links: tuple[Link, ...]  # base first, every link after its parent
     freedoms: tuple[Freedom, ...]  # freedoms of the base relative to the world
@@ -139,5 +139,5 @@ def lump_bodies(
 
 
 def coupling_rows(assembly: Assembly, model: PlanarModel) -> list[Floats]:
-    """Return weights (links,) for each body that follows others: the relative angles, so weighted, add up to zero."""
+    """Return, for each body that follows others, weights (links,) with which the relative angles add up to zero."""
     return [model.chain[body] - row @ model.chain for body, row in followers(assembly).items()]

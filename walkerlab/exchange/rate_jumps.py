@@ -15,20 +15,20 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 AHEAD: Final = 0.4
-"""Smallest angle between the legs at a heel strike, as a fraction of the walk's largest."""
+"""Smallest angle between the legs at a heel strike, as a fraction of the largest during the walk."""
 WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, as a fraction of the step period."""
-MOST_RUNS: Final = 20  # stretches with one leg far ahead that are searched for jumps
+MOST_RUNS: Final = 20  # maximum number of stretches with one leg far ahead that are searched for jumps
 WINDOW_SAMPLES: Final = 60  # windows with more samples are thinned towards this number
 SAMPLES_ON_A_SIDE: Final = 4  # fewest samples before and after an instant for a fit
 DEGREE: Final = 3
-SMALLEST_SCATTER: Final = 1e-12  # lower limit, as a fraction of the sum of squared angles
+SMALLEST_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum
 MOST_FOUND: Final = 4
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
-    """Return sums (rad) of the leg angles from the slope's normal at which their rates jump, the clearest first.
+    """Return likely sums (rad) of the leg angles at heel strikes, where their rates jump, the clearest jumps first.
 
     time   (samples,) s
     angle  (samples, 2) rad, from the vertical
@@ -44,9 +44,9 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
 
 
 def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
-    """Return the reduction of the angles' scatter by rate jumps where `over` (samples,) falls through zero within runs.
+    """Return the scatter of the angles that rate jumps explain, as a multiple of the variance that remains.
 
-    The reduction is in units of the variance that remains.
+    A jump is fitted in each run (first sample, last sample), where `over` (samples,) last falls through zero.
     """
     jumps = []
     for first, last in runs:
@@ -77,7 +77,7 @@ def typical_distance(time: Array, runs: Iterable[tuple[int, int]]) -> float:
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:
-    """Fit a jump of the rates at an instant: reduction of the squared scatter, remaining scatter, degrees of freedom.
+    """Fit a rate jump at an instant; return the squared scatter it explains and leaves, and the degrees of freedom.
 
     Returns None if there are too few samples before or after the instant.
     """

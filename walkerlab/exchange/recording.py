@@ -1,7 +1,7 @@
 """Read time series from files that other programs or people wrote.
 
 `read_recording` chooses the format by the file extension: delimited text (CSV, ADAMS tables), ADAMS results (.res),
-OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` maps them to a walk.
+OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` maps them to quantities of a walk.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def checked_time(recording: Recording) -> Recording:
 
 
 def read_delimited(path: Path) -> Recording:
-    """Read CSV files and ADAMS tables: titles, a header, rows of numbers."""
+    """Read a CSV file or an ADAMS table, which has optional titles, a header, and rows of numbers."""
     lines = without_last_delimiters(text_of(path).splitlines())
     header, delimiter = header_of(path, lines)
     names, units = names_and_units(split_row(lines[header], delimiter))
@@ -142,9 +142,9 @@ def without_last_delimiters(lines: list[str]) -> list[str]:
 
 
 def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
-    """Find the line number of the header and the delimiter: the first row of names followed by as many numbers.
+    """Find the header, the first row of names followed by as many values; return its index and the delimiter.
 
-    A table of one column is recognised only if no table has several columns.
+    A table with several columns takes precedence over a table with one column.
     """
     several = [(number, delimiter) for number in range(len(lines[:HEADER_LINES])) for delimiter in DELIMITERS]
     for fewest in (2, 1):
@@ -228,7 +228,7 @@ def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: 
 
 
 def as_time_column(recording: Recording) -> Recording:
-    """Rename the time column, named time or t or ending in the word time, to `time`."""
+    """Rename the time column to `time`; its name is time or t, or ends in the word time."""
     columns = recording.columns
     name = next((name for name in columns if name.lower() in ("time", "t")), None)
     name = name or next((name for name in columns if re.search(r"(^|[.\s_])time$", name, re.IGNORECASE)), None)
@@ -332,7 +332,7 @@ def without_repeated_times(recording: Recording) -> Recording:
 
 
 def read_opensim(path: Path) -> Recording:
-    """Read OpenSim tables (.sto, .mot), and SIMM's variant of them: lines up to `endheader`, names, rows."""
+    """Read an OpenSim table (.sto, .mot) or SIMM's variant: settings up to `endheader`, column names, and rows."""
     lines = text_of(path).splitlines()
     end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None or end + 1 >= len(lines):
@@ -351,7 +351,7 @@ def read_opensim(path: Path) -> Recording:
 
 def blank_separated(path: Path, lines: Sequence[str], first: int, count: int) -> Array:
     """Parse the lines from index `first` on, separated by blanks or tabs, into an array (rows, count)."""
-    rows = []  # the header's count of rows is often wrong
+    rows = []  # counted, because the number of rows in the header is often wrong
     for number, line in numbered_rows(lines, first):
         rows.append(cells_as_numbers(path, number, "\t".join(line.split()), "\t", count))
     return np.array(rows).reshape(len(rows), count)
@@ -404,7 +404,7 @@ def read_c3d(path: Path) -> Recording:
 
 def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Read labels, rate, units and marker positions (3 or 4, markers, frames) with ezc3d."""
-    with path.open("rb"):  # raises OSError, which ezc3d does not
+    with path.open("rb"):  # raises OSError for an unreadable file; ezc3d does not
         pass
     # Damaged files end ezc3d in segmentation faults, so a child process runs it.
     try:

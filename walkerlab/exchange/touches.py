@@ -1,8 +1,8 @@
 """Find the heel strikes in recorded angles.
 
-A foot strikes where it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so all
-those of one leg before the other leg's next one count as one strike. The instant is the zero of the height in a smooth
-fit: polynomials before and after, which meet there because angles are continuous while their rates jump.
+A foot strikes when it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so
+consecutive crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit of the angles:
+one polynomial before the strike and one after it, which meet at the strike, because only the rates jump.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
 
 
 def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int]]:
-    """Return times at which a foot that is ahead falls to the other's level, and the leg; noise may repeat them."""
+    """Return times at which the foot ahead falls to the other's level, and its leg; noise may repeat a heel strike."""
     # A recording may end with a heel strike, so its last two samples are continued by half an interval.
     time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
@@ -95,7 +95,7 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
 
 
 def fit_around(t: Array, y: Array, touch: float) -> tuple[Array, Array, float]:
-    """Fit polynomials that meet at a heel strike; return the angles and the rates just before it, and the scatter."""
+    """Fit polynomials that meet at a heel strike; return the angles at it, the rates before it, and the scatter."""
     before, after = np.minimum(t - touch, 0.0), np.maximum(t - touch, 0.0)
     sides = [
         side[:, None] ** np.arange(1, TOUCH_DEGREE + 1)

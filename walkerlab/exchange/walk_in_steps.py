@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 TWO_FEET_TOLERANCE: Final = (
-    0.03  # rad, largest sum of the leg angles from the normal at the start of a recording on two feet
+    0.03  # rad, limit of the sum of the leg angles from the normal in a recording that starts on two feet
 )
-SHORTEST: Final = 0.25  # fraction of the mean step; an earlier first heel strike is the start itself
+SHORTEST: Final = 0.25  # fraction of the mean step period; an earlier first heel strike counts as the start
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
 MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
@@ -45,7 +45,7 @@ SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, a
 class RecordedSteps:
     """Recorded walk from its first heel strike on; column 0 is the leg that swings first."""
 
-    time_s: Array  # (samples,) since that heel strike; every later one has a sample on each side
+    time_s: Array  # (samples,) s, from that heel strike; every later heel strike has a sample on each side
     step: NDArray[np.int64]  # (samples,) index of the step
     angle_rad: Array  # (samples, 2)
     velocity_rad_s: Array  # (samples, 2)
@@ -60,9 +60,9 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     """Find the steps of a recorded walk.
 
     source         name of the recording, for messages
-    touch_sum_rad  sum of the leg angles from the slope's normal at heel strikes; not 0 if slope or sensors are off
+    touch_sum_rad  sum of the leg angles from the slope's normal at heel strikes; 0 unless slope or sensors are off
 
-    Raises ConfigError if the recording has no complete step, or a gap within one.
+    Raises ConfigError for implausible values, a gap within a step, or a recording without a complete step.
     """
     angle = walk.both_legs("angle")
     assert angle is not None, "a walk has the angles of both legs"

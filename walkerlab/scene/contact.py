@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig, GroundConfig
     from walkerlab.config.schema import Config
 
-BUDGET_PER_STEP = 1_000_000  # right-hand sides
+BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
 SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
 GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # derivatives of a radau5 step are exact
 FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
@@ -128,7 +128,7 @@ def require_contact(config: ContactConfig) -> Contact:
 
 
 def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find the contact model's gait on pads that are its own step length apart, from a rigid start state.
+    """Find the contact model's gait on pads one step of that gait apart, searching from a rigid start state.
 
     rigid_step_length_m  initial pad pitch
     """
@@ -176,7 +176,7 @@ def friction_law(contact: Contact) -> FrictionLaw:
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
-    """Return the contact model's state for a rigid start; the stance foot just touches at along = 0 and rolls.
+    """Convert a rigid start to the contact model's state; the stance foot just touches ground at along = 0, and rolls.
 
     rigid_state  state of the rigid model with both feet on the slope; for a compass (theta_1 swing, theta_2 stance,
                  dtheta_1, dtheta_2)

@@ -75,7 +75,7 @@ def model_reads(model: str, config: ContactConfig, key: str) -> bool:
 
 
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """Build the error for the config key `where` if it names a parameter that none of the models uses."""
+    """Build the error for the config key `where`, which names a parameter `key` that none of the models uses."""
     return ConfigError(
         f"{where}: {key} does not affect the {' or the '.join(models)} model",
         "Choose a key that the model uses, or another model (--model).",

@@ -72,7 +72,7 @@ def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBran
 
 
 def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
-    """Yield for each branch the range of slopes where the ground need not pull, and its longest stable part."""
+    """Yield each branch's range of slopes where the ground need not pull on the foot, and its longest stable part."""
     for branch in branches:
         good = [point for point in branch.points if point.monitors[0] >= 0.0]
         if len(good) < 2:
@@ -109,7 +109,7 @@ def suggest_gaits(config: Config, typed: str = "") -> str:
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
-    """Return the distance (m) of the feet ahead of the shanks with the most stable gait, and that gait, or None."""
+    """Return how far (m) ahead of the shanks the feet give the most stable gait, and that gait; None without a gait."""
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).over(config, rigid_walker)(ahead_m)

@@ -51,7 +51,7 @@ GAIT_STEP: Final = 1e-3  # difference step for derivatives of the gait, relative
 class Question:
     """Parameters to estimate from a measured walk, with the settings of the estimate."""
 
-    fit: Mapping[str, tuple[float, float] | None]  # bounds of each fitted key, in its unit; None for the schema's
+    fit: Mapping[str, tuple[float, float] | None]  # bounds by fitted key, in its unit; None for the schema's bounds
     prior: Mapping[str, tuple[float, float]]  # known value and standard deviation, by key
     nuisance: tuple[str, ...] = ()  # properties of clock and sensors to estimate too
     loss: Loss = "linear"
@@ -169,7 +169,7 @@ class Fit:
 
 
 def in_time(first: Fit) -> Fit | None:
-    """Refit angles at their sample times, starting from a fit in phase; None for steps, or if it does not converge."""
+    """Refit angles at their sample times, from a fit in phase; None for measured steps or if the fit fails."""
     forecast, u = first.problem.forecast, first.fitted.u
     if not isinstance(forecast.measured, MeasuredAngles):
         return None

@@ -1,4 +1,4 @@
-"""Plan measurements: find which ones determine a walker's parameters, and the number of steps they need."""
+"""Plan measurements: find which of them determine a walker's parameters, and how many steps they need."""
 
 from __future__ import annotations
 

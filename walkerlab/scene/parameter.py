@@ -32,7 +32,7 @@ class Parameter:
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
-        """Return the config at another value, with defaults that depend on it; None if the schema rejects the value."""
+        """Return the config at another value, with dependent defaults recomputed; None if the schema rejects it."""
         return config_with(config, (self,), (value,))
 
     def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
@@ -64,7 +64,7 @@ class Parameter:
 
 
 def config_with(config: ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config | None:
-    """Return the config at values of several parameters (parameters,); None if the schema refuses them."""
+    """Return the config at values of several parameters (parameters,); None if the schema rejects them."""
     try:
         return _changed(config, parameters, values)
     except ValidationError:
@@ -113,8 +113,8 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 
 def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
-    """Return why a key is not a parameter of the config's models; empty if it is one."""
-    # `own` has the keys of this config, for its own type of walker
+    """Explain why a key is not a parameter of the config's models; empty if it is one."""
+    # `own` has the keys that exist for this config's type of walker
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):
             return "is a block of keys, not a number"

@@ -34,8 +34,8 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
 def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
     """Return the hip mass (kg) of a walker with straight legs, raised if the contact model needs more."""
-    # On compliant ground, legs that are point masses need a hip mass: otherwise, when side by side, they turn about
-    # their masses and move the massless hip freely, so that the forces do not determine its acceleration.
+    # On compliant ground, legs that are point masses need a hip mass. Otherwise legs side by side can turn about their
+    # masses and move the massless hip freely, and the forces do not determine the hip's acceleration.
     if rigid:
         return walker.hip_mass_kg
     present = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2

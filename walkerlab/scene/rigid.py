@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
     from walkerlab.config.schema import Equations, Output
 
-CACHED_LEVEL_WALKERS = 16  # families over a slope reuse the same walker
+CACHED_LEVEL_WALKERS = 16  # a family over slopes reuses its walker on level ground
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Scaled starts of the contact model, for maps and basins."""
+"""Starts of the contact model with scaled velocities, for maps and basins."""
 
 from dataclasses import replace
 
@@ -10,15 +10,15 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import ContactScene, start_state
 
-# away from boundaries between outcomes, a map is the same as with the config's tolerances (docs/adjustment.md)
+# away from boundaries between outcomes, these tolerances give the same map as the config's (docs/adjustment.md)
 MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
-LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # right-hand sides per cell: minimum, and multiple of the unchanged start's
+LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
 
 
 def starts_of(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Build a contact scene's starts from a rigid start with scaled velocities; walks must settle on any known gait."""
+    """Build a scene's starts from a rigid start with scaled velocities; walks must settle on the gait if known."""
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
     def start(swing: float, stance: float) -> State:
@@ -31,6 +31,6 @@ def starts_of(
 def for_a_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """Return the same starts with the solver settings of a map.
 
-    evaluations  right-hand sides of the walk from the unchanged start; a cell's budget is a multiple of them
+    evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them
     """
     return starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * evaluations))

@@ -24,7 +24,7 @@ from walkerlab.scene.rigid import rigid_walker
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
 
-# Solver settings for walks that only need their number of steps; the budget is per step.
+# Solver settings for walks of which only the number of steps matters; the budget is per step.
 QUICK_WALKS: Final = {
     RIGID: Tolerances("dop853", 1e-7, 1e-9, ENDLESS),
     CONTACT: Tolerances("radau5", 1e-6, 1e-8, 1_000_000),
@@ -36,7 +36,7 @@ class ModelUnderTest:
     """A model and its gait, in a form that can be sent to other processes."""
 
     model: str
-    config: ContactConfig  # config of its scene
+    config: ContactConfig  # config of the model's scene
     z: Floats  # (d,) coordinates of the gait on the section
     length_m: float  # step length
 
@@ -66,7 +66,7 @@ def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
 def find_model_gait(
     model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]
 ) -> ModelUnderTest:
-    """Return a model with its gait, for the contact model on ground without pads; raises NoAnswer if it has no gait.
+    """Return a model with its gait (the contact model's is on ground without pads); NoAnswer if it has no gait.
 
     gait  summary of `fixedpoint`
     note  receives a message about each difference from the config's scene

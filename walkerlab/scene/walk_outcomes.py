@@ -38,11 +38,11 @@ def describe_endings(
     """Count and describe the walks that ended early, the most frequent outcome first.
 
     outcomes  number of walks by outcome; other keys are ignored
-    contact   whether the contact model walked
+    contact   whether the walks are the contact model's
     pads      pads of the walks that ended off-pad
 
-    Returns rows of `outcome`, `walks`, `of` (total number of walks), `ground` (whether it is a cause) and `said`
-    (description).
+    Returns rows with `outcome`, `walks`, `of` (total number of walks), `ground` (whether the ground is the cause) and
+    `said` (description).
     """
     total = sum(walks for outcome, walks in outcomes.items() if outcome_of(outcome) is not None)
     rows = []
