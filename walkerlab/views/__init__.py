@@ -1,1 +1,1 @@
-"""Views for people: figures, reports, the interactive page and the command line; they compute no results."""
+"""Views of the results: figures, reports, the interactive page and the command line."""

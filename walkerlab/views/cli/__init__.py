@@ -1,1 +1,1 @@
-"""The command line: options, output and exit codes; each command imports everything else that it needs."""
+"""The command line: options, output and exit codes. Each command imports what it needs when it runs."""

@@ -13,9 +13,9 @@ from walkerlab.views.cli.request import Request
 
 
 def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
-    """Delete these stages' files from the run's folder, or from every run's, once confirmed; remove folders left empty.
+    """Delete the stages' files of one run or, with `every`, of all runs, after confirmation; remove emptied folders.
 
-    Raises typer.BadParameter without a terminal to confirm on, LockedError (with `--no-wait`) and StorageError.
+    Raises typer.BadParameter if there is no terminal to ask on, LockedError (with `--no-wait`) and StorageError.
     """
     if every:
         names = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
@@ -43,7 +43,7 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
 
 
 def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
-    """List files, one line each, but one line for a run's figures and one for the chunks of each sweep."""
+    """Return a line for each file, but only one line for all figures of a run and for all chunks of a sweep."""
     lines: dict[str, list[Path]] = {}
     for path in files:
         stem = {CHUNKS: f"{path.stem.rpartition('-')[0]}-*", FIGURES: "*"}.get(path.parent.name, path.name)

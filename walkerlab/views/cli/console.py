@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 SILENCE_S = 8.0
-"""Longest silence (s) while a stage runs without a terminal."""
+"""Maximum time (s) without a message while a stage runs and stderr is not a terminal."""
 
 ENOUGH_DONE, ENOUGH_S = 0.1, 3.0
-"""Fraction of the parts, and time (s), needed to predict the remaining time: the first parts are not typical."""
+"""Fraction of the parts, and time (s), after which the remaining time is predicted; the first parts are not typical."""
 
 
 class Console:
@@ -149,13 +149,13 @@ class StageLine:
         self.label, self.kernel = stage, ""
         self.total: int | None = None
         self.done = 0
-        self.progress: list[tuple[int, float]] = []  # parts done, and computing time up to then (s)
+        self.progress: list[tuple[int, float]] = []  # parts done and computing time (s), after each advance
         self.compiled_s = 0.0  # compile time within the current piece of work (s)
         self.compiling_since = 0.0
         self.began = self.work_began = time.monotonic()
 
     def start(self, label: str, total: int | None = None) -> None:
-        """Begin a piece of work."""
+        """Begin a piece of work; `total`: number of its parts, or None if unknown."""
         self.label, self.total, self.done, self.progress = label, total, 0, []
         self.work_began, self.compiled_s = time.monotonic(), 0.0
         self.console.detail(label if total is None else f"{label} ({total})")
@@ -169,7 +169,7 @@ class StageLine:
         self.console.note(text)
 
     def compiling(self, kernel: str) -> None:
-        """Exclude compilation from the computing time; `kernel` is the function being compiled, empty at the end."""
+        """Exclude compilation from the computing time; `kernel`: function now being compiled, empty at the end."""
         now = time.monotonic()
         if self.kernel and not kernel:
             self.compiled_s += now - self.compiling_since

@@ -54,7 +54,7 @@ TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "t
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY, STEPS = "trajectory", "steps"
 COLUMN_WIDTHS = {1: 252.0, 2: 516.0}
-"""Width of one or two columns of a journal (pt)."""
+"""Width (pt) of a figure that spans one or two columns of a journal."""
 STORED_WITH = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
@@ -63,7 +63,7 @@ FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 def export_from(
     folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = EXPORT_DPI
 ) -> Path:
-    """Write one item of a run to a file (`width` pt, `dpi`), and return its path.
+    """Write an item of a run to a file and return its path; a figure is `width` pt wide, with `dpi` pixels per inch.
 
     Raises ConfigError for an unknown item or format, StaleError for a missing result.
     """
@@ -86,7 +86,7 @@ def export_from(
 
 
 def draw_walker(config: Path, target: Target, console: Console) -> Path:
-    """Draw the walker of a config with its dimensions; ConfigError for a bad config or format."""
+    """Draw the walker of a config with its dimensions; ConfigError for an invalid config or unknown format."""
     # Imported here: no other export draws a walker.
     from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
@@ -129,7 +129,7 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
 
 
 def find_item(folder: RunFolder, name: str) -> Illustration | Table:
-    """Find a figure or table by name; ConfigError, with the names of all items, for an unknown one."""
+    """Find a figure or table by name; for an unknown name, raise ConfigError with a list of the run's items."""
     # Imported here: tables of the paper's values need no drawing code.
     from walkerlab.views.figures.registry import FIGURES
 
@@ -164,7 +164,7 @@ def plan_run(folder: RunFolder) -> Executor:
 def figure(
     folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
 ) -> bytes:
-    """Draw a figure as on the page; size: width (pt), pixels per inch. StaleError if its results are missing."""
+    """Draw a figure as on the page; `size`: width (pt) and pixels per inch. StaleError if its results are missing."""
     stored = results_in(folder, illustration.stages)
     run, plot = plan_run(folder), PIPELINE["plot"]
     inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
@@ -262,7 +262,7 @@ class Film:
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """Return `model`, by default contact-sim (simulate if only that has run); ConfigError if it is not a walk."""
+    """Return `model` or, if None, contact-sim (simulate if only that has run); ConfigError if `model` is not a walk."""
     if model is not None and model not in MODEL_NAMES:
         raise ConfigError(f"--model {model} is not a walk.", f"Choose from {', '.join(MODEL_NAMES)}.")
     rigid, contact = MODEL_NAMES
@@ -273,7 +273,7 @@ def walk_in(folder: RunFolder, model: str | None = None) -> str:
 def write_film(folder: RunFolder, target: Target, film: Film, console: Console) -> Path:
     """Draw a run's walk and write the animation.
 
-    Raises ConfigError for an unknown format, StaleError if there is no walk to draw, StorageError.
+    Raises ConfigError for an unknown format, StaleError if no walk can be drawn, StorageError if writing fails.
     """
     path, kind = target.of("an animation", f"{folder.name}-{film.model}", FILM_KINDS)
     ffmpeg = shutil.which("ffmpeg")

@@ -1,4 +1,4 @@
-"""Expected failures of a command: a message, advice and an exit code; bugs keep their traceback."""
+"""Turns a command's expected failures into a message, advice and an exit code; bugs keep their traceback."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 def exit_on_failure(request: Request) -> Iterator[None]:
     """Turn expected failures into a message on stderr and an exit code; with `--json`, also print a JSON object."""
     raise_on(signal.SIGTERM, KeyboardInterrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a script's background jobs ignore it
+    # background jobs of a script ignore SIGINT, and must go on doing so
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
     def print_failed(error: WalkerlabError) -> None:

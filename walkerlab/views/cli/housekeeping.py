@@ -67,7 +67,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)
     def clean(
         request: Request,
-        all_runs: Annotated[bool, typer.Option("--all", help="Clean every run in the folder of all runs.")] = False,
+        all_runs: Annotated[bool, typer.Option("--all", help="Clean all runs in the runs folder.")] = False,
         yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
     ) -> None:
         """Delete a run's results and leftovers of killed runs; keep all other files."""

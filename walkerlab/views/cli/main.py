@@ -21,17 +21,17 @@ from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
 
 def main() -> None:
     """Run the program with this process's arguments, and exit with its code."""
-    # Loaded modules stay until the command ends; searching them for garbage again and again would take longer than a
-    # warm search for gaits.
+    # Loaded modules stay until the command ends; searching them for garbage repeatedly would take longer than finding a
+    # gait with compiled code.
     gc.set_threshold(300_000, 50, 100)
-    # All matrices are small: threads that share one would wait for each other longer than they compute.
+    # All matrices are small; threads that share one would spend more time waiting than computing.
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
     def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:
-        # Imported here: help must not load the compiler, which is loaded anyway when it warns.
+        # Imported here: help must not load the compiler; when a cache warning appears, the compiler is loaded already.
         from walkerlab.physics.kernel_cache import CacheWarning
 
         own = category is CacheWarning
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def tolerate_output_errors() -> None:
-    """Discard output to closed streams, and escape characters without encoding, as in undecodable file names."""
+    """Discard output to closed streams, and escape characters that cannot be encoded, as in undecodable file names."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))

@@ -15,9 +15,9 @@ from walkerlab.views.cli.target import Target, write_file
 
 
 def write_model(run: str, runs: Path, target: Target, law: str | None, console: Console) -> list[Path]:
-    """Write a model of the walker of a run or config, computing its gait first if necessary.
+    """Write a model of a run's or config's walker, computing its gait first if necessary; return the files written.
 
-    Raises ConfigError for an unknown run or format or a walker that the format cannot express, NoAnswer without a gait.
+    Raises ConfigError for an unknown run or format, or if a format cannot express the walker; NoAnswer without a gait.
     """
     resolved = resolve(run, runs=runs)
     config, folder = resolved.loaded.config, resolved.folder

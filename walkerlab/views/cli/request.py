@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 RUNS = Path("runs")
 OF_KIND = re.compile(r"\([^)]*\)")
-"""Kind of a block that has several kinds, as in `walker(kneed)`."""
+"""Pattern for the kind of a block in a key, as in `walker(kneed)`."""
 
 
 def keys_to_set(incomplete: str) -> list[str]:
@@ -72,13 +72,13 @@ def option(*flags: str, default: Any = None, **about: Any) -> Any:
 
 
 def as_parameter(entry: Field[Any]) -> inspect.Parameter:
-    """Convert a field declared by `option` to a parameter in a signature that typer reads."""
+    """Convert a field declared by `option` to a parameter of the signature that typer reads."""
     kind, declared = inspect.Parameter.KEYWORD_ONLY, entry.metadata["option"]
     return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, declared])
 
 
 def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
-    """Convert a stage's own options to settings; `values` are by flag, None if not given.
+    """Convert a stage's own options to settings; `values`: value of each option by flag, None if the user gave none.
 
     Raises typer.BadParameter for malformed bounds, and for an option given without the options that it needs.
     """
@@ -103,7 +103,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
 
 
 def bounds(flag: str, values: Sequence[str], form: str) -> str:
-    """Convert texts NAME=A:B (or NAME for null, if `form` allows it) to a YAML block; otherwise typer.BadParameter."""
+    """Convert arguments NAME=A:B (or NAME for null, if `form` allows it) to a YAML block; else typer.BadParameter."""
     either = r"([^=]+)(?:=([^:]+):([^:]+))" + ("?" if "[" in form else "")
     parts = [re.fullmatch(either, value) for value in values]
     if None in parts:
@@ -113,7 +113,7 @@ def bounds(flag: str, values: Sequence[str], form: str) -> str:
 
 
 def pairs(flag: str, values: Sequence[str], kind: type) -> str:
-    """Convert texts NAME=VALUE,... to a YAML block; a unit without a name applies to its kind. Floats stay unquoted."""
+    """Convert arguments NAME=VALUE,... to a YAML block; with `--units`, a unit without a name applies to its kind."""
     # Imported here: few commands read files of other programs.
     from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
@@ -126,7 +126,7 @@ def pairs(flag: str, values: Sequence[str], kind: type) -> str:
 
 
 def own_parameter(name: str, option: "Option") -> inspect.Parameter:
-    """Convert a stage's own option to a parameter in a signature that typer reads."""
+    """Convert a stage's own option to a parameter of the signature that typer reads."""
     complete = keys_to_vary if option.metavar == "KEY" else None
     declared = typer.Option(option.flag, metavar=option.metavar, help=option.help, autocompletion=complete)
     kind: Any = list[str] if "=" in option.metavar or option.type is list else option.type
@@ -142,7 +142,7 @@ class Request:
 
     command: str  # name of the command as typed
     own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
-    instead: str = ""  # stage that an option runs instead of the command's own; empty if there is no such option
+    instead: str = ""  # stage to run instead of the command's own, if an option selects one; otherwise empty
     full: bool = option(
         "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
     )
@@ -178,12 +178,12 @@ class Request:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """All changes of the config in the form of `--set`."""
+        """All changes of the config, as KEY=VALUE."""
         return (*(self.sets or ()), *self.own)
 
     @property
     def typed(self) -> str:
-        """Options that select the run, each after a space; empty for the default run."""
+        """Options that select the run, each preceded by a space; empty for the default run."""
         words = [] if self.config is None else ["-c", self.config]
         for setting in self.settings:
             words += ["--set", setting]
@@ -194,14 +194,14 @@ class Request:
 
     @property
     def processes(self) -> int:
-        """Number of processes that may run at once."""
+        """Number of processes that may run simultaneously."""
         if self.jobs is not None:
             return self.jobs
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     @cached_property
     def resolved_run(self) -> "ResolvedRun":
-        """The config and its run folder, after showing the config's warnings; ConfigError if the config is invalid."""
+        """Resolve the config and its run folder, and show the config's warnings; ConfigError if it is invalid."""
         from walkerlab.pipeline.resolve import resolve
 
         run = resolve(self.config, self.settings, self.strides, self.runs, self.name)
@@ -266,13 +266,13 @@ def command(
     asks: type[Request] = Request,
     sets: Sequence["Option"] = (),
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add the decorated function, which takes a request and its own options, to a program as a command.
+    """Return a decorator that adds a function of a request and further options to a program as a command.
 
     shared   fields of the request that the command offers as options
     name     name of the command; default: the function's
     purpose  help text; default: the function's docstring
-    asks     type of the request, whose own fields come first in the help
-    sets     options that set keys of the config, first in the help
+    asks     type of the request; its additional fields come first in the help
+    sets     options that set keys of the config; they come first in the help
     Errors of the function end the command as `exit_on_failure` describes.
     """
 

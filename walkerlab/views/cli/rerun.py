@@ -17,7 +17,7 @@ SHORT = 12
 
 
 def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
-    """Recompute an artifact in an empty folder and compare; ConfigError if it is missing, StaleError if it differs."""
+    """Recompute an artifact in an empty folder; ConfigError if missing, StaleError if damaged or not reproduced."""
     try:
         stored = read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -46,7 +46,8 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
         return
     why = "the code is the same" if same_code else "the code has changed since"
     another = StaleError(
-        f"{path} is not reproduced: content {before[:SHORT]} then, {(after or 'no result')[:SHORT]} now; {why}.",
+        f"{path} is not reproduced: its content digest was {before[:SHORT]} "
+        f"and is now {(after or 'missing')[:SHORT]}; {why}.",
         "Results agree bit for bit only on the same platform with the same versions; `walkerlab show` lists both.",
     )
     print_result(request, value, [], another)

@@ -60,7 +60,7 @@ def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
 
 
 def draw(folders: tuple[RunFolder, RunFolder], results: list[dict[str, Any]]) -> list[Path]:
-    """Draw both runs' walks overlaid into the first run's figures folder; return the files."""
+    """Draw both runs' walks overlaid, store the images in the first run's figures folder, and return their paths."""
     from walkerlab.pipeline.store.files import make_folder, write_atomically
     from walkerlab.views.figures.walks import draw_runs
 
@@ -89,7 +89,7 @@ def as_object(folders: tuple[RunFolder, RunFolder], found: RunDifference, figure
 def lines(
     folders: tuple[RunFolder, RunFolder], comparison: RunDifference, figures: list[Path], every: bool
 ) -> list[str]:
-    """Describe changed config keys and changed headline values or, with `every`, all values that differ."""
+    """Describe changed config keys, and the headline values of changed stages or, with `every`, all changed values."""
     from walkerlab.views.report.numbers import number
     from walkerlab.views.report.tables import aligned
     from walkerlab.views.report.text import in_words

@@ -24,14 +24,14 @@ from walkerlab.views.report.answers import answer, verdict
 from walkerlab.views.report.tables import aligned
 
 SEARCHING = ("fixedpoint", "report")
-"""Stages that look for gaits nearby if the config has no gait."""
+"""Stages whose advice suggests nearby gaits if the config has none."""
 WRITES_CONFIG = {"design": "optimum", "identify": "identified"}
 """Stages that write a config, with the config's name."""
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its result; raises typer.Exit(4) without an answer, or as `execute` does."""
+    """Run a stage as requested and print its result; typer.Exit(4) if there is no answer. See `execute` for errors."""
     try:
         report_on(request, stage, graph)
     except ConfigError as error:
@@ -39,7 +39,7 @@ def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
 
 
 def report_on(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its result; its ConfigErrors lack the position in the config file."""
+    """Run a stage as requested and print its result; a ConfigError does not give the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     config, folder = request.resolved, request.folder
     if options.dry:
@@ -74,7 +74,7 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 def write_config(request: Request, report: StageReport, name: str) -> Path:
-    """Write a config that extends the request's config by a stage's parameters; StorageError if that fails."""
+    """Write a config that extends the request's by the parameters that a stage found; StorageError if writing fails."""
     start = config_to_extend(request.config)
     base = load(Path(start)).config
     typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
@@ -95,7 +95,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     """Describe the result: what was computed, where it is stored, and what to do next."""
     if report.artifact is None:
         return [f"{report.stage}: no result", *omission_lines(request, report)]
-    # without an answer, reason and advice are printed once, as the error
+    # if there is no answer, its reason and advice are printed only once, as the error
     separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
     own = {key: value for key, value in report.summary.items() if key not in separate}
     if "html" in own:

@@ -25,9 +25,9 @@ NOT_CURRENT = ("stale", "missing", "damaged")
 def print_status(request: Request, graph: Graph, check: bool, run: str | None) -> None:
     """Print the state of each stage, and of all runs unless one was selected.
 
-    run  name or folder of a run, judged by the config of its results; None for the request's run
-    Raises ConfigError for an unknown run, StaleError for an unknown config; with `check`, typer.Exit(5) for a stale,
-    missing or damaged result.
+    run  name or folder of a run, compared with the config stored in its results; None for the request's run
+    Raises ConfigError for an unknown run, StaleError if its config is unreadable; with `check`, typer.Exit(5) for a
+    stale, missing or damaged result.
     """
     folder = request.folder if run is None else run_named(run, request.runs)
     config = request.resolved if run is None else config_of(folder)

@@ -78,7 +78,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
         chosen, address = engine_named(request.engine)
         loaded, over = request.loaded, request.over or ()
-        block = loaded.config.sweep or Sweep()  # settings for which no option is given
+        block = loaded.config.sweep or Sweep()  # used where no option is given
         own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
         question = build_sweep(
             request.stage or block.stage,
@@ -155,7 +155,7 @@ def format_duration(seconds: float) -> str:
 
 
 def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
-    """Return the keys that the JSON object of every command has."""
+    """Return the entries that the JSON objects of a planned and of a finished sweep share."""
     return {
         "stage": "sweep",
         "run_dir": str(request.folder.path),

@@ -18,7 +18,7 @@ from walkerlab.views.explore.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
 EARLY = re.compile(r"page: (.+) \(partial")
-"""Progress line with which a command announces a partial page."""
+"""Progress line that announces a partial page."""
 JOB_PROGRAM = (
     "from walkerlab.pipeline.interrupts import end_with_parent; end_with_parent(); "
     "from walkerlab.views.cli.main import main; main()"

@@ -18,7 +18,7 @@ FIRST: Final = (
 )  # fmt: skip
 """Keys shown before any search, in this order; a trailing dot means the whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
-"""Blocks whose keys are shown initially only if active; knee-lock keys appear in searches only."""
+"""Blocks of which only non-zero keys are shown initially; keys of the knee's lock appear in searches only."""
 OF_OTHERS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
@@ -27,12 +27,12 @@ OF_OTHERS: Final = (
 AROUND: Final = 5.0
 """Factor between a slider's initial value and either end of its range."""
 FAR_AROUND: Final = 100.0
-"""Factor for keys of which only the order of magnitude is known, listed in `BY_MAGNITUDE`."""
+"""Factor for the keys in `BY_MAGNITUDE`, of which only the order of magnitude is known."""
 BY_MAGNITUDE: Final = ("contact.stiffness", "contact.damping", "velocity", "rtol", "atol", "penetration")
 DECADES: Final = 100.0
 """Ratio of bounds above which a slider is logarithmic."""
 HALVINGS: Final = 10
-"""Bisections to find the last valid value of a slider."""
+"""Number of bisections to find the last valid value of a slider."""
 
 
 def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:

@@ -48,7 +48,7 @@ class Desk:
     def ask(self, call: Callable[[], Answered]) -> Answered:
         """Run the call in the worker once it is free; status 409 if a newer request arrived meanwhile.
 
-        If the worker dies, a new one runs the call, once: the old worker may have died while idle.
+        If the worker dies, a new one retries the call once, because the old one may have died while idle.
         """
         with self._count:
             self._newest += 1
@@ -63,7 +63,7 @@ class Desk:
                     answer = self.worker.do(call, self._note_compilation)
                 except WorkerDiedError as error:
                     self.worker = self._hire()
-                    deaths += error.exit_code_of_worker != -GIVE_WAY  # the signal kills a worker that has not begun
+                    deaths += error.exit_code_of_worker != -GIVE_WAY  # the signal kills a worker without a handler yet
                     if deaths > 1:
                         return failure(500, error.message, error.advice)
                 except Exception as error:

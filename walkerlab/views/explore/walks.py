@@ -40,9 +40,9 @@ class SupersededError(BaseException):
 
 
 class GivingWay(Silent):
-    """Progress that abandons a request once a newer one waits, but only between two gaits.
+    """Progress reporter that abandons a request when a newer one waits, but only between two gaits.
 
-    Acting on the signal wherever it arrives might interrupt an import halfway.
+    Acting on the signal immediately might interrupt an import.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class ExploredConfig:
     sets: tuple[str, ...]  # values of `--set`
     runs: Path  # folder of all runs
     changes: Mapping[str, Any]  # values by key, applied after `sets`
-    models: Sequence[str] = ()  # models that walk
+    models: Sequence[str] = ()  # models whose walks are requested
     called: str | None = None  # name on the page; None for the config's own name
 
     @property
@@ -78,7 +78,7 @@ class ExploredConfig:
 
     @property
     def all_sets(self) -> list[str]:
-        """All changes of the config in the form of `--set`."""
+        """All changes of the config, as KEY=VALUE."""
         plain = {key: value if isinstance(value, str) else json.dumps(value) for key, value in self.changes.items()}
         return [*self.sets, *(f"{key}={value}" for key, value in plain.items())]
 
@@ -183,7 +183,7 @@ def curve(branch: Group) -> dict[str, list[Any]]:
 
 
 def config_text(question: ExploredConfig, name: str) -> str:
-    """Write the config as YAML that extends its starting point and lists only differences; ConfigError.
+    """Write the config as YAML that extends its starting point and lists only differences; ConfigError if invalid.
 
     If the starting point has another type of walker, the whole config is written.
     """

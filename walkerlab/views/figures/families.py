@@ -54,7 +54,7 @@ class DrawnBranch:
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
-    """Yield all branches, or all curves, of each model in the order in which they were followed."""
+    """Yield the groups called `name` (branch or curve) of each model, in the order in which they were followed."""
     groups = results[STAGE].groups
     for model in MODELS:
         for number in count():
@@ -117,7 +117,7 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the parameter values and quantities to plot between two points of a branch, given by index."""
-    # from the flip at which a branch begins, the steps' values separate as the square root of the distance
+    # near the flip at which a branch begins, the steps' values separate as the square root of the distance from it
     value, quantity = curve.value[begin : end + 1], curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
         return value, quantity
@@ -136,9 +136,9 @@ QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle
 ROOM: Final = 0.06
 """Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
 LEAST: Final = 0.05
-"""Minimum width of the bifurcation panel relative to the full range, and of a vertical axis relative to its values."""
+"""Minimum span of panel (b) as a fraction of the full range, and of a vertical axis as a fraction of its magnitude."""
 TOLD_APART: Final = 0.04
-"""Minimum distance between the labels of fold-born gaits, relative to the axis."""
+"""Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
 POINTS_BETWEEN: Final = 16
 """Sampling points per interval of a branch, to find the extremes of a quantity and to plot multipliers."""
 
@@ -185,7 +185,7 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """List parameter value and steps of the gaits born in folds; of gaits too close to label, only the shortest."""
+    """List (parameter value, steps) of gaits born in folds; of gaits whose labels would overlap, only the shortest."""
     folds = [
         (branch.period, float(curve.value[place]))
         for branch in branches
@@ -211,7 +211,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
-    """Return the range around the bifurcations, up to the end of the attractor; None without bifurcations."""
+    """Return the parameter range around the bifurcations and any attractor; None if there are no bifurcations."""
     summary = results[STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]
     if not found:

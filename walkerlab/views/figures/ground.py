@@ -30,9 +30,9 @@ DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOST, TOTAL), NO_ENERGIES)
 STRIDES, STEPS = 2, 40
-"""Strides shown of the forces (few enough to tell impacts apart), and steps shown of the energy losses."""
+"""Number of strides in the force figure, few enough to tell impacts apart, and of steps in the loss figure."""
 OF_SAMPLES: Final = 0.99
-"""Fraction of the loaded samples that is in view; impact forces are many times the weight."""
+"""Fraction of the loaded samples that the axis shows; impact forces, many times the weight, lie beyond it."""
 NOTHING: Final = 1e-3
 """Fraction of the energy lost below which a cause is not drawn."""
 

@@ -26,7 +26,7 @@ MEASURED: Final = "measured_"
 LEG_LOOKS: Final = (("swing leg", BLUE), ("stance leg", VERMILLION))
 MAX_RESIDUALS: Final = 4000  # approximate number of residuals plotted for each leg
 PHASE_INTERVALS: Final = 25  # intervals of the step's phase over which residuals are averaged
-LEADING: Final = 0.1  # smallest change, relative to the largest one in a combination, at which a parameter is named
+LEADING: Final = 0.1  # a parameter is named if its change is at least this fraction of the combination's largest
 
 
 def quantities(steps: Group) -> list[str]:

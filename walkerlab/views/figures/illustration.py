@@ -48,8 +48,8 @@ class Illustration:
     """An illustration drawn from stored results."""
 
     name: str  # file name without suffix
-    needs: tuple[Need, ...]  # results without which it cannot be drawn; other results are drawn if available
-    draw: Draw  # draws the figure and returns it with the caption's arguments; called within the common style
+    needs: tuple[Need, ...]  # required results; other results are drawn if available
+    draw: Draw  # draws the figure in the current style and returns it with the caption's arguments
     number: int | None = None  # number in the paper; None if the paper has no such figure
     words: str = ""  # file in `words/` with title, caption and text alternative; default: the figure's name
     scene: str = ""  # first argument of the templates, if one file serves several figures
@@ -89,7 +89,7 @@ class Illustration:
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
     def render(self, results: Results) -> Drawing:
-        """Return the files and texts; equal results give equal bytes."""
+        """Draw the figure and return its files and texts; equal results give equal bytes."""
         with styled():
             figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)

@@ -198,7 +198,7 @@ MAPS: Final = "stability-maps"
 STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
 _LAW: Final = Contact().in_si()
 PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
-SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # ranges of errors that the colours distinguish: stiction map, step map
+SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # error ranges of the colour scales: stiction map, step map
 VERDICT_COLOURS: Final = {
     "fine": SKY,
     "wrong silently": VERMILLION,

@@ -20,12 +20,12 @@ Point = tuple[float, float]
 HEIGHT, SMALL = 4.6, 7.5
 """Nominal height of the figure (in) and font size of its labels (pt)."""
 SMALL_ARC = 0.02
-"""Length (leg lengths) up to which a dimension has a label but no arrow, and the sole's centre no mark."""
+"""Length (leg lengths) up to which a dimension has a label but no arrow, and a sole has no mark at its centre."""
 FAINT = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
 BEHIND, BENT = -0.3, -0.75
-"""Angles (rad) of the second leg, or of its thigh, and of its shank."""
+"""Angles (rad) at which the second leg is drawn: of the whole leg or, with knees, its thigh; and of the shank."""
 BESIDE, FIRST_LANE = 0.62, 0.24
 """Distances from the leg (leg lengths): of the labels behind it, and of the first dimension line ahead of it."""
 LETTER, LINE = 0.0088, 0.0195
@@ -233,7 +233,7 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
 
 
 def draw_parts(walker: PartsWalker) -> Figure:
-    """Draw the bodies of the second leg, and those of neither leg, each in its own frame."""
+    """Draw all bodies except those of the first leg, each in its own frame."""
     shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
     figure = blank(HEIGHT)
     for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):

@@ -50,7 +50,7 @@ BELOW, BESIDE = 1.7, 0.4
 
 
 def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:
-    """Return the illustration of a robustness sweep over one parameter, or by drive; None for sweeps of other forms."""
+    """Return the illustration of a robustness sweep that varies one parameter or compares drives; otherwise None."""
     if can_be_drawn(group, parameters):
         return paper_figure(17, (), partial(over_one_parameter, group, parameters[0]))
     driven = actuations(group, parameters)

@@ -42,7 +42,7 @@ def run(
             if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
                 missing.append({"what": figure.called, "why": why})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
-    # some captions quote measured run times
+    # some captions quote run times, which differ from run to run
     return Content(
         {index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing}, timed=("figures",)
     )

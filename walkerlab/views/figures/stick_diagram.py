@@ -120,7 +120,7 @@ class Sticks:
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the indices of samples at the start and heel strikes of the first cycle, and of others in between."""
+        """Return the indices of the first cycle's samples at its start and heel strikes, and of samples in between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
         between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         if strikes.size <= CYCLE:
@@ -208,7 +208,7 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
 
 
 def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
-    """Label the landings with their times, and the walking direction with the slope above the highest points `path`."""
+    """Label the landings with their times, and draw an arrow above `path` (samples, 2), labelled with the slope."""
     length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
@@ -250,7 +250,7 @@ def entries(sticks: Sticks) -> list[Artist]:
 
 
 PAD_HEIGHT = 0.028
-"""Drawn height of a pad, leg lengths; pads have no physical thickness."""
+"""Height at which a pad is drawn (leg lengths); the model's pads have no thickness."""
 PADS: Final[tuple[dict[str, Any], ...]] = tuple(
     {"facecolor": "white", "edgecolor": look.colour, "hatch": hatch, "linewidth": 0.7}
     for look, hatch in zip(LEGS, ("////", "||||"), strict=True)
@@ -310,8 +310,8 @@ RELIEF, RELIEF_UNDER = 0.04, 0.075
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
-    """Return frame times (s) of a slow motion; by default of four steps or, for a fall, the last four and the fall."""
-    # a fall is held for a second
+    """Return frame times (s) of an animation, by default of four steps or, for a fall, the last four and the fall."""
+    # the last frame of a fall is shown for a second
     begin, shown = 0, STEPS_SHOWN if steps is None else steps
     if steps is None and sticks.ending:
         begin, shown = max(0, sticks.strikes.size - STEPS_SHOWN), sticks.strikes.size + 1

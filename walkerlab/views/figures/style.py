@@ -73,7 +73,7 @@ NARROW: Final = {
     "xtick.labelsize": 7.2,
     "ytick.labelsize": 7.2,
 }
-"""Further settings for one-column figures; superscripts in labels of 7.2 pt have 5 pt."""
+"""Further settings for one-column figures; superscripts of 7.2 pt labels are 5 pt high."""
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,11 @@ SWEEP_PANEL_HEIGHT: Final = 1.9
 MAP_HEIGHT: Final = 2.9
 MAX_PANELS: Final = 4
 MAX_LINES: Final = 5
-"""Maximum number of values of a second parameter to draw as lines; more are drawn as a map."""
+"""Maximum number of lines, one for each value of a second parameter; with more values a map is drawn."""
 DASHES: Final = ("-", "--", "-.")
 STABILITY_BOUND: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
-"""Maximum number of points plotted in a panel; of more, an even selection is shown."""
+"""Maximum number of points plotted in a panel; if there are more, an even selection is plotted."""
 PREFERRED: Final[tuple[str, ...]] = (
     "period_s", "last_step_period_s", "spectral_radius", "step_length_m", "last_step_length_m", "steps",
     "slip_per_step_m", "max_penetration_m", "min_normal_force_N", "energy_drift_J", "end_time_s",
@@ -38,7 +38,7 @@ LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
-    """Return the quantities to plot by default: the preferred ones that vary or, without any, others that vary."""
+    """Return the quantities to plot by default: preferred ones that vary or, if there are none, others that vary."""
     varying = []
     for name in group.variables:
         if is_number(group, name, dims) and name not in parameters:
@@ -91,7 +91,7 @@ def draw(
 
 
 def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], against: str) -> Figure:
-    """Plot each quantity over the quantity `against`, a row each; points of a single parameter are joined in order."""
+    """Plot each quantity over the quantity `against`, a row each; join the points in order if one parameter varies."""
     x = spread(group, against, dims)
     few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
@@ -117,7 +117,7 @@ def label(group: Group, name: str) -> str:
 
 
 def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
-    """Plot a row per quantity and a column per parameter; points of a single, monotonic parameter are joined."""
+    """Plot a row per quantity and a column per parameter; join the points if one parameter varies monotonically."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
     figure, axes = panels(0.5 + SWEEP_PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -152,7 +152,7 @@ def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
 
 
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
-    """Add stability bound, marks of gaps and scales to a panel; missing: parameter values of points without answer."""
+    """Draw the stability bound, mark the parameter values `missing` of points without an answer, and set the scales."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:
@@ -163,7 +163,7 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
 
 
 def marked(group: Group, names: Sequence[str]) -> list[Artist]:
-    """Return the legend entries of what `finish_panel` draws."""
+    """Return the legend entries of the stability bound and of the marks for points without an answer."""
     gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
     stability = [entry(STABILITY_BOUND, color=GREY, linewidth=0.8)] if RADIUS in names else []
     return [*stability, *([entry("no answer", **MISSING)] if gaps else [])]
@@ -175,7 +175,7 @@ def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot each quantity over the parameter with more values, with a line for each value of the other parameter."""
+    """Plot each quantity over the parameter with more values; each value of the other parameter gets a line."""
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
     x, values = numbers(group, across), group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}

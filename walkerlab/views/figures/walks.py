@@ -60,7 +60,7 @@ class DrawnWalk:
     strikes: Array  # (shown steps,) times of the heel strikes, s
     samples: Group  # variables stored over time
     end: int | None = None  # number of samples shown; None for all
-    recorded: bool = False  # whether it was recorded elsewhere and has its own name
+    recorded: bool = False  # whether it was recorded outside walkerlab and has its own name
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.samples[name][: self.end]
@@ -81,7 +81,7 @@ class DrawnWalk:
 
 
 def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
-    """Return the walks whose trajectories have the given variables, that of the rigid model first."""
+    """Return the walks whose trajectories have the given variables, the rigid model's walk first."""
     every = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT), (RECORDED_STAGE, RECORDED))
     there = [(stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
     return [walk_of(results[stage], look) for stage, look in there]
@@ -202,7 +202,7 @@ def draw_states(results: Results) -> Drawn:
 
 
 CYCLES = 20
-"""Strides shown: enough for the transient to end; further lines would only overlap."""
+"""Number of strides shown, enough for the transient to end; further lines would only overlap."""
 LAST_STRIDE = 2
 """Steps per stride."""
 EARLIER_WIDTH = 0.5

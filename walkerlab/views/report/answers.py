@@ -29,7 +29,7 @@ FIRST_VALUES = 6
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """Return lines that summarise a stage's result; stages without an answer of their own list their keys."""
+    """Return lines that summarise a stage's result; for a stage that is not in `ANSWERS`, list the summary's keys."""
     if not summary:
         return []
     return lay_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(describe_summary(summary, short=True))
@@ -49,7 +49,7 @@ def lay_out(blocks: Iterable[str | Table]) -> list[str]:
 
 
 def fixedpoint(summary: Summary) -> list[str | Table]:
-    """Describe the gait, with both sets of equations side by side if the digits shown differ."""
+    """Describe the gait, with both sets of equations side by side if their displayed digits differ."""
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
         return [f"No gait on a slope of {slope}: {summary['reason']}."]

@@ -36,7 +36,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Statements:
-    """Statements in a row, each with a subject and a verdict."""
+    """Statements shown together, in one of four layouts."""
 
     template: ClassVar[str] = "statements"
     items: tuple[Statement, ...]
@@ -45,11 +45,11 @@ class Statements:
 
 @dataclass(frozen=True)
 class Statement:
-    """One statement."""
+    """A statement about a subject, with an optional verdict."""
 
     about: str  # subject, set bold
     text: str
-    badge: str = ""  # verdict in a word; empty for none
+    badge: str = ""  # verdict in a word, or empty
     tone: Tone = "plain"
 
 
@@ -215,7 +215,7 @@ class Section:
     anchor: str  # id, unique on the page
     title: str
     blocks: tuple[PageBlock, ...] = ()
-    finding: str = ""  # one-sentence result; a section that has one is folded, with only this sentence visible
+    finding: str = ""  # one-sentence result; if there is one, the section is folded and shows only this sentence
     page: str = MAIN  # file of the page
 
     @classmethod

@@ -30,7 +30,7 @@ class Page:
     lead: tuple[str, ...] = ()  # paragraphs under the title
     file: str = MAIN
     study: Source | None = None  # the study reproduced, or None
-    relation: str = "Redoes"  # begins the line on the study: Redoes, or After if the scene differs
+    relation: str = "Redoes"  # first word of the line about the study: Redoes, or After if the scene differs
     pending: tuple[str, ...] = ()  # results still being computed
     run: str = ""  # name of the run for suggested commands; empty for the default run
 

@@ -48,7 +48,7 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """Turn a function of results and summary into a section; None if the summary is empty or lacks the key `needed`."""
+    """Pass a stage's summary to the decorated function; no section if the summary is empty or has no key `needed`."""
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:
         @wraps(make)

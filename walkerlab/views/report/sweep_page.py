@@ -37,7 +37,7 @@ class Files:
 def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> Files:
     """Plot a sweep's quantities over its parameters, or over `against`, and write its page.
 
-    Raises ConfigError for an unknown quantity, StorageError if the system refuses.
+    Raises ConfigError for an unknown quantity, StorageError if writing fails.
     """
     group, question = swept.group, swept.question
     check_quantities(group, question.dims, names)
@@ -72,7 +72,7 @@ def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], 
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity in `names` (by option); first results may lack nested quantities."""
+    """Raise ConfigError for an unknown quantity in `names` (by option); nested ones may appear later."""
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

@@ -1,4 +1,4 @@
-"""Tables for pages, terminal, CSV and, in `tex`, LaTeX: one description of columns and records for all formats."""
+"""Tables, described once by columns and records, for pages, terminal and CSV; for LaTeX see `tex`."""
 
 import re
 import unicodedata
@@ -73,7 +73,7 @@ class Column:
 def measured(
     words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
 ) -> Column:
-    """Return a column of numbers in a prefixed unit; the unit comes from `labels` or from the suffix of the key."""
+    """Return a column of numbers in a unit scaled by `prefix`; the unit comes from `labels` or the key's suffix."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
     factor = PREFIXES[prefix]
 

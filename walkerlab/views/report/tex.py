@@ -34,7 +34,7 @@ TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\t
 
 
 def as_tex(content: Table) -> bytes:
-    """Format a table for booktabs and siunitx, as a float if it has a caption, without columns of sentences."""
+    """Format a table for booktabs and siunitx, as a float if it has a caption; columns of sentences are left out."""
     heads, rows = flat(content)
     columns = [in_column(head, [row[place].datum for row in rows]) for place, head in enumerate(heads)]
     head, *lines = [" & ".join(line) + r" \\" for line in zip(*(cells for _, cells in columns), strict=True)]

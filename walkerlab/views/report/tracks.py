@@ -52,7 +52,7 @@ class Track:
         return Track({name: values[inside] for name, values in self.channels.items()})
 
     def thinned(self, gap: float) -> Track:
-        """Keep in each interval of `gap` s the first sample, that of the largest force, and both sides of a jump."""
+        """Keep the first and the most loaded sample of each interval of `gap` s, and both sides of every jump."""
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)
         first = np.flatnonzero(np.diff(bins, prepend=-1))

@@ -50,7 +50,7 @@ function remember() {
   remember.last = fragment();
 }
 
-// Requests: one at a time; of those made meanwhile only the last is sent.
+// Requests are sent one at a time; of those made while one is answered, only the last is sent.
 
 let [asking, next] = [false, false];
 
@@ -92,7 +92,7 @@ function say(text, tone = "plain") {
   byId("said").className = `statement ${tone}`;
 }
 
-// Positions in a command line mean nothing on a page; they are removed.
+// Remove positions in a command line, which mean nothing on a page.
 const ended = (text = "") => text && (/^[a-z]+[ :]/.test(text) ? text[0].toUpperCase() : text[0]) + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
 const placeless = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
 const sentence = ({ message, advice }) => [placeless(message), advice].map(ended).join(" ").trim();

@@ -76,7 +76,7 @@ LOSS_HEADS = {
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
-    """Return the energy (J) that a gait loses in a channel; None if knees lose nothing."""
+    """Return the energy (J) that a gait loses in a channel; None for a knee channel without losses."""
     energy = gait["lost_J"].get(channel)
     return energy if energy or channel in ("damping", "friction") else None
 

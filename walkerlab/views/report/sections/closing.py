@@ -46,7 +46,7 @@ def left_out(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """Yield one row per reason: what is missing, then what depends on it."""
+    """Yield for each reason a row of results missing because of it, then a row of any results that depend on them."""
     reasons = {absent.why for absent in missing}
     # the innermost reason is the last part: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}

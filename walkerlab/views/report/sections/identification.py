@@ -13,7 +13,7 @@ from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
 NO_EFFECT = 1e-6
-"""Fraction of the largest singular value below which a combination has no effect on any walk."""
+"""Fraction of the largest singular value below which a parameter combination counts as having no effect on any walk."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 GAIT_WORDS = {
@@ -116,7 +116,7 @@ def with_error(value: float, error: float | None, unit: str) -> str:
 
 
 def mass_in_words(key: str, text: str) -> str:
-    """Describe a mass in a builder's words, as in 'the hip weighs 9.8 ± 0.2 kg'."""
+    """Describe a mass in words, as in 'the hip weighs 9.8 ± 0.2 kg'."""
     body = axis_label(key).removesuffix(" mass")
     return f"the legs weigh {text} kg each" if body == "leg" else f"the {body} weighs {text} kg"
 
@@ -163,7 +163,7 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def noise_in_words(summary: Mapping[str, Any]) -> str:
-    """Describe the noise of the floor, then that of the measurement."""
+    """Describe the roughness of the floor and the noise of the measurement."""
     floor = summary["noise"]["process"]["roughness_m"]
     parts = [f"floor {number(1e3 * floor, 2)} mm rough" if floor else "an even floor"]
     parts += [

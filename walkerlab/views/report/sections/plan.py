@@ -24,7 +24,7 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
 
 
 def goals(summary: Mapping[str, Any]) -> list[str]:
-    """Return a sentence for each target error that gives the fewest steps to reach it."""
+    """Return a sentence for each target error, with the fewest steps that reach it."""
     rows = summary["measurements"]
     return [
         goal(rows, place, summary["max_steps"]) for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry

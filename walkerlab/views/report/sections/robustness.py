@@ -14,7 +14,7 @@ MAX_DERIVATIVES = 12
 BUILDER_KEYS = ("walker.", "push_off.")
 """Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
-"""Quantity that ranks the parameters; it is scaled, since a norm in s/m depends on leg length by its unit alone."""
+"""Quantity that ranks the parameters; dimensionless, since leg length would change a norm in s/m by its unit alone."""
 MODEL_COLUMN = Column("model", "model")
 NORM_COLUMNS = (
     MODEL_COLUMN,

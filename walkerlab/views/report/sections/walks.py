@@ -69,7 +69,7 @@ def joules(value: float, digits: int = 4) -> str:
 
 HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("does not hold (ignored)", "fair")
 RELATIVE_ROUNDING = 1e-6
-"""Relative energy drift, and scuffing depth in leg lengths, that count as zero."""
+"""Largest relative energy drift, and largest scuffing depth in leg lengths, that count as zero."""
 ASSUMPTION_COLUMNS = (
     Column("assumption", "assumption"),
     Column("measured", "measured", wide=True),
