@@ -36,7 +36,7 @@ FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25
 FORMULAS = (CENTRAL_4TH, FORWARD_4TH, tuple((-offset, -weight) for offset, weight in FORWARD_4TH))
 # grid of the search and accuracy of its bisection, in units of the disturbance
 SEARCH_GRID, BISECTION_WIDTH = 1.0 / 5000.0, 1e-6
-MAX_DISTURBANCE = 0.5  # in units of the disturbance
+MAX_DISTURBANCE = 0.5  # largest disturbance tried, in units of the disturbance
 
 
 class GaitOnMap(NamedTuple):
@@ -54,7 +54,7 @@ class GaitOnMap(NamedTuple):
 
 
 def derivative(function: Callable[[float], Floats | None], step: float) -> Floats | None:
-    """Differentiate a function at 0 to fourth order, from one side if the other lacks values; None if both do."""
+    """Differentiate a function at 0 to fourth order, one-sided if values are missing on one side; None if on both."""
     for formula in FORMULAS:
         values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
         if len(values) == len(formula):
@@ -97,13 +97,13 @@ def walk_disturbed(gait: GaitOnMap, disturbance: Disturbance, size: float, steps
 
 
 def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None:
-    """Return a gait's sensitivity to a disturbance; None if the gait is unstable or neighbouring steps fail."""
+    """Return a gait's sensitivity to a disturbance; None if the gait is unstable or a slightly disturbed step fails."""
     fine, coarse = (response(gait, disturbance, times) for times in (1.0, 2.0))
     return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return norms and response of the disturbed step, by differences of `times` the usual step size, or None."""
+    """Return the norms and the response of the disturbed step, with `times` the usual difference step, or None."""
     d, h = gait.z.size, times * gait.step_map.probe
 
     def after(size: float) -> Floats | None:
