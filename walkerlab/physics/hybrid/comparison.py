@@ -190,8 +190,7 @@ def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[n
 def orbit_distances(walk: Motion, reference: Motion) -> Array:
     """Compute the symmetric Hausdorff distance (leg,) between the orbits of the last strides in the phase plane.
 
-    Each axis is scaled by the reference orbit's range: 0.01 is one percent of the orbit's size. Raises ValueError
-    if either walk completed no stride.
+    Each axis is scaled by the reference orbit's range. Raises ValueError if either walk completed no stride.
     """
     stride, reference_stride = walk.last_stride(), reference.last_stride()
     distances = np.empty(LEG_COUNT)

@@ -55,12 +55,12 @@ class ContactSamples(NamedTuple):
 
     @property
     def dissipated_J(self) -> Any:
-        """Energy dissipated so far (samples, 5), in the order of `energy_channels.LOSSES`."""
+        """Energy dissipated up to each sample (samples, 5), in the order of `energy_channels.LOSSES`."""
         return self.account[:, LOSS_ENTRIES]
 
     @property
     def driven_J(self) -> Any:
-        """Energy supplied so far by push-off and hip (samples, 2)."""
+        """Energy supplied by push-off and hip up to each sample (samples, 2)."""
         return self.account[:, SUPPLY_ENTRIES]
 
 

@@ -249,7 +249,7 @@ def run_parts(
     walk_state: WalkState,
 ) -> Stopped:
     """Walk the hinged step, if there is one, and then the free steps."""
-    # A walk that completed all steps continues, unobserved, until the foot that carried the last step has lifted.
+    # A walk that completed all steps continues, unobserved, until the last stance foot lifts: its slip is then known.
     y, spent = start, np.zeros(4, np.int64)
     if hinged:
         first = walk_on(walker, ground, tolerances, walk_state, observer, start, hinged=True)

@@ -51,10 +51,10 @@ class WalkState(NamedTuple):
     level: Any  # (2,) m, height of the ground above the slope, for each foot
     cells: Any  # (2,) number of the cell below each foot, in the foot's lane of pads
     left_cells: Any  # (2,) number of the cell on which each foot last stood
-    foothold: Any  # (2,) m, position of each foot's last touch
-    touched: Any  # (2,) m, `material_along` at each foot's last touch
-    slipped: Any  # (2,) m, slip of each foot from its last touch to its latest lift
-    rolled: Any  # (2,) m, rolling distance of each foot over the same time
+    foothold: Any  # (2,) m, position of each foot's last touch that ended a step
+    touched: Any  # (2,) m, `material_along` of each foot at that touch
+    slipped: Any  # (2,) m, slip of each foot from that touch to its latest lift
+    rolled: Any  # (2,) m, rolling distance of each foot in the same time
     leaving: Any  # (2,) whether a foot is the former stance foot and has not lifted yet
     knee: Any  # (2,) state of each knee
     knee_strike: Any  # (steps + 1,) s, time at which the swing leg's knee locked in each step; -1 if it did not

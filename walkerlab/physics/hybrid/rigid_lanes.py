@@ -83,7 +83,7 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Return a model of two straight legs with the values that lanes need; None if it has more bodies or knees."""
+    """Convert a model of two straight legs for lanes; None if the model has knees or more bodies."""
     if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y

@@ -78,7 +78,7 @@ def is_bent(system: Mode) -> bool:
 
 @kernel_part
 def knee_angle(model: RigidModel, y: Any, first: int) -> float:
-    """Return the swing knee's angle beyond straight (rad), or its rate, if the angles or rates start at y[first]."""
+    """Return the swing knee's angle beyond straight (rad) or its rate; y[first] is the first of the angles or rates."""
     return y[first + model.shank] - y[first + model.thigh]
 
 
