@@ -30,7 +30,7 @@ from walkerlab.physics.solvers.system import Floats
 
 SAME_STATE = 1e-6  # states closer than this count as equal
 AMPLITUDE_HALVINGS = 12  # halvings of the amplitude when entering a doubled branch
-MAX_MULTIPLIER_CHANGE = 0.6  # of multipliers near the unit circle, from one point of a branch to the next
+MAX_MULTIPLIER_CHANGE = 0.6  # change of a multiplier near the unit circle from one point of a branch to the next
 CRITICAL_RANGE = 1.6  # multipliers are near the unit circle if their magnitude or its inverse is below this
 SEED_EVALUATIONS = 20  # evaluations in Newton's method from a seed
 CLOSED_LOOP = "returns to its first point"

@@ -1,11 +1,12 @@
 """Robustness of a gait: sensitivity to a floor drop and a push, the largest survivable ones, and rough ground.
 
-Gait sensitivity norm: with z the section coordinates after a step and e an indicator of it, both minus the gait's,
+The gait sensitivity norm measures the response to a disturbance d of one step. With the section coordinates z after a
+step and an indicator e of the step, both minus the gait's values,
 
     z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
 
-for a disturbance d of one step. A drop takes the state off the section of even ground for two steps; the first terms of
-the sum are therefore difference quotients of exact walks, and the derivative on even ground gives the rest.
+A drop takes the state off the section of even ground for two steps, so the first terms of the sum are difference
+quotients of exact walks, and the derivative on even ground gives the rest.
 
 Source: Hobbelen and Wisse, A disturbance rejection measure for limit cycle walkers: the gait sensitivity norm, IEEE
 Transactions on Robotics 23 (2007).

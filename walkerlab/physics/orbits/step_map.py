@@ -99,7 +99,7 @@ class StepMap(Stepper, Protocol):
     probe: float  # size of a disturbance with a linear response, in units of the walker
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """Return the worst value of each monitor (monitors,) over `steps` steps from z."""
+        """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk from z (d,) over heights (steps + 1,), current foothold first, after a hip push along the slope."""

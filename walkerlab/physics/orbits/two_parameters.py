@@ -43,7 +43,7 @@ MapAt = Callable[[float], StepMap | None]
 
 
 class Plane(NamedTuple):
-    """Second parameter of a family: step maps over the first parameter at its values, its span and present value."""
+    """Second parameter of a family: step map at each of its values, its span, and its value in the family."""
 
     map_at: MapAt
     span: ValueSpan
