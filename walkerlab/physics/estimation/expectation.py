@@ -1,4 +1,4 @@
-"""Parameter errors to expect from a walk before it is measured, from the derivatives of a predicted walk."""
+"""Parameter errors to expect from a walk before it is measured, computed from the derivatives of a predicted walk."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class PlannedWalk:
     def expect(
         self, steps: int, measured: Collection[str], noise: Mapping[str, float], roughness_m: float
     ) -> Information:
-        """Return the information about the parameters from the `measured` quantities of the first `steps` steps."""
+        """Return the information about the parameters in the `measured` quantities of the first `steps` steps."""
         deviations = np.array([noise[name] for name in self.quantities])
         used = np.isin(self.data.quantity, [self.quantities.index(name) for name in measured])
         rows = used & (self.step < steps)
@@ -43,7 +43,7 @@ class PlannedWalk:
 
 
 def planned_walk(problem: FitProblem, keys: tuple[str, ...]) -> PlannedWalk | None:
-    """Predict the walk of the problem's start with its derivatives; None if it or a neighbouring walk ends early."""
+    """Predict the walk from the problem's start, with derivatives; None if it, or a slightly changed walk, fails."""
     forecast = problem.forecast
     u = np.zeros(forecast.unknowns)
     u[: forecast.scales.size] = np.array(problem.start) / forecast.scales

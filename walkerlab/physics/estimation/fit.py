@@ -32,9 +32,9 @@ NO_NEIGHBOURS: Final = "the predicted walk, or one with slightly changed paramet
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
 SETTLED_FIT: Final = 1e-6  # relative change of the cost, or of the unknowns, that ends a round
-SAME_DERIVATIVES: Final = 1e-3  # derivatives are kept until an unknown changes by this much, in its scale
-INSIDE: Final = 1e-9  # distance from the bounds at the start, in scales
-# standard deviation of each unknown about its start, in its scale; undetermined combinations stay at the start
+SAME_DERIVATIVES: Final = 1e-3  # derivatives are kept until a scaled unknown has changed by this much
+INSIDE: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
+# prior standard deviation of each scaled unknown about its start, which keeps undetermined combinations there
 WEAK_PRIOR: Final = 1.0
 
 
@@ -72,13 +72,13 @@ class Fitted:
     evaluation: Evaluation
     data: Linearised
     predicted: Floats  # (values,) predicted values over even ground, from the most probable start
-    z: Floats  # (d,) section coordinates at the end of that walk
+    z: Floats  # (d,) section coordinates at the end of the predicted walk
     rounds: int
     why: str = ""  # reason why it did not converge; empty if it did
 
 
 def fit(problem: FitProblem, start: Floats) -> Fitted | str:
-    """Fit the unknowns from a start (unknowns,); return a reason as text if no walk near the start can be predicted.
+    """Fit the unknowns from a start (unknowns,); return the reason if no walk near the start can be predicted.
 
     Each round fits the unknowns by least squares on whitened residuals, then the standard deviations.
     """
@@ -92,8 +92,7 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
         before, u = u, least_squares_fit(problem, u, start, heights, data, noise)
         data = None if forecast.predict(u, even) is None else linearise(problem, u, heights)
         if data is None:
-            # The data pull the walker out of its basin of attraction, so the last walk that did not end early is
-            # judged.
+            # The data pull the walker out of its basin of attraction: judge the last walk that did not end early.
             u, why = before, NO_NEIGHBOURS
             data = linearise(problem, u, heights)
         if data is None:
@@ -118,7 +117,7 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
 
 
 def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
-    """Estimate the standard deviations at unknowns (unknowns,), starting from another fit; None if walks end early."""
+    """Estimate the standard deviations at u (unknowns,), starting from another fit; None if a walk ends early."""
     even = np.zeros(problem.forecast.heights)
     data, predicted = linearise(problem, u, even), problem.forecast.predict(u, even)
     if data is None or predicted is None:
@@ -162,7 +161,7 @@ def linearise(problem: FitProblem, u: Floats, heights: Floats, exact: bool = Fal
 def least_squares_fit(
     problem: FitProblem, u: Floats, start: Floats, heights: Floats, data: Linearised, noise: Noise
 ) -> Floats:
-    """Minimise the whitened residuals over the unknowns, with the derivatives of `data` near u."""
+    """Minimise the whitened residuals over the unknowns, reusing the derivatives in `data` near u."""
     from scipy.optimize import least_squares  # takes a third of a second, only needed here
 
     forecast, low_high = problem.forecast, problem.limits()

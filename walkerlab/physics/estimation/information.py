@@ -15,11 +15,13 @@ from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
 OPEN: Final = 1.0
-"""Singular value below which a combination is undetermined: a change by its whole scale stays within the noise."""
-LOST_SHARE: Final = 1e-7  # fraction of the largest singular value below which a combination has no effect at all
+"""Singular value below which a parameter combination is undetermined: changes by its scale are lost in the noise."""
+# fraction of the largest singular value below which a parameter combination counts as having no effect at all
+LOST_SHARE: Final = 1e-7
 NOISE_DRAWS: Final = 200
 NOISE_LOG_STEP: Final = 0.05
-FARTHEST_NOISE: Final = (3.0, 1.5)  # farthest below and above the most likely, in logarithms of standard deviations
+# largest distance below and above the most likely value, in the logarithm of a standard deviation
+FARTHEST_NOISE: Final = (3.0, 1.5)
 LOADED: Final = 0.1  # a parameter is named if its component in an undetermined direction is at least this
 
 
@@ -36,7 +38,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
-    """Reduce information (unknowns, unknowns), at known standard deviations, to the parameters (first unknowns)."""
+    """Reduce information (unknowns, unknowns), at known standard deviations, to the parameters, the first unknowns."""
     reduced = free_the_rest(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]
@@ -55,8 +57,8 @@ def correlations(covariance: Floats) -> Floats:
 def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:
     """Return the Satterthwaite degrees of freedom of Student's t for errors along the directions `basis`.
 
-    A short walk determines the standard deviations of floor and measurement poorly. The covariance averaged over their
-    plausible values is larger than that at the most likely values, by nu / (nu - 2) for nu degrees of freedom.
+    A short walk determines the standard deviations of floor and measurement poorly. Averaged over their plausible
+    values, the covariance is nu / (nu - 2) times as large as at the most likely values, for nu degrees of freedom.
     """
     if not len(basis):
         return information.freedom
@@ -111,7 +113,7 @@ def is_open(singular: Floats) -> NDArray[np.bool_]:
 
 
 def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, ...], set[str]]:
-    """Describe the combinations that the walk does not determine; also return the parameters in them."""
+    """Describe the parameter combinations that the walk does not determine; also return the parameters in them."""
     named, keys = [], set[str]()
     largest = information.singular_values.max(initial=0.0)
     for value, direction in zip(information.singular_values, information.directions, strict=True):

@@ -17,14 +17,14 @@ from walkerlab.physics.solvers.system import Floats
 
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
 ROUGHEST: Final = 0.02  # largest roughness, as a fraction of the leg length
-OUTLIER: Final = 6.0  # standard deviations
-SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; a missed heel strike is off by far more
-ALTERNATION: Final = 5.0  # standard deviations by which odd and even steps differ
+OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
+SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; the residual of a missed heel strike is far larger
+ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
 PHASE_BINS: Final = 20
 
 
 def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float) -> tuple[Fit, str]:
-    """Return whether a model fits, with a reason as text if not; `sizes` are the quantities' typical values."""
+    """Return whether a model fits, and the reason if it does not; `sizes` are the quantities' typical values."""
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             name, unit = name_and_unit(quantity)
@@ -66,7 +66,7 @@ def whitened_residuals(forecast: Forecast, fitted: Fitted) -> Floats:
 
 
 def alternation_of(residuals: Floats) -> float:
-    """Return the difference between odd and even steps as a normal deviate of the same probability as Student's t."""
+    """Return the difference between odd and even steps: the normal deviate with the same probability as Student's t."""
     odd, even = residuals[::2], residuals[1::2]
     if min(odd.size, even.size) < 2:
         return 0.0

@@ -40,7 +40,7 @@ class MeasuredAngles:
     phase: Floats  # (samples,) fraction of the step's period that has passed
     angles_rad: Floats  # (samples, 2) from the vertical; the leg that swings first comes first
     lengths_m: Floats | None = None  # (steps,)
-    # sum of the angles from the slope's normal at heel strikes; not zero if slope or sensors are off
+    # sum of both legs' angles from the slope's normal at heel strikes; not zero if slope or sensors are off
     touch_sum_rad: float = 0.0
 
     @property

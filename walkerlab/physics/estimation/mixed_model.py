@@ -1,7 +1,7 @@
 """Linear model with random heights: whitening, restricted likelihood of its standard deviations, and information.
 
-Everything follows from the sums of squares and products of residuals, derivatives and responses of each quantity, so
-that the cost of a likelihood does not depend on the number of samples.
+All results follow from the sums of squares and products of each quantity's residuals and derivatives, so the cost of a
+likelihood does not depend on the number of samples.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ NOISE_RATIO: Final = 1.0
 
 Without this prior, the floor could explain one quantity of a short walk exactly, with a noise of zero.
 """
-NOISE_RANGE: Final = 1e6  # ratio of the largest standard deviation of a measurement to the smallest
+NOISE_RANGE: Final = 1e6  # ratio of the largest allowed standard deviation of a measurement to the smallest
 ROUNDING: Final = 1e-14  # relative rounding error of sums of products
 LOG_STEP: Final = 1e-4  # difference step of logarithms, in derivatives of the restricted likelihood
 # eigenvalues of scaled information below this fraction of the largest are rounding errors
@@ -34,7 +34,7 @@ class Noise(NamedTuple):
     """Standard deviations of the measurement by quantity, and of the floor's heights (m)."""
 
     measurement: Floats  # (quantities,)
-    roughness_m: Any  # a float, or an array if `evaluate` takes several at once
+    roughness_m: Any  # a float, or an array (...,) for several sets of standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +42,15 @@ class Linearised:
     """Measured minus predicted values of a walk, and derivatives of the predicted values."""
 
     residuals: Floats  # (values,) relative to the walk over even ground
-    J: Floats  # (values, unknowns) derivatives by the scaled unknowns
-    G: Floats  # (values, heights) derivatives by the heights, 1/m
+    J: Floats  # (values, unknowns) derivatives with respect to the scaled unknowns
+    G: Floats  # (values, heights) derivatives with respect to the heights, 1/m
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
     prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of priors
     sizes: Floats  # (quantities,) typical size of each quantity
 
 
 class Evaluation(NamedTuple):
-    """Likelihoods and the most likely unknowns; several standard deviations add leading axes."""
+    """Likelihoods and the most likely unknowns; several sets of standard deviations add leading axes."""
 
     restricted: Any  # log-likelihood of the standard deviations, with their prior
     likelihood: Any  # log-likelihood of the data

@@ -1,4 +1,4 @@
-"""Predicted steps and angles of a walk, and their derivatives by parameters, start, sensors and floor."""
+"""Predicted steps and angles of a walk, and their derivatives with respect to parameters, start, sensors and floor."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class WalkMap(Protocol):
         """Return z (d,) with the stance foot at rest on the ground."""
 
     def sampled(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
-        """Return the legs' angles (times, 2) at times from the first heel strike, the first swing leg's first."""
+        """Return the legs' angles (times, 2), first swing leg first, at times counted from the first heel strike."""
 
     def varied(self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ...) -> VariedWalk | None:
         """Differentiate the walk and its samples along columns (d + steps + 1, columns) of start and heights."""
@@ -58,18 +58,18 @@ class Forecast:
     """Function from unknowns to predicted values.
 
     The unknowns are parameters, coordinates of the start along `directions`, and nuisances, each divided by its scale.
-    Fits of angles at fractions of each step (`in_phase`) converge from a poor first guess. Angles at their sample times
-    do not depend on the measured heel strikes; in that case periods are not counted as measured values.
+    If `in_phase`, angles are compared at fractions of each step, so that fits converge from a poor first guess; if not,
+    at their sample times, which do not depend on measured heel strikes, and periods do not count as measured values.
     """
 
     walks: WalkMap
     admits: Callable[[tuple[float, ...]], bool]  # whether parameters give a valid walker
     scales: Floats  # (parameters,) typical changes
-    z: Floats  # (d,) section coordinates about which the start is searched for
+    z: Floats  # (d,) section coordinates around which the start is searched for
     directions: Floats  # (d, starts) directions of the start that affect the next step
     measured: MeasuredSteps | MeasuredAngles
     nuisances: tuple[str, ...] = ()
-    in_phase: bool = True  # whether angles are at fractions of each measured step rather than at their sample times
+    in_phase: bool = True  # whether angles are compared at fractions of each step rather than at their sample times
 
     @cached_property
     def steps(self) -> MeasuredSteps:
@@ -138,14 +138,14 @@ class Forecast:
         return np.concatenate(parts)
 
     def differentiate(self, u: Floats, heights_m: Floats, exact: bool) -> Floats | None:
-        """Return the derivatives (values, unknowns) by the unknowns; `exact` if they enter the result."""
-        # Derivatives by parameters are difference quotients of exact walks; the others follow from tangent columns.
+        """Return the derivatives (values, unknowns) with respect to the unknowns; `exact` if they enter the result."""
+        # Derivatives by parameters are difference quotients of exact walks; the other ones follow from tangent columns.
         none = np.zeros((heights_m.size, 0))
         columns = self._columns_along(u, heights_m, none)
         return None if columns is None else self._with_parameters(u, heights_m, columns, exact)
 
     def differentiate_all(self, u: Floats, heights_m: Floats, exact: bool) -> tuple[Floats, Floats] | None:
-        """Return the derivatives (values, unknowns) by the unknowns, and (values, heights) by the heights (1/m)."""
+        """Return the derivatives by the unknowns, (values, unknowns), and by the heights, (values, heights) in 1/m."""
         columns = self._columns_along(u, heights_m, np.eye(heights_m.size))
         J = None if columns is None else self._with_parameters(u, heights_m, columns, exact)
         if columns is None or J is None:
@@ -162,7 +162,7 @@ class Forecast:
         return walk if whole else None
 
     def _times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
-        """Return the sample times (samples,) from the walk's first heel strike, and which are within the walk."""
+        """Return the sample times (samples,) from the walk's first heel strike, and whether each is within the walk."""
         assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         touches, step = np.append(0.0, np.cumsum(walk.durations_s)), self.measured.step
         times = self._measured_times() / sensors[CLOCK]
@@ -172,7 +172,7 @@ class Forecast:
         return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
 
     def _measured_times(self) -> Floats:
-        """Return the sample times (samples,) from the first measured heel strike, by the measurement's clock."""
+        """Return the sample times (samples,) from the first measured heel strike, on the measurement's clock."""
         assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         touches, step = self.measured.touches_s, self.measured.step
         return np.asarray(touches[step] + self.measured.phase * np.diff(touches)[step] - touches[0])
@@ -222,7 +222,7 @@ class Forecast:
         return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
 
     def _with_parameters(self, u: Floats, heights_m: Floats, columns: Floats, exact: bool) -> Floats | None:
-        """Return the derivatives (values, unknowns): by parameters, then the `columns` that belong to unknowns."""
+        """Join the derivatives by parameters with the `columns` of the other unknowns; returns (values, unknowns)."""
         formula, step = (CENTRAL_4TH, EXACT_STEP) if exact else (FORWARD, QUICK_STEP)
         starts, own = self.directions.shape[1], []
         predict = cache(lambda place, offset: self.predict(u + offset * step * np.eye(u.size)[place], heights_m))
@@ -236,7 +236,7 @@ class Forecast:
 
 
 def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
-    """Return the derivatives (d, starts) of the settled start as z (d,) moves along directions (d, starts)."""
+    """Return the derivatives (d, starts) of the settled start along directions (d, starts) of z (d,)."""
     h = SETTLING_STEP
     ends = [walks.settled(z + h * column, p) - walks.settled(z - h * column, p) for column in directions.T]
     return np.array(ends).reshape(-1, z.size).T / (2.0 * h)

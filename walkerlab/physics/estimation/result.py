@@ -44,8 +44,8 @@ class Information:
 
     keys: tuple[str, ...]
     correlations: Floats  # (parameters, parameters) correlations of the estimates
-    # (parameters,) singular values of the sensitivity to scaled parameters, in standard deviations of the data, while
-    # start and nuisances are free
+    # (parameters,) singular values of the sensitivity to scaled parameters, in standard deviations of the data, with
+    # start and nuisances free
     singular_values: Floats
     directions: Floats  # (parameters, parameters) one row per singular value: components of the scaled parameters
     covariance: Floats  # (parameters, parameters) in the parameters' units, along determined directions

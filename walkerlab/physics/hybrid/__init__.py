@@ -9,28 +9,28 @@ Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
     other ends    a heel strike with a bent knee, or no heel strike in time
 
 Contact model (`contact_loop`)
-    modes         forms of the tree (`ground/walker`): the first stance foot hinged or free, each knee locked or not;
-                  in every form a foot has ground or not, and a knee is RELEASED, BENT, STOPPING or LOCKED
+    modes         forms of the walker (`ground/walker`): the first stance foot hinged or free, each knee locked or not;
+                  in each form a foot has ground below it or not, and a knee is RELEASED, BENT, STOPPING or LOCKED
     each foot     HEIGHT: touch (`touch` decides whether it ends the step) or lift; LEFT_EDGE, RIGHT_EDGE: the
                   foot crosses an edge of a pad; RELEASE, FULL_DAMPING, FRICTION_SWITCHES: switching points of the
-                  force law, where solver steps end and nothing else happens; VERTICAL_VELOCITY: the leading foot
+                  force law, at which solver steps end and nothing else happens; VERTICAL_VELOCITY: the leading foot
                   stops sinking in, and the trailing knee is released
     walker        PASSING: the feet pass each other, and each may gain or lose its ground; FALL: the hip is too low:
                   fell; SLIDE: the stance foot slid too far: slid
     each knee     EXTENSION: a bent knee becomes straight, and locks or meets its stop; EXTENSION_RATE: a knee turns
                   back in its stop, and latches
-    no function   PULSE_END: the push-off ends, and a trailing knee that waited for its end is released
-    other ends    no touch in time, no foot on the ground for too long, a touch with a bent knee, off a pad, stubbed
+    timed         PULSE_END: the push-off ends, and a trailing knee that waited for its end is released
+    other ends    no touch in time, too long a flight, a touch with a bent knee, a trip on a pad, a stubbed foot
 
 | file | content |
 |---|---|
 | `endings` | codes by which kernels of both models report the end of a walk |
 | `contact_events`, `contact_crossings` | the events; event functions along a step, and their first zero |
-| `contact_state` | the walk state apart from coordinates: stance, contacts, signs of the event functions |
+| `contact_state` | the state of a walk besides coordinates: stance, contacts, signs of the event functions |
 | `contact_loop` | solver steps, and the search for the time of an event |
 | `contact_transitions`, `contact_jumps` | effects of events on the walk state, and on velocities, energy and tangent |
 | `contact_record`, `contact_tangent` | samples and energy balance; the derivative with respect to the start |
-| `contact_result` | a whole walk in all its forms, and its result |
+| `contact_result` | a whole walk across changes of form, and its result |
 | `rigid_walk`, `rigid_record`, `recorded_walk` | loop and events; samples and extremes; a whole walk and its result |
 | `walk_record`, `hip_work` | for both models: fields of every result; work of the hip torque |
 | `rigid_measures`, `comparison` | energies and forces along a rigid walk; differences between two walks |

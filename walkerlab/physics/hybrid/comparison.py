@@ -70,14 +70,14 @@ class Motion:
         return angle, velocity
 
     def last_before(self, end: float) -> float:
-        """Return the time (s) of the last sample before a jump at `end`, or `end` itself if nothing jumps at it."""
+        """Return the time (s) of the last sample before a jump at `end`, or `end` itself if there is no jump."""
         index = int(np.searchsorted(self.time, end))
         if index < self.time.size and self.time[index] == end and index in self._first_samples[1:]:
             return float(self.time[index - 1])
         return end
 
     def during(self, step: int, phases: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities (phases, leg) at phases of a step: 0 is after an impact, 1 before the next."""
+        """Compute angles and velocities (phases, leg) of a step; phase 0 is after an impact, 1 before the next one."""
         start, end = self.span(step)
         return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
 
@@ -92,7 +92,7 @@ class Motion:
         return (inside - start) / (end - start)
 
     def last_stride(self) -> Motion:
-        """Cut out the last two completed steps with the impacts that end them; raises ValueError if there are fewer."""
+        """Cut out the last two completed steps, with the impacts before them; raises ValueError if there are fewer."""
         if self.steps < 2:
             raise ValueError("no stride was completed")
         start = self.time[0] if self.steps == 2 else self.last_before(self.step_ends[-3])
@@ -130,7 +130,7 @@ def add_strike_samples(motion: Motion) -> Motion:
 
 
 def jumps_among(times: Array, time: float, strikes: Array, close: float) -> bool:
-    """Whether a strike lies in the interval that `times` and `time` span, further than `close` (s) from `time`."""
+    """Whether a strike lies in the interval spanned by `times` and `time`, more than `close` (s) from `time`."""
     between = (strikes > min(times[0], time)) & (strikes < max(times[-1], time)) & (np.abs(strikes - time) > close)
     return bool(between.any())
 
@@ -156,7 +156,7 @@ class WalkDifference:
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
-    """Return the sample times (s) of both walks, while both last, and `walk` minus `reference` at these times."""
+    """Return the sample times (s) of either walk while both last, and `walk` minus `reference` at these times."""
     time = np.union1d(walk.time, reference.time)
     time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
     angle, velocity = walk.at(time)
@@ -165,7 +165,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """Compute `walk` minus `reference` (step, phase, leg) in common steps; raises ValueError if no step is common."""
+    """Compute `walk` minus `reference` (step, phase, leg) in steps of both walks; ValueError if there are none."""
     steps = min(walk.steps, reference.steps)
     if steps == 0:
         raise ValueError("no step was completed by both")
@@ -176,7 +176,7 @@ def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkD
 
 
 def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
-    """Mark the phases (step, phase) in which both walks are smooth: not at impacts, nor between their knee strikes."""
+    """Mark the phases (step, phase) at which both walks are smooth: after the impact, and not between knee strikes."""
     # Between the two knee strikes the velocities differ by the whole jump, however similar the walks are.
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
     for step, row in enumerate(clear):
@@ -190,8 +190,7 @@ def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[n
 def orbit_distances(walk: Motion, reference: Motion) -> Array:
     """Compute the symmetric Hausdorff distance (leg,) between the orbits of the last strides in the phase plane.
 
-    Each axis is scaled by the reference orbit's range: 0.01 is one percent of the orbit's size. Raises ValueError
-    if either walk completed no stride.
+    Each axis is scaled by the reference orbit's range. Raises ValueError if either walk completed no stride.
     """
     stride, reference_stride = walk.last_stride(), reference.last_stride()
     distances = np.empty(LEG_COUNT)

@@ -1,8 +1,8 @@
 """Event functions of a walk on compliant ground, sampled along a step, and their first crossing.
 
-For touch, lift, pad edges, feet passing, slide and fall, the walk state stores the sign of the event function, and a
-change of that sign is the event, so simultaneous events cannot hide one another. Other events are switching points of
-the force law, where its derivatives jump: steps that end at these points preserve the method's order.
+For touch, lift, pad edges, passing feet, slide and fall, the walk state stores the sign of the event function. A change
+of that sign is the event, so simultaneous events cannot hide one another. Switching points of the force law are events
+because its derivatives jump at them: steps that end at these points preserve the method's order.
 """
 
 from typing import Any
@@ -97,7 +97,7 @@ def sample_foot(
 
 @kernel_part
 def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
-    """Return the step's fraction (or NO_CROSSING) and the number of the knees' first event."""
+    """Return the fraction of the step at which the first knee event occurs (or NO_CROSSING), and the event's number."""
     # a bent knee straightens, a knee in its stop turns back, or the stance foot stops sinking in and releases a knee
     best, event = NO_CROSSING, -1
     for knee in range(2):
@@ -121,14 +121,14 @@ def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float,
 def earliest_crossing(
     system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Return the step's fraction (or NO_CROSSING) and the number of the first event; `watch_order` adds PASSING."""
+    """Return the fraction of the step at which the first event occurs (or NO_CROSSING), and the event's number."""
     sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
     best, event = NO_CROSSING, -1
     for foot in range(2):
         if foot == system.form.hinged:
             continue
         first = foot * PER_FOOT
-        # above the ground there is no force to switch; switching after a touch belongs to the next step
+        # a foot in the air has no force to switch; switching after a touch belongs to the next step
         inside = has_ground[foot] != 0 and sides[first + HEIGHT] < 0
         last = RELEASE
         if inside and ground.frame.locate_switching and not walk_state.progress.passes_switching:
@@ -143,7 +143,7 @@ def earliest_crossing(
             fraction = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
             if fraction < best:
                 best, event = fraction, SLIDE
-    if watch_order:
+    if watch_order:  # PASSING is an event only if the order of the feet matters
         fraction = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
         if fraction < best:
             best, event = fraction, PASSING
@@ -159,10 +159,10 @@ def earliest_crossing(
 @kernel_part
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
     """Find the fraction of the step at which an event function leaves its side of zero, or NO_CROSSING."""
-    # The result is 0 if the function is already on the other side, because the previous step ended with another event
-    # past this zero or on it. If the function is zero at the start, the direction of its change decides, unless the
-    # change is mere rounding: a foot just released from its hinge may still sink in. If its own event left it at zero,
-    # its side has already changed, and the result is 0 only if it is on the other side at all nodes.
+    # The result is 0 if the function starts on the other side: another event ended the previous step beyond this zero
+    # or on it. If the function starts at zero, the direction of its change decides, unless that change is rounding: a
+    # foot just released from its hinge may still sink in. If the function is at zero because of its own event, its side
+    # has already changed, and the result is 0 only if the function is on the other side at all nodes.
     value = finder.values[event, 0]
     at_zero = zero_at_start or abs(value) < ZERO_ROUNDING
     if side != NO_SIDE:

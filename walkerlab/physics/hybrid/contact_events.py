@@ -13,7 +13,7 @@ from walkerlab.physics.kernels import by_reference, kernel_part
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
 FRICTION_SWITCHES = 5  # first of up to four switching points of the friction law
-MATERIAL, VERTICAL_VELOCITY = 9, 10  # position of the foot's material (m), which is no event; rate of its height (m/s)
+MATERIAL, VERTICAL_VELOCITY = 9, 10  # position of the foot's material (m), not an event; rate of HEIGHT (m/s)
 PER_FOOT = 11
 # event functions of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
@@ -22,17 +22,17 @@ EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
 EVENT_FUNCTIONS = SLIDE + 5
 PULSE_END = EVENT_FUNCTIONS  # has no event function: it is due at a fixed time
 NO_EVENT = -1
-LEGS_TURN = EVENT_FUNCTIONS  # row of the legs' relative angular velocity, which is no event
+LEGS_TURN = EVENT_FUNCTIONS  # row of the legs' relative angular velocity, not an event
 EVENT_ROWS = EVENT_FUNCTIONS + 1
-FARTHEST_SLIDE = 0.25  # fraction of the pitch that a stance foot's material may slide from its touch
+FARTHEST_SLIDE = 0.25  # largest slide of a stance foot's material from where it touched, as a fraction of the pitch
 
 
 class Frame(NamedTuple):
-    """Dimensions of the walker, and a setting, that the criteria of events use."""
+    """Values that the criteria of events use: dimensions of the walker, and a setting."""
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)
-    locate_switching: bool  # end steps at the switching points of the force law
+    locate_switching: bool  # whether steps end at the switching points of the force law
 
 
 @by_reference

@@ -33,14 +33,14 @@ def change_form(
     walker: ContactWalker, before: OnGround, after: OnGround, event: int, observer: ContactObserver, method: Any
 ) -> Floats:
     """Return the state in the walker's new form after an event; records the energy lost and updates the tangent."""
-    # A lock is a plastic impact, a latch loses the elastic energy of its stop, a release changes no velocity. The
-    # tangent jumps at all of these, and at a step's touch if the hip's torque then acts on the other leg. A push-off
-    # starts at that touch: the tangent of a walker with a push-off then compares walks that touch at the same time.
+    # Locks and latches are plastic impacts, a latch also loses the elastic energy of its stop, and a release changes no
+    # velocity. The tangent jumps at all of these, and at a step's touch if the hip's torque then acts on the other leg.
+    # A push-off starts at that touch, so with a push-off the tangent compares walks at equal times since the touch.
     y, t = method.y, float(method.clock[T])
     whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     x = to_full(before.form, y, size)
-    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # the touch ends a step: the other leg was the stance leg
+    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch, before which the other leg stood
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     locks = EXTENSION <= event < PULSE_END
     new = x

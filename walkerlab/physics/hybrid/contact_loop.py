@@ -41,8 +41,8 @@ LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-REWINDS = 24  # rewinds of one step after which its end counts as the event, which rounding moves at each attempt
-DOUBTS = 12  # rewinds of one step after which an event is dropped if the step's end does not confirm it
+REWINDS = 24  # rewinds of a step after which its end counts as the event; rounding moves the event at each attempt
+DOUBTS = 12  # rewinds of a step after which an event is dropped unless it occurs at the step's end
 
 
 @callable_kernel
@@ -56,13 +56,13 @@ def scan(
 
 
 class EventSearch(NamedTuple):
-    """State of the search for an event's time, in which steps are made to end at the expected time."""
+    """State of the search for an event's time, which repeats steps until one of them ends at the event."""
 
     target: float  # s, latest end of the next step
     event: int  # event that is being located, or the last event
-    latest: float  # s, end of the step in which the event appeared: upper bound of the search
+    latest: float  # s, end of the step in which the event first appeared, an upper bound of its time
     arriving: bool  # whether the target is the event's expected time
-    refinements: int  # number of corrections of that time
+    refinements: int  # number of corrections of the expected time
     rewinds: int  # number of rewinds of the present step
     stands: bool  # whether the last step is valid; if not, it is repeated up to the new target
     happens: bool  # whether the event happens at the end of the step
@@ -78,11 +78,11 @@ def walk_in_form(
     walk_state: WalkState,
     until: int,
 ) -> tuple[int, int]:
-    """Walk until the walk state is full, the walk changes its form, the hinge is released, or the walk ends.
+    """Walk until the steps fill `walk_state`, the walker changes its form, a hinged step is complete, or the walk ends.
 
     method  holds the start state, and the end state on return
-    until   NO_LIMIT; a number of steps, after which the walk also ends when the feet pass each other; or AT_LIFT: when
-            the walk state is full, the walk continues until the foot that carried the last step has lifted
+    until   NO_LIMIT; or a number of steps, after which the walk also ends when the feet pass each other; or AT_LIFT,
+            with which a full walk state does not end the walk until the foot that carried the last step has lifted
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
@@ -175,7 +175,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
 
 @kernel_part
 def forget_zeros(walk_state: WalkState, h: float) -> None:
-    """Clear `at_zero`, which keeps events from being found twice, unless the last step of h (s) was too short."""
+    """Clear `at_zero`, which prevents finding an event twice, unless the last step's length h (s) is too short."""
     if h > 2.0 * EVENT_TIME:
         for i in range(walk_state.at_zero.size):
             walk_state.at_zero[i] = 0
@@ -201,7 +201,7 @@ def react(
         note_work(observer, system, method.y)
     if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
         return WALKED
-    # the caller must apply the tangent's jumps: at changes of form, and where forces jump as the legs change roles
+    # the caller must apply the tangent's jumps, at changes of form and if forces jump as the legs change roles
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return CHANGES_FORM
     if not is_switching(event):
@@ -216,13 +216,13 @@ def is_hinged(system: OnGround) -> bool:
 
 @kernel_part
 def jumps_at_touch(system: OnGround) -> bool:
-    """Whether forces may change abruptly at a step's touch: the legs change roles at the hip, or a push-off begins."""
+    """Whether forces may jump at the touch that ends a step: the legs change roles at the hip, or a push-off begins."""
     return is_sprung(system.form, HIP_ROW) or system.form.push_off != 0.0
 
 
 @kernel_part
 def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
-    """Compute the time (s) at which step or flight becomes too long, or the push-off ends if that is earlier."""
+    """Compute the time (s) at which the step or a flight gets too long or the push-off ends, whichever is first."""
     by_step = walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time
     by_flight = walk_state.progress.airborne_since + LONGEST_FLIGHT * frame.pendulum_time
     left = pulse_left(system, t)

@@ -46,21 +46,21 @@ OF_ORDER_9: Quadrature = (
 @by_reference
 class ContactSamples(NamedTuple):
     time_s: Any  # (samples,)
-    states: Any  # (samples, 4 + 2 n) states of the whole walker
-    has_ground: Any  # (samples, 2) whether each foot has ground
+    states: Any  # (samples, 4 + 2 n) states of the free walker with all bodies
+    has_ground: Any  # (samples, 2) whether there is ground below each foot
     stance: Any  # (samples,) stance foot
     knees: Any  # (samples, 2) state of each knee
     level: Any  # (samples, 2) m, height of the ground above the slope, for each foot
-    account: Any  # (samples, entries) J, energy account so far
+    account: Any  # (samples, entries) J, energy account up to each sample
 
     @property
     def dissipated_J(self) -> Any:
-        """Energy dissipated so far (samples, 5), in the order of `energy_channels.LOSSES`."""
+        """Energy dissipated up to each sample (samples, 5), in the order of `energy_channels.LOSSES`."""
         return self.account[:, LOSS_ENTRIES]
 
     @property
     def driven_J(self) -> Any:
-        """Energy supplied so far by push-off and hip (samples, 2)."""
+        """Energy supplied by push-off and hip up to each sample (samples, 2)."""
         return self.account[:, SUPPLY_ENTRIES]
 
 
@@ -151,7 +151,7 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Copy the account at a step's touch, for the work in completed steps; hip work then includes the springs."""
+    """Copy the account at a step's end, for the work in completed steps; the copied hip work includes the springs."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
     observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - spring_energy(system, y)
@@ -233,7 +233,7 @@ def add_work(
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
     """Compute the energies (J) lost to damping and friction under a foot with ground."""
     # If the force law has released the foot, the damping loss is the energy that the ground's spring loses: quadrature
-    # would be inaccurate for powers of the penetration. Steps end at the release, so it holds throughout a step.
+    # would be inaccurate for powers of the penetration. Steps end at a release, so the foot stays released in a step.
     damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])

@@ -64,7 +64,7 @@ def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 
 def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
-    """Compute (samples, foot, 5): position along the slope, height (m), normal force, friction (N) and slip (m/s)."""
+    """Compute (samples, foot, 5): position along the slope, height (m), normal force, friction (N), slip (m/s)."""
     feet = np.zeros((samples.time_s.size, 2, 5))
     fill_feet(walker, samples, feet)
     return feet
@@ -72,7 +72,7 @@ def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """Fill in `sample_energies`; `system` is the free walker, and its ground and knees are set to each sample's."""
+    """Write the energies of all samples into `energies`; overwrites ground and knees of `system`, the free walker."""
     for i in range(samples.states.shape[0]):
         for k in range(2):
             system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
@@ -158,7 +158,7 @@ def new_observer(
 
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
-    """Return the walker in its present form, which shares memory with the walk state."""
+    """Return the walker in its present form; it shares memory with the walk state."""
     memory = walk_state
     return on_ground(walker, memory.has_ground, memory.knee, hinged, memory.level, memory.progress)
 
@@ -249,7 +249,7 @@ def run_parts(
     walk_state: WalkState,
 ) -> Stopped:
     """Walk the hinged step, if there is one, and then the free steps."""
-    # A walk that completed all steps continues, unobserved, until the foot that carried the last step has lifted.
+    # A walk that completed all steps continues, unobserved, until the last stance foot lifts: its slip is then known.
     y, spent = start, np.zeros(4, np.int64)
     if hinged:
         first = walk_on(walker, ground, tolerances, walk_state, observer, start, hinged=True)
@@ -267,7 +267,7 @@ def run_parts(
 
 
 def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
-    """Return dissipated energies (J) by name of the loss; losses in knees only for a walker with knees."""
+    """Return the dissipated energies (J) by channel, without the knees' channels for a walker without knees."""
     pairs = zip(LOSSES, dissipated.tolist(), strict=True)
     return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
 
@@ -295,7 +295,7 @@ def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances)
 
 
 def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
-    """Gather the drives' work from the account (J), and gravity's over distances `along` the slope and `up` (m)."""
+    """Combine gravity's work for a displacement `along` the slope and `up` (m) with the drives' work in the account."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
     return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
 

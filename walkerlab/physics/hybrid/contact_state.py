@@ -43,19 +43,21 @@ class WalkState(NamedTuple):
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
     touch_height: Any  # (steps,) m, height of the foothold above the slope
-    slip: Any  # (steps,) m, net slip of each step's stance foot; for the last step, slip up to now until the foot lifts
+    # (steps,) m, net slip of each step's stance foot from its touch to its lift, or to the other foot's touch if it has
+    # not lifted yet
+    slip: Any
     rolling: Any  # (steps,) m, rolling distance of each step's stance foot
     has_ground: Any  # (2,) whether there is ground under a foot
     level: Any  # (2,) m, height of the ground above the slope, for each foot
-    cells: Any  # (2,) cell below each foot, in the foot's lane
-    left_cells: Any  # (2,) cell of each foot's last stance
-    foothold: Any  # (2,) m, position of each foot's last touch
-    touched: Any  # (2,) m, `material_along` at each foot's last touch
-    slipped: Any  # (2,) m, slip of each foot from its last touch to its latest lift
-    rolled: Any  # (2,) m, rolling distance of each foot over the same time
+    cells: Any  # (2,) number of the cell below each foot, in the foot's lane of pads
+    left_cells: Any  # (2,) number of the cell on which each foot last stood
+    foothold: Any  # (2,) m, position of each foot's last touch that ended a step
+    touched: Any  # (2,) m, `material_along` of each foot at that touch
+    slipped: Any  # (2,) m, slip of each foot from that touch to its latest lift
+    rolled: Any  # (2,) m, rolling distance of each foot in the same time
     leaving: Any  # (2,) whether a foot is the former stance foot and has not lifted yet
     knee: Any  # (2,) state of each knee
-    knee_strike: Any  # (steps + 1,) s, time at which the knee of the step's swing leg locked; -1 if it has not
+    knee_strike: Any  # (steps + 1,) s, time at which the swing leg's knee locked in each step; -1 if it did not
     sides: Any  # (event functions,) side of zero on which each event function is: 1, -1, or 0 if not stored
     at_zero: Any  # (event functions,) whether the last event left each event function at zero
     progress: WalkProgress
@@ -125,7 +127,7 @@ def initial_sides(
 
 
 def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
-    """Return the sign of a value, or of its rate if the value is zero to rounding; and whether the value is zero."""
+    """Return the sign of a value, of its rate (if the value is zero) or `otherwise`, and whether the value is zero."""
     for value, scale in zip(value_and_rate, scales, strict=True):
         if abs(value) > START_ROUNDING * scale:
             return (1 if value > 0.0 else -1), value is not value_and_rate[0]
@@ -160,5 +162,5 @@ def is_to_lift(walk_state: WalkState) -> bool:
 
 
 def steps_with_lift(walk_state: WalkState) -> int:
-    """Count the steps whose stance foot has lifted, which completes slip and rolling: all, or all but the last."""
+    """Count the steps with complete slip and rolling: all, or all but the last if its stance foot has not lifted."""
     return int(walk_state.progress.steps) - int(is_to_lift(walk_state))

@@ -1,9 +1,9 @@
 """Tangent of a walk on compliant ground: the variational equations along the steps taken.
 
-On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. It is solved by the three-stage Radau collocation
-method on the same step, with J at the stages: for radau5 this is the exact derivative of the step itself. The force law
-is continuous at its switching points and at touch and lift, so Phi jumps only in changes of form, see `contact_jumps`.
-A foot that leaves its pad under load would also need a jump, but that happens in no gait.
+On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. This equation is solved by three-stage Radau
+collocation on the same step, with J at the stages: for radau5 this is the exact derivative of the step itself. The
+force law is continuous at its switching points and at touch and lift, so Phi jumps only at the events of
+`contact_jumps`. A foot that leaves its pad under load would also need a jump, but that happens in no gait.
 """
 
 from typing import Any, NamedTuple
@@ -31,9 +31,9 @@ RADAU_WEIGHTS = np.array(
 
 @by_reference
 class Tangent(NamedTuple):
-    """Derivative Phi of the state, and workspace for the n values of the whole walker's state."""
+    """Derivative Phi of the state, and workspace; n is the size of the free walker's state with all bodies."""
 
-    # In a form of the walker with fewer bodies, only the first rows are used.
+    # If locked knees or a hinge reduce the state, only the first rows are used.
 
     Phi: Any  # (n, directions); no directions unless the tangent is requested
     stages: Any  # (4, n, n) Jacobians at the three stages, and one more for extrapolation
@@ -95,7 +95,7 @@ def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
 
 @kernel_part
 def carry_direction(tangent: Tangent, n: int, direction: int, h: float) -> None:
-    """Advance one column of Phi (n,): solve K = J (Phi + h A K) for the stage derivatives, then add their sum."""
+    """Advance one column of Phi (n,): solve K = J (Phi + h A K) for the stage derivatives, then add h b K."""
     for i in range(3):
         for row in range(n):
             total = 0.0

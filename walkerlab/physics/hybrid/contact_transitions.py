@@ -153,7 +153,7 @@ def set_foothold(
     foot: int,
     y: Any,
 ) -> int:
-    """Set a swing foot's ground to its next foothold's height; on an ordinary plane, a foot below it is stubbed."""
+    """Set the ground under a swing foot to its next foothold's height; on an ordinary plane, a foot below it stubs."""
     set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
@@ -278,7 +278,7 @@ def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
 
 @kernel_part
 def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
-    """Release the trailing knee at a touch, or set the time of its release: see `AT_COMPRESSION`, `AT_PULSE_END`."""
+    """Release the trailing knee at a step's touch, or note what it waits for (`AT_COMPRESSION`, `AT_PULSE_END`)."""
     if form.kneed:
         if form.release_at_touch and form.push_off != 0.0:
             walk_state.progress.release = AT_PULSE_END

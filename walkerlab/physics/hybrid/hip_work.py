@@ -11,7 +11,7 @@ from walkerlab.physics.mechanics.hinges import legs_apart
 from walkerlab.physics.solvers.events import CrossingFinder, first_crossing
 from walkerlab.physics.solvers.stepping import interpolate
 
-BEYOND = 1e-12  # fraction of a step after a reversal at which the search for the next reversal starts
+BEYOND = 1e-12  # distance between a reversal and the start of the search for the next one, as a fraction of a step
 
 
 class TorqueWork(NamedTuple):

@@ -39,7 +39,7 @@ from walkerlab.physics.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJE
 from walkerlab.physics.solvers.system import State
 
 STEPS_AT_ONCE = 64
-BUDGET_OF_A_STEP = 50_000  # right-hand sides; the tightest tolerance needs about 700
+BUDGET_OF_A_STEP = 50_000  # evaluations of the right-hand side; the tightest tolerance needs about 700
 MAX_FRICTION = 1.0  # friction coefficient, about as for rubber on dry concrete
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
@@ -48,7 +48,7 @@ CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to 
 class Samples(NamedTuple):
     """Samples of a walk, on a regular grid and on both sides of every heel strike."""
 
-    time_s: Array  # (samples,) strictly rising; the sample before a heel strike is one float earlier than the one after
+    time_s: Array  # (samples,) strictly rising; samples before and after a heel strike have adjacent floats as times
     state: Array  # (samples, 2 n) rad, rad/s, swing leg first
     step: NDArray[np.int64]  # (samples,) number of the step, from 0
     bent: NDArray[np.bool_]  # (samples,) whether the swing leg's knee is free
@@ -60,7 +60,7 @@ class RigidWalkResult(WalkRecord):
 
     start: State
     before: Array  # (steps, 2 n) states just before the touches
-    after: Array  # (steps, 2 n) states just after them, with the legs' roles exchanged
+    after: Array  # (steps, 2 n) states just after the touches, with the legs' roles exchanged
     min_normal_force: float  # N, force of the ground on the stance foot
     max_friction_ratio: float  # tangential over normal force while the ground pushes; 0 if it never pushes
     max_scuff_depth: float  # m, depth of the swing foot below the slope
@@ -69,12 +69,12 @@ class RigidWalkResult(WalkRecord):
     energy_balance_residual: float  # J, over all completed steps
     lost_in_strikes: float  # J
     energy_drift: float  # J, largest range of the energy within a swing
-    mean_energy: float  # J, mean over time; potential energy from the contact point at the touch that begins each step
+    mean_energy: float  # J, mean over time; heights are measured from the contact point at the touch before each step
     samples: Samples | None
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """Demands of this walk that real ground does not meet."""
+        """Reasons why real ground would not support this walk."""
         reasons = []
         if self.min_normal_force < 0.0:
             reasons.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
@@ -111,7 +111,7 @@ def take_walk(
     """Walk `steps` steps from `start`, or until the walk ends, with a limited budget of evaluations per step.
 
     advance      called after each block with the number of steps taken in it
-    heights      (steps + 1,) m, heights of the footholds above the slope, the start's first; None for even ground
+    heights      (steps + 1,) m, heights of the footholds above the slope from the start on; None for even ground
     step_length  m, step length of the gait, by default the distance between the feet at the start. On uneven ground, a
                  foot that lands less than a quarter of it ahead of the other foot ends the walk as a fall
 
@@ -191,7 +191,7 @@ class Recorder:
         return Outcome(status)
 
     def _mean_energy(self, strikes: Array, after: Array) -> float:
-        """Compute the mean energy over time (J), with potential energy from the contact point at each step's touch."""
+        """Compute the mean energy over time (J); heights are from the contact point at the touch before each step."""
         zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
         if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
@@ -236,7 +236,7 @@ class Recorder:
         return Samples(time[order], state[order], step[order], bent[order])
 
     def finished(self, outcome: Outcome) -> RigidWalkResult:
-        if self.tally.duration == 0.0:  # no swing has begun, which would have observed the start
+        if self.tally.duration == 0.0:  # no swing has begun, so the start has not been observed yet
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:

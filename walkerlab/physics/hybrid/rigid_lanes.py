@@ -41,20 +41,20 @@ from walkerlab.physics.solvers.lanes import (
 from walkerlab.physics.solvers.system import State
 
 # rows of a batch's memory, with one value per lane
-START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the step tried last
+START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the last attempt
 NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = (
     16,
     17,
     18,
     19,
-)  # s: next step, step tried last, time, time left for a heel strike
+)  # s: next step, last attempted step, time, time left for a heel strike
 ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = 20, 21, 22, 23, 24
 LANE_ROWS = 25
-SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of integers
+SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of `LaneMemory.slots`
 
 NOBODY = -1
 FIRST_LANE_STEP = 0.1  # pendulum times
-ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion takes the walk to a heel strike that is closer than this
+ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion bridges the time to a heel strike that is closer than this
 STRIKE_REFINEMENTS = 6
 MAX_TRIES = 20_000  # attempted steps in one swing
 MIN_LANE_STEP = 1e-13  # pendulum times
@@ -70,7 +70,7 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    unpaired: float  # kg m^2; the values from this one to `lean` repeat the model's, so that loops need not load them
+    unpaired: float  # kg m^2; `unpaired` to `lean` are copies of the model's values, so that loops need not load them
     mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2
@@ -78,12 +78,12 @@ class TwoLegs(NamedTuple):
     slope: float  # rad
     lean: float  # rad
     upright: float  # rad, angle of the stance leg from the slope's normal that puts the hip above its foot's centre
-    fallen: float  # rad from `upright`; further than this the hip is too low
+    fallen: float  # rad, largest angle from `upright` at which the hip is high enough
     pendulum_time: float  # s
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Return a model of two straight legs with the values that lanes need; None if it has more bodies or knees."""
+    """Convert a model of two straight legs for lanes; None if the model has knees or more bodies."""
     if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y
@@ -224,7 +224,7 @@ def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     """Try a step in every lane and accept it where no event is possible; return whether some lane needs attention.
 
-    A lane needs it if its step may contain or has reached an event, its time is over, or steps are too many or small.
+    Attention is due if the step may contain an event or ends at one, time is over, or steps are too many or too small.
     """
     rows = memory.rows
     y, k1 = load_state(rows, START_STATE), load_state(rows, START_RATE)
@@ -336,7 +336,7 @@ def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
 
 @kernel_part
 def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) -> Jet:
-    """Compute swing theta_1 + stance theta_2 and its first two derivatives in time, at the start or end of a step."""
+    """Compute swing * theta_1 + stance * theta_2 and its first two time derivatives at the start or end of a step."""
     return (
         swing * rows[row, lane] + stance * rows[row + 1, lane],
         swing * rows[row + 2, lane] + stance * rows[row + 3, lane],
@@ -346,7 +346,7 @@ def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) 
 
 @kernel_part
 def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
-    """Interpolate swing theta_1 + stance theta_2 + constant over a lane's step by a quintic."""
+    """Interpolate swing * theta_1 + stance * theta_2 + constant over a lane's step by a quintic."""
     rows = memory.rows
     a = event_function(rows, START_STATE, lane, swing, stance)
     b = event_function(rows, END_STATE, lane, swing, stance)
@@ -369,7 +369,7 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
 
 @kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Find the fraction of a lane's step at which the hip gets too low, or NO_CROSSING if it ends high enough."""
+    """Find the fraction of a lane's step at which the hip gets too low, or NO_CROSSING if the hip ends high enough."""
     from_upright = walker.slope - walker.upright
     angle = memory.rows[END_STATE + 1, lane] + from_upright
     if abs(angle) <= walker.fallen:

@@ -70,7 +70,7 @@ def places(
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute the walker's points at angles (samples, n), rad, swing leg first; `knee_m` is in the thigh's frame."""
+    """Compute the walker's points at angles (samples, n), rad, swing leg first; `knee_m`: x, y in the thigh's frame."""
     psi = angle + walker.slope
     rolled = -walker.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
     contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))

@@ -23,8 +23,8 @@ SIMPSON = (1.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.0, 2.0 / 24.0, 4.0 / 24.
 class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of its bases final
     """Counts, extremes and energies of a walk, written by kernels.
 
-    Extremes cover the whole walk. Energies are measured from the stance foot and, except for the drift, belong to the
-    current swing. `strike_loss` and `forward_work` cover completed steps, `step_*` the current step.
+    Extremes cover the walk, except that `min_energy` and `max_energy` cover the current swing. Energies are measured
+    from the stance foot. `strike_loss` and `forward_work` cover completed steps, `step_*` the current step.
     """
 
     recorded: int  # number of samples recorded
@@ -54,7 +54,7 @@ class Observer(NamedTuple):
 
     watching: bool
     times: Any  # (samples,) s, rising
-    states: Any  # (samples, 2 n), followed by any tangent columns, which are at fixed time since the heel strike
+    states: Any  # (samples, 2 n), then any tangent columns, which compare walks at equal times since the heel strike
     steps: Any  # (samples,) number of the step of each sample
     tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a step
 
@@ -149,7 +149,7 @@ def vertex(before: float, middle: float, after: float) -> float:
 def ascend_to_worst(
     tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
-    """Record a measure's maximum near fraction `middle` of the step, below `last`, found by ever narrower parabolas."""
+    """Record a measure's maximum near fraction `middle` of the step, up to `last`, using ever narrower parabolas."""
     for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
         centre = assumptions_at(method, mode, middle)

@@ -61,10 +61,12 @@ from walkerlab.physics.solvers.system import derivative
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
 SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground a foot must land at least this far ahead
-SEARCH_START = 1e-6  # fraction of the first step; before 1e-9, rounding makes a straight knee at rest cross zero
+# fraction of a swing's first step at which the search for a knee strike starts; before 1e-9, rounding makes a straight
+# knee at rest cross zero
+SEARCH_START = 1e-6
 # event functions, rows of the finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
-LEG_RATE = 4  # row of the legs' relative angular velocity, which is no event
+LEG_RATE = 4  # row of the legs' relative angular velocity, not an event
 EVENTS = 5
 
 
@@ -76,7 +78,7 @@ def is_bent(system: Mode) -> bool:
 
 @kernel_part
 def knee_angle(model: RigidModel, y: Any, first: int) -> float:
-    """Return the angle of the swing knee beyond straight (rad), from angles at y[first] on; or its rate, from rates."""
+    """Return the swing knee's angle beyond straight (rad) or its rate; y[first] is the first of the angles or rates."""
     return y[first + model.shank] - y[first + model.thigh]
 
 
@@ -88,7 +90,7 @@ def hip_above_fall(model: RigidModel, y: Any) -> float:
 
 @kernel_part
 def may_end(system: Mode, method: Any, at_start: bool) -> bool:
-    """Whether the last step may contain an event, from values and rates at its ends; false for most of a swing."""
+    """Whether the last step may contain an event, judged by values and rates at its ends; usually false in a swing."""
     model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
     if hip_above_fall(model, y) < 0.0:
         return True
@@ -107,7 +109,7 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
     """Compute the heel strike's event function, a function that is positive with the swing foot ahead, and their rates.
 
-    For a straight leg on even ground both functions are linear in the angles, so scuffing near mid-swing is no zero.
+    For a straight leg on even ground both functions are linear in the angles, so scuffing near mid-swing is not a zero.
     Otherwise they are the foot's height above its next foothold and its distance ahead. `turn` (n,): rates or a column.
     """
     model, swing, stance = system.model, turn[SWING], turn[STANCE]
@@ -119,10 +121,10 @@ def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float,
 
 @kernel_part
 def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_start: bool = False) -> Any:
-    """Compute bounds of an event function within a step from its values, and its rates per step, at both ends.
+    """Return bounds on an event function within a step, from its values and rates (per step) at both ends.
 
     These are the bounds of the Bernstein coefficients of Hermite's cubic, widened by an eighth of their spread, far
-    more than the cubic's error. With `zero_at_start` the first coefficient is left out to divide out that zero.
+    more than the cubic's error. With `zero_at_start`, the first coefficient is left out, which divides out this zero.
     """
     second, third = start + start_rate / 3.0, end - end_rate / 3.0
     first = second if zero_at_start else start
@@ -142,7 +144,7 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
 
 @callable_kernel
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """Find the fractions of a sampled step at which heel strike ahead, fall and knee strike happen, or NO_CROSSING."""
+    """Find the fractions of a step at which heel strike (foot ahead), fall and knee strike occur, or NO_CROSSING."""
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
@@ -159,7 +161,7 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
 def take_step(
     model: RigidModel, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
-    """Take one step from time t (s): a swing and its heel strike; y then holds the state after it and tangent columns.
+    """Take one step from time t (s), a swing and its heel strike; y then holds the state and tangent columns after it.
 
     Returns WALKED and the time of the heel strike, and leaves the state before it in `method`; or another outcome and
     its time. The time of the knee strike is written into `strikes`.
@@ -277,9 +279,9 @@ class HeelStrikes(NamedTuple):
 
     time: Any  # (steps,) s
     before: Any  # (steps, m) states just before the strikes
-    after: Any  # (steps, m) states just after them, with the legs' roles exchanged
+    after: Any  # (steps, m) states just after the strikes, with the legs' roles exchanged
     knee_time: Any  # (steps,) s, times of the knee strikes; empty without knees
-    rise: Any  # (steps + 1,) m, input: rise of each foothold from the one before, beginning with the present one
+    rise: Any  # (steps + 1,) m, input: rise of each foothold from the one before, beginning with the present foothold
     nearest: float  # m, a foot that lands less than this ahead of the stance foot ends the walk; 0 on even ground
     lift: Any  # (steps + 1, columns) m, input: derivative of each rise in each column's direction
     waits: Any  # (steps, columns) s, derivative of each step's duration in each column's direction

@@ -47,7 +47,7 @@ class DrivenWork(NamedTuple):
 
 def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
     """Draw heights (steps + 1,), m, of the footholds of rough ground: the first is 0, the rest normally distributed."""
-    # The first heights do not depend on the number of heights.
+    # The first heights do not depend on how many are drawn.
     return np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, steps))
 
 
@@ -61,7 +61,7 @@ class WalkRecord:
     knee_strike_time_s: Array | None  # (steps,) when the swing knee locked, nan if it did not; None without knees
     end_time_s: float  # end of the walk, which may be later than the last touch
     work: WalkWork
-    foothold_height_m: Array | None  # (steps,) height above the slope at each touch; None on even ground
+    foothold_height_m: Array | None  # (steps,) height above the slope of each foothold; None on even ground
     driven: DrivenWork
 
     @property
@@ -80,12 +80,12 @@ class WalkRecord:
 
     @property
     def lengths_m(self) -> Array:
-        """Distances (steps,) along the slope from touch to touch, the first one from the first foothold."""
+        """Distances (steps,) along the slope from touch to touch, the first of them from the first foothold."""
         return np.diff(self.touch_along_m, prepend=0.0)
 
     @property
     def ground_m(self) -> Array:
-        """Heights (steps + 1,) of the footholds above the slope, the start's first."""
+        """Heights (steps + 1,) of the footholds above the slope, beginning with the start's."""
         heights = np.zeros(self.steps) if self.foothold_height_m is None else self.foothold_height_m
         return np.append(0.0, heights)
 

@@ -1,7 +1,7 @@
 """Attractors of a step map over a parameter, and their largest Lyapunov exponents.
 
 The largest Lyapunov exponent is the mean logarithmic growth per step of a tangent vector. Its uncertainty, at least
-1/steps, is the standard error of means over blocks of several correlation times; walks with too few are continued.
+1/steps, is the standard error of means over blocks of several correlation times; walks with few blocks are continued.
 
 Source: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980).
 """
@@ -21,8 +21,8 @@ from walkerlab.physics.solvers.system import Floats
 
 MAX_PERIOD = 48  # steps; longer cycles count as aperiodic
 REPEAT_DISTANCE = 1e-5  # points closer than this count as equal
-# largest distance between points a period apart in a walk that still converges, and largest ratio of these distances in
-# its last third to those in its first
+# a walk converges to a cycle if points a period apart are closer than NEAR_REPEAT, and if the largest such distance in
+# the last third of the walk is below MAX_APPROACH_RATIO times that in the first third
 NEAR_REPEAT, MAX_APPROACH_RATIO = 1e-3, 0.8
 GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a fraction of the largest coordinate
 MAX_BLOCKS, MIN_BLOCKS, BLOCK_LENGTH = 64, 10, 5.0  # blocks per walk; length of a block in correlation times
@@ -41,7 +41,7 @@ class Attractor:
     period: int  # steps after which it repeats; 0 if aperiodic
     periods_s: Floats  # (steps,) durations of its steps
     angles: Floats  # (steps,) rad, as in `MappedStep`
-    last: Floats  # (d,) a point on it
+    last: Floats  # (d,) last point of the walk on it
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Lyapunov:
 
 
 def may_diverge(exponents: Sequence[Lyapunov], value: float) -> bool:
-    """Whether neighbouring walks may diverge at a value: false if the nearest measured exponents are not positive."""
+    """Whether neighbouring walks may diverge at a parameter value: false if the nearest exponents are not positive."""
     below = [exponent for exponent in exponents if exponent.value <= value][-1:]
     above = [exponent for exponent in exponents if exponent.value >= value][:1]
     return not exponents or any(exponent.exponent > exponent.uncertainty for exponent in (*below, *above))
@@ -191,7 +191,7 @@ def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int
 def settle_elsewhere(
     step_map: StepMap, attractor: Attractor, starts: int, spread: float, transient: int, generator: np.random.Generator
 ) -> list[Seed]:
-    """Find periodic gaits other than the attractor that walks from scattered starts near it settle on.
+    """Find other periodic gaits, on which walks from scattered starts near the attractor settle.
 
     spread  standard deviation of the starts' coordinates, as a fraction of the largest coordinate
     """

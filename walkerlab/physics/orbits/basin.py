@@ -34,10 +34,10 @@ MAX_SETTLED_WALKS = 32  # maximum number of settled walks that are continued
 CAPTURE = 1e-3  # largest distance at which an attractor counts as reached
 NARROWING, NARROWINGS = 0.25, 6
 STARTS_PER_POINT = 24  # test walks started around each point of an attractor; all must return to it
-# steps between checks for capture; limit of right-hand sides per step
+# steps between checks for capture; maximum number of right-hand-side evaluations per step
 STEPS_PER_LOOK, BATCH_BUDGET = 16, 4_000_000
 
-# Unit walker. Walkers with two straight legs walk all starts at once, in lanes; other walkers one start at a time.
+# Unit walker. Walkers with two straight legs walk from many starts simultaneously, in lanes; others from one at a time.
 Walker = TwoLegs | RigidModel
 
 
@@ -67,7 +67,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
     points: Floats  # (period, 3) section points in walking order, starting with the smallest angle
-    reach: float  # distance from which all test walks return to it; zero if some walks leave from any distance
+    reach: float  # distance from which all test walks return to it; zero if not all return from any distance tried
 
     @property
     def period(self) -> int:
@@ -124,7 +124,7 @@ def walk_to_attractor(
 def walk_one_by_one(
     walker: RigidModel, capture: Capture, starts: Floats, fates: Fates, tolerances: tuple[float, float]
 ) -> None:
-    """Walk from one start after another, for any walker, and check for capture after each batch of steps."""
+    """Walk from one start after another with any walker, and check for capture after each batch of steps."""
     shooting, section = RigidStepper(walker, Tolerances("dop853", *tolerances, BATCH_BUDGET)), strike_section(walker)
     for number, start in enumerate(starts):
         z, steps = start, 0
@@ -147,7 +147,7 @@ def walk_one_by_one(
 
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     """Find the attractors that the unit walker reaches from section coordinates `starts` (n, 3)."""
-    # The first starts walk the full length; later ones only if they reach none of the attractors known by then.
+    # The first starts walk the full length; later starts do so only if they reach no attractor known by then.
 
     def with_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
         generator = np.random.default_rng(seed)
@@ -205,7 +205,7 @@ def same_cycle(first: Floats, second: Floats) -> bool:
 
 
 def find_reach(walker: Walker, points: Floats, cycles: Sequence[Floats], generator: np.random.Generator) -> float:
-    """Return a distance from a cycle within which test walks from all directions return to it, or zero."""
+    """Return a distance from a cycle at which test walks from all directions return to it, or zero."""
     # The distance is at most a quarter of the gap to the nearest other cycle.
     foreign = [cycle for cycle in cycles if cycle is not points]
     gap = min((float(np.linalg.norm(p - cycle, axis=1).min()) for cycle in foreign for p in points), default=np.inf)
@@ -237,13 +237,13 @@ class Window:
         return int(np.prod(self.cells))
 
     def along(self, axis: int) -> Floats:
-        """Return the cell centres along an axis, given by its index in `axes`."""
+        """Return the cell centres along the axis with this index in `axes`."""
         width = (self.upper[axis] - self.lower[axis]) / self.cells[axis]
         middles: Floats = np.arange(self.cells[axis], dtype=np.float64) + 0.5
         return self.lower[axis] + width * middles
 
     def starts(self, cells: Integers, inside: Floats | None = None) -> Floats:
-        """Return section coordinates (n, 3) of the cells with these flat indices, last axis fastest.
+        """Return section coordinates (n, 3) in the cells with these flat indices (last axis fastest).
 
         inside  (n, axes) position within each cell, in cell widths from -1/2 to 1/2; cell centres by default
         """

@@ -1,8 +1,8 @@
 """Bifurcations of gaits: folds, flips and tori as zeros of test functions, and the branch beyond a flip.
 
-Test functions of the derivative DP of n steps: det(DP - 1) for a fold, det(DP + 1) for a flip, and for a torus
+The test functions of the derivative DP of n steps are det(DP - 1) for a fold, det(DP + 1) for a flip, and for a torus
 det(DP ^ DP - 1), where the bialternate product DP ^ DP acts on pairs of directions and has products of pairs of
-multipliers as eigenvalues. All are smooth along a branch, so that fast root finders converge.
+multipliers as eigenvalues. They are smooth along a branch, so that fast root finders converge.
 
 Source: Kuznetsov, Elements of applied bifurcation theory, sections 5.4 (normal form of the flip), 10.2 and 10.3.
 """
@@ -123,7 +123,7 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
     passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
     if len(passing) < 2:
         return None
-    rate = (passing[0] - passing[1]) / (2.0 * gap)  # minus the derivative by s of the multiplier that crosses -1
+    rate = (passing[0] - passing[1]) / (2.0 * gap)  # negative derivative by s of the multiplier that crosses -1
     form, probe = None, NORMAL_FORM_STEP
     for _ in range(FORM_REFINEMENTS):
         terms = _cubic(equations, flip, v, w, probe)
@@ -162,7 +162,7 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 
 
 def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
-    """Predict a point x (d + 1,) of the doubled branch near a flip; also return a plane's normal and the amplitude."""
+    """Predict a point x (d + 1,) of the doubled branch; also return the correction plane's normal and the amplitude."""
     xi = share * form.amplitude
     s = form.cubic * xi * xi / form.rate
     guess = flip.point.x + s * flip.point.tangent

@@ -1,4 +1,4 @@
-"""Search for the contact model's own gait: walk from a rigid start to the section, then apply Newton's method.
+"""Search for a gait of the contact model: walk from a rigid start to the section, then apply Newton's method.
 
 If that fails, the gait is followed from nearly rigid ground, where the rigid gait is a good guess, to actual ground.
 """
@@ -24,9 +24,9 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
 WARM_UP_STEPS = (4, 2, 0)  # numbers of steps to walk before Newton's method, tried in turn
-SEARCH_STEP_BUDGET = 40_000  # right-hand sides per step
+SEARCH_STEP_BUDGET = 40_000  # right-hand-side evaluations per step
 CONTACT_EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
-# factors from the actual to nearly rigid ground: stiffness rises, friction velocities fall
+# factors from actual to nearly rigid ground, by which the stiffness rises and the friction velocities fall
 MAX_STIFFENING, MAX_CREEP_FACTOR = 100.0, 30.0
 # strides from nearly rigid ground (0) to the actual ground (1)
 FIRST_STRIDE, RIGIDITY_STRIDES = 0.25, Strides(1.0, 0.02, 2)
@@ -40,7 +40,7 @@ class GaitAnswer:
 
 
 def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    """Search for the contact gait near a free walker's state with both feet on the ground; say why it fails."""
+    """Search for the contact gait near a free walker's state with both feet on the ground, or state why it fails."""
     excluded = why_no_gait(walker)
     if excluded:
         return GaitAnswer(None, *excluded)
@@ -58,7 +58,7 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
 
 
 def why_no_gait(walker: ContactWalker) -> tuple[str, str] | None:
-    """Return reason and advice if conservation of momentum or energy excludes a gait on this ground; else None."""
+    """Return reason and advice if conservation of momentum or energy excludes a gait on this ground, or None."""
     if walker.slope <= 0.0 and not walker.driven:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
     friction, required = walker.friction.largest, abs(math.tan(walker.slope))
@@ -119,7 +119,7 @@ def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, cr
 
 
 def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
-    """Return the walker on ground of a rigidity between 0 (its own ground) and 1 (nearly rigid)."""
+    """Return the walker on ground of a rigidity between 0 (actual ground) and 1 (nearly rigid ground)."""
     stiffer = MAX_STIFFENING**rigidity
     return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), MAX_CREEP_FACTOR**-rigidity)
 

@@ -54,31 +54,31 @@ from walkerlab.physics.orbits.step_map import (
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
-# indices into the state of the position along the slope, the height and the first body's angle; velocities follow in
-# the same order
+# indices of the position along the slope, the height and the first body's angle in the state; velocities follow in the
+# same order
 ALONG, HEIGHT, ANGLES = 0, 1, 2
 NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True)
 class SectionStep(MappedStep):
-    # net slip over a whole stance: the landing foot's until the section, plus the trailing foot's from the section on
+    # net slip over a stance: slip of the landing foot before the section, plus slip of the trailing foot after it
     slip_m: float
-    rolling_m: float  # rolling distance, summed in the same way
+    rolling_m: float  # rolling distance over a stance, summed in the same way
     dissipated_J: Floats  # (5,) losses to damping, friction, pad edges, knee strikes and knee stops
     driven: DrivenWork
-    work: NDArray[np.int64]  # counts of right-hand sides, accepted steps, rejected steps and Jacobians
+    work: NDArray[np.int64]  # counts of right-hand-side evaluations, accepted steps, rejected steps and Jacobians
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Return the bodies that turn independently, the swing leg's first; the locked stance shank is not among them."""
+    """Return the bodies that turn independently, the swing leg's first; the locked stance shank is left out."""
     locked = walker.whole.knees[stance, 0] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
 
 def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Return the bodies whose angles are coordinates, the swing leg's first."""
-    # A latched compliant stop gives the stance shank an angle of its own.
+    # After a compliant stop has latched, the stance shank's angle differs from its thigh's.
     free = turning_bodies(walker, stance)[1:]
     if walker.kneed and not isinstance(walker.stop, IdealLock):
         return (*free, int(walker.whole.knees[stance, 0]))
@@ -98,7 +98,7 @@ def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tu
 
 
 def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
-    """Return the distance (m) of foot 0 ahead of foot 1, and its derivatives (n,) by the bodies' angles."""
+    """Return the distance (m) of foot 0 ahead of foot 1, and its derivatives (n,) with respect to the angles."""
     s, c = np.sin(angles + walker.slope), np.cos(angles + walker.slope)
     x, y = ((lever[0] - lever[1])[: angles.size] for lever in (walker.whole.foot_x, walker.whole.foot_y))
     return float(c @ x - s @ y), -(s * x + c * y)
@@ -243,7 +243,7 @@ def walk_from_section(
 
 
 def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
-    """Return the angles (steps,) from the vertical of straight legs that touch down this far ahead and up (m)."""
+    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above."""
     apart = 0.5 * np.hypot(along, up) / leg_length
     return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
@@ -314,8 +314,8 @@ class WalkerOnGround:
 class ContactMap(StepMap):
     """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
 
-    For pads, families are followed on ground that feet can touch only ahead of the stance foot, so that straight legs
-    may scuff. `watch` reports whether pads of the gait's own step length would trip the swing foot.
+    For a walker on pads, families are followed on a plane that feet can touch only ahead of the stance foot, so that
+    straight legs may scuff. `watch` reports whether pads of the gait's step length would trip the swing foot.
     """
 
     monitors = (

@@ -140,7 +140,7 @@ def step_along(
     acceptable: Callable[[CurvePoint[Data]], bool] = lambda _: True,
     before: CurvePoint[Data] | None = None,
 ) -> tuple[CurvePoint[Data], float] | NotConverged:
-    """Find the next `acceptable` point of a curve and the next step length; `before` serves to predict curvature."""
+    """Find the next `acceptable` point of a curve and the next step length; the point `before` gives the curvature."""
     lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
     if before is not None:

@@ -15,9 +15,9 @@ from walkerlab.physics.solvers.system import Floats
 
 PRECISION = 1e-9  # change of the quantity at convergence, relative to its initial value
 MAX_DESIGN_ITERATIONS = 60
-BOUND_TOLERANCE = 1e-6  # distance from a bound, as a fraction of the range
+BOUND_TOLERANCE = 1e-6  # fraction of the range; parameters closer to a bound count as on it
 SAME_OPTIMUM = 1e-4  # searches that end closer than this fraction of the range found the same optimum
-PENALTY_SLOPE = 10.0  # penalty if there is no gait, in initial values per squared range
+PENALTY_SLOPE = 10.0  # penalty if there is no gait, in initial values of the quantity per squared range
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def is_feasible(problem: DesignProblem, point: Point) -> bool:
 def search_from_starts(
     problem: DesignProblem, own: Floats, starts: int, seed: int, search: Searcher | None = None
 ) -> list[DesignSearch]:
-    """Search from the walker's own parameters and from random ones; return successful searches, best feasible first."""
+    """Search from the walker's parameters and from random ones; return successful searches, best feasible one first."""
     search = search or (lambda _, start: minimise(problem, start))
     random_starts = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (starts - 1, own.size))
     all_starts = (np.clip(own, problem.lower, problem.upper), *random_starts)

@@ -30,14 +30,14 @@ from walkerlab.physics.solvers.system import Floats
 
 SAME_STATE = 1e-6  # states closer than this count as equal
 AMPLITUDE_HALVINGS = 12  # halvings of the amplitude when entering a doubled branch
-MAX_MULTIPLIER_CHANGE = 0.6  # between neighbouring points, for multipliers near the unit circle
+MAX_MULTIPLIER_CHANGE = 0.6  # change of a multiplier near the unit circle from one point of a branch to the next
 CRITICAL_RANGE = 1.6  # multipliers are near the unit circle if their magnitude or its inverse is below this
 SEED_EVALUATIONS = 20  # evaluations in Newton's method from a seed
 CLOSED_LOOP = "returns to its first point"
 NO_WALKER = "the parameter's next value makes no walker"
 END_OF_SPAN = "end of the span"
 EDGE_TOLERANCE = 1e-12  # relative to the size of the span
-# points per branch; growth of a disturbance over a cycle beyond which gaits cannot be resolved
+# maximum number of points per branch; growth of a disturbance over a cycle beyond which gaits cannot be resolved
 MAX_BRANCH_POINTS, MAX_CYCLE_GROWTH = 400, 1e4
 
 
@@ -208,7 +208,7 @@ class BranchFollower:
 
     def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
         """Return the first gait of twice the period, at the normal form's amplitude; None if Newton's method fails."""
-        # the tangent must point away from the flip, where the halves of the cycle move apart
+        # the tangent must point away from the flip: the halves of the cycle must move apart along it
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
             point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)

@@ -31,9 +31,9 @@ from walkerlab.physics.orbits.two_parameters import (
 from walkerlab.physics.solvers.system import Floats
 
 BEFORE_FLIP = 0.02  # the attractor is followed from this far before the first flip, as a fraction of the span
-# number of parameter values, periods to search for, steps per walk
+# search for other gaits: number of parameter values, periods to search for, steps per walk
 OTHER_GAIT_VALUES, OTHER_PERIODS, CLOSE_RETURN_STEPS = 12, (3, 5, 6), 4000
-# scattered starts at each value: number, standard deviation (see `settle_elsewhere`), and steps to settle
+# scattered starts at each value: number, standard deviation (see `settle_elsewhere`), and steps allowed to settle
 SCATTERED, SCATTER_WIDTH, SCATTER_STEPS = 40, 0.1, 400
 CURVE_POINTS = 120
 RIGID, CONTACT = "rigid", "contact"
@@ -125,7 +125,7 @@ class FamilySearch:
 
     def add_attractors(self, family: Family) -> Family:
         """Add the attractors beyond the first flip of a stable branch, and their Lyapunov exponents."""
-        # They are followed from just before that flip or, if all flips lie outside the span, from an end of the span.
+        # Start just before the first flip or, if all flips lie outside the span, at an end of the span.
         span, how = self.span, self.thoroughness
         flipping = first_flip(family.branches)
         if flipping is not None:
@@ -157,7 +157,7 @@ class FamilySearch:
 
     def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
         """Add gaits of 2, 4, 8, ... steps beyond flips outside the span; return the attractor at the smallest value."""
-        # From an end of the branch a walk leaves the gait for the attractor; points that nearly repeat are the seeds.
+        # A walk from an end of the branch leaves the gait for the attractor; its nearly repeating points are the seeds.
         how = self.thoroughness
         self.announce("gaits of {model} beyond flips outside the span")
         ends = [

@@ -38,7 +38,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
 RANDOM_START = "random start"
-# rad, half the angle between the legs; on level ground or from a random start, a smaller one counts as standing
+# rad, half the angle between the legs; on level ground or from a random start, a smaller angle counts as standing
 SMALLEST_ANGLE = 1e-5
 ANGLE_NOISE = 1e-3  # relative to the angle between the legs at heel strike; samples do not resolve smaller angles
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
@@ -68,7 +68,7 @@ class RigidGait:
     period: float  # s
     step_length: float  # m
     multipliers: tuple[complex, ...]  # eigenvalues of the step map's derivative, largest first
-    residual: float  # rad, largest component of P(x) - x of a separate step, velocities times sqrt(L/g)
+    residual: float  # rad, largest component of P(x) - x, computed in a separate step, with velocities times sqrt(L/g)
     energy: float  # J, mean over the duration of the step, with heights from the stance foot
     energy_drift: float  # J, maximum minus minimum energy
     min_normal_force: float  # N
@@ -76,14 +76,14 @@ class RigidGait:
     max_scuff_depth: float  # m
     min_normal_impulse: float  # N s, from the ground at heel and knee strikes
     max_impulse_ratio: float | None  # None if the ground never pushes
-    trailing_foot_rises: bool  # whether it rises just after the heel strike
-    knee_strike: float | None  # s; None for legs without knees
+    trailing_foot_rises: bool  # whether the trailing foot rises just after the heel strike
+    knee_strike: float | None  # s, time from the heel strike; None for legs without knees
     work: dict[str, float]  # J per step, by source
     cost_of_transport: float  # work divided by weight times distance
     froude: float  # speed over sqrt(g L)
     swings: int = 1  # how often the swing leg passes the stance leg in a step
     feet_meet: bool = False  # whether the feet meet on the ground in mid-swing
-    found_by: tuple[str, ...] = ()  # the searches that led to it
+    found_by: tuple[str, ...] = ()  # searches that led to this gait
     z: tuple[float, ...] = ()  # section coordinates of the unit walker
 
     @property
@@ -115,7 +115,7 @@ class RigidGait:
 
 def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     """Whether the swing foot comes down exactly at the stance foot, in states (samples, 2 n) with straight legs."""
-    # The step map is discontinuous at such a gait: if the foot came down any further ahead, it would strike.
+    # The step map is discontinuous at such a gait: if the foot came down slightly further ahead, it would strike.
     over, ahead = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE]), swing[:, SWING] - swing[:, STANCE]
     down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
     where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
@@ -281,7 +281,7 @@ def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
 
 
 def with_partial_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
-    """Return the walker with a fraction `share` of its drive, on a slope (rad) interpolated from `slope` to its own."""
+    """Return the walker with a fraction `share` of its drive, on a slope (rad) between `slope` and the walker's."""
     parts = {name: share * walker[name] for name in ("laws", "push_off")}
     return on_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
 

@@ -1,9 +1,9 @@
 """Derivatives of gait quantities with respect to a walker parameter, by the implicit function theorem.
 
 With section coordinates z and the derivative A of the step map P, dz/dp = (I - A)^-1 dP/dp, and every quantity of the
-gait changes along (dz/dp, 1). Derivatives by p are difference quotients of exact steps along this direction; the
-derivative of a multiplier follows from A's and from its left and right eigenvectors. The difference between two step
-sizes estimates the error, and the step is halved as long as this reduces errors that are not yet small.
+gait changes along (dz/dp, 1). Derivatives with respect to p are difference quotients of exact steps in this direction;
+that of a multiplier follows from the derivative of A and from the multiplier's left and right eigenvectors. Two step
+sizes give an error estimate, and the step is halved as long as this reduces errors that are not yet small.
 """
 
 from __future__ import annotations
@@ -32,12 +32,14 @@ GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-STEP_QUANTITY_COUNT = 3  # the first ones, which follow from a single step
-MIN_EIGENVECTOR_PRODUCT = 1e-6  # multipliers coincide if |l' r| of the largest one's eigenvectors is below this
+STEP_QUANTITY_COUNT = 3  # number of quantities, the first ones, that follow from a single step
+# multipliers count as equal if their magnitudes differ by less than this, or if the condition number of the eigenvector
+# matrix is above the inverse of this
+MIN_EIGENVECTOR_PRODUCT = 1e-6
 STEP_FACTOR = 1.5  # step of a difference quotient, in fifth roots of the relative tolerance
 APPROACH_STEPS = (1e-4, 1e-2)  # multiples of that step, to find the direction of the family
 STEP_SIZES = (2.0, 1.0, 0.5, 0.25, 0.125)  # multiples of that step, tried in turn
-SMALL_ERROR = 1e-3  # relative error that needs no smaller step
+SMALL_ERROR = 1e-3  # relative error at which no smaller step is needed
 LOST_ERROR = 0.1  # relative error above which a derivative is lost in rounding
 
 
@@ -97,7 +99,7 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 
 
 def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
-    """Differentiate a gait's quantities by the parameter of its step map; empty if neighbouring steps fail."""
+    """Differentiate a gait's quantities by the parameter of the step map; empty if the map fails at nearby values."""
     h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
         closer = family_direction(gait, part * h, along)
@@ -135,7 +137,7 @@ class Derivatives(NamedTuple):
 
 
 def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
-    """Return the derivative (d,) of the gait's z by the parameter, from steps near z along a guess of it, or None."""
+    """Improve a guess of the derivative (d,) of the gait's z by the parameter, using steps along it, or return None."""
     # On compliant ground a step from z itself fails if the parameter changes the walker's dimensions: its foot would be
     # in the air or deep in the ground.
 
@@ -148,7 +150,7 @@ def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
 
 
 def differentiate(gait: GaitOnMap, h: float, guess: Floats, selection: Collection[str]) -> Derivatives | None:
-    """Compute difference quotients of step h along the family; None if neighbouring steps fail."""
+    """Compute difference quotients of step h along the family; None if the step map fails at nearby values."""
     along = family_direction(gait, h, guess)
     if along is None:
         return None

@@ -18,8 +18,8 @@ ROUNDING_FACTOR = 100.0
 class Evaluated(NamedTuple, Generic[Data]):
     outcome: Outcome | None  # WALKED if there is a value
     value: Floats  # (m,)
-    jacobian: Floats  # (m, m), or (m, m + 1) for a curve
-    data: Data  # the caller's own data
+    jacobian: Floats  # (m, m) for a point, or (m, m + 1) for a curve
+    data: Data  # data for the caller
 
     @property
     def residual(self) -> float:

@@ -37,7 +37,8 @@ WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
 TIMED_WALKS = 3
 SERIES_EFFORT = CONTACT_EFFORT._replace(most=30)
-# duration over sqrt(d / g) with static penetration d: so short a push-off ends while the other foot is still landing
+# duration of a push-off divided by sqrt(d / g), where d is the static penetration: so short a push-off ends while the
+# other foot is still landing
 PUSH_OFF_FACTOR = 0.1
 
 
@@ -73,7 +74,7 @@ def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
 
 
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
-    """Return the walker on the ground of a setting; if the series varies all parameters, its push-off is brief."""
+    """Return the walker on the ground of a setting, with a shortened push-off if the series varies all parameters."""
     # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
@@ -192,7 +193,7 @@ def solver_settings(tolerance: float) -> Tolerances:
 
 
 def observed_orders(distances: list[Distance]) -> list[float]:
-    """Return the observed orders of convergence of the period, one from each three successive settings."""
+    """Return the observed orders of convergence of the period, one for every three successive settings."""
     if len(distances) < 3:
         return []
     ratio = distances[1].setting.rigidity / distances[0].setting.rigidity

@@ -60,13 +60,13 @@ SECTION_NAMES = ("theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank")
 EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
 LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # tolerances for attractors
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
-STEPS_PER_BATCH = 8  # steps per derivative of a long walk
+STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 METHODS_AT_ONCE = 4  # solver methods kept, one for each number of tangent columns
-SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is a fixed point as well
+SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
 NO_RESIDUAL, NEAR_RESIDUAL = 1e300, 1e-6
-# largest distance from a known gait, and largest fraction of it left after a move with that gait's derivative
+# largest distance from a known gait, and largest fraction of it left after a Newton move with that gait's derivative
 RECOGNITION_DISTANCE, RECOGNITION_RESIDUAL = 0.1, 0.1
 # results other than the index of a known gait
 NEW_GAIT, NO_GAIT = -1, -2
@@ -132,7 +132,7 @@ class Memory(NamedTuple):
 
 
 class RigidStepper(local):
-    """Step map of walkers of one kind, with working memory of its own in each thread."""
+    """Step map of walkers of one kind, with separate working memory in each thread."""
 
     def __init__(self, like: RigidModel, tolerances: Tolerances) -> None:
         size, d = len(like.zero_state), int(like.coordinates)
@@ -298,7 +298,7 @@ class RigidMap(StepMap):
     probe = 2e-5
 
     def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare a family's map; `walker_at` returns None for values without a valid walker, `like` is any of them."""
+        """Prepare a family's map; `walker_at` returns None for values without a valid walker, `like` is an example."""
 
         @lru_cache(CACHE_SIZE)
         def unit_at(p: float) -> SimilarWalker | None:
@@ -370,7 +370,7 @@ class RigidMap(StepMap):
     def varied(
         self, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats = NO_TIMES
     ) -> VariedWalk | None:
-        """Differentiate a walk by tangent columns: variational equations in swings, saltation at strikes."""
+        """Differentiate a walk with tangent columns: variational equations in swings, saltation at strikes."""
         unit = self._unit_at(p)
         if unit is None:
             return None
@@ -466,12 +466,12 @@ class SimilarWalker(NamedTuple):
     walker: RigidModel
     units: Units
     section: StrikeSection
-    feet: list[list[float]]  # for each body: angle from the slope's normal at z = 0, its derivative by theta_2, levers
+    feet: list[list[float]]  # by body: angle from the slope's normal at z = 0, its derivative by theta_2, foot levers
     radius: float
-    apart: float  # rad, minus the sum of the legs' angles with both feet on the slope
+    apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
-        """Return rises and nearest landing of a walk from z over foothold heights (m), in units of the walker."""
+        """Return rises and nearest landing (see HeelStrikes) over foothold heights (m), in units of the walker."""
         rises = np.diff(heights_m, prepend=heights_m[0]) / self.units.length
         return rises, SHORTEST_LANDING * self.step_length(float(z[0]), float(z[0])) if rises.any() else 0.0
 

@@ -1,11 +1,12 @@
 """Robustness of a gait: sensitivity to a floor drop and a push, the largest survivable ones, and rough ground.
 
-Gait sensitivity norm: with z the section coordinates after a step and e an indicator of it, both minus the gait's,
+The gait sensitivity norm measures the response to a disturbance d of one step. With the section coordinates z after a
+step and an indicator e of the step, both minus the gait's values,
 
     z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
 
-for a disturbance d of one step. A drop takes the state off the section of even ground for two steps; the first terms of
-the sum are therefore difference quotients of exact walks, and the derivative on even ground gives the rest.
+A drop takes the state off the section of even ground for two steps, so the first terms of the sum are difference
+quotients of exact walks, and the derivative on even ground gives the rest.
 
 Source: Hobbelen and Wisse, A disturbance rejection measure for limit cycle walkers: the gait sensitivity norm, IEEE
 Transactions on Robotics 23 (2007).
@@ -36,7 +37,7 @@ FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25
 FORMULAS = (CENTRAL_4TH, FORWARD_4TH, tuple((-offset, -weight) for offset, weight in FORWARD_4TH))
 # grid of the search and accuracy of its bisection, in units of the disturbance
 SEARCH_GRID, BISECTION_WIDTH = 1.0 / 5000.0, 1e-6
-MAX_DISTURBANCE = 0.5  # in units of the disturbance
+MAX_DISTURBANCE = 0.5  # largest disturbance tried, in units of the disturbance
 
 
 class GaitOnMap(NamedTuple):
@@ -54,7 +55,7 @@ class GaitOnMap(NamedTuple):
 
 
 def derivative(function: Callable[[float], Floats | None], step: float) -> Floats | None:
-    """Differentiate a function at 0 to fourth order, from one side if the other lacks values; None if both do."""
+    """Differentiate a function at 0 to fourth order, one-sided if values are missing on one side; None if on both."""
     for formula in FORMULAS:
         values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
         if len(values) == len(formula):
@@ -97,13 +98,13 @@ def walk_disturbed(gait: GaitOnMap, disturbance: Disturbance, size: float, steps
 
 
 def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None:
-    """Return a gait's sensitivity to a disturbance; None if the gait is unstable or neighbouring steps fail."""
+    """Return a gait's sensitivity to a disturbance; None if the gait is unstable or a slightly disturbed step fails."""
     fine, coarse = (response(gait, disturbance, times) for times in (1.0, 2.0))
     return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return norms and response of the disturbed step, by differences of `times` the usual step size, or None."""
+    """Return the norms and the response of the disturbed step, with `times` the usual difference step, or None."""
     d, h = gait.z.size, times * gait.step_map.probe
 
     def after(size: float) -> Floats | None:

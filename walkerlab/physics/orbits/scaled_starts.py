@@ -1,4 +1,4 @@
-"""Starts with scaled angular velocities: how far the velocities may change, and the smallest change that walks.
+"""Starts with scaled velocities: how far the velocities may change, and the smallest change that leads to walking.
 
 In the paper both velocities were raised by hand until the contact model walked. In this module a start is a pair of
 factors (s_1, s_2) on the velocities of swing and stance leg; (1, 1) is the unchanged rigid start.
@@ -31,7 +31,7 @@ SETTLED_SHARE = 0.02  # largest deviation from the gait, as a fraction of its pe
 MARGIN_STEP = 0.02  # spacing of factors until a walk fails
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.0, 4.0
 MARGIN_HALVINGS = 14
-ZOOMS, ZOOM_CELLS = 4, 4  # number of successively finer grids around the best start, and of their cells to either side
+ZOOMS, ZOOM_CELLS = 4, 4  # number of successively finer grids around the best start, and of cells on each side of it
 ZOOM_OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
 
 
@@ -39,7 +39,7 @@ class StartTrial(NamedTuple):
     outcome: int
     steps: int
     settled: bool  # whether its last step matches the gait's period and length within 2 %
-    evaluations: int  # right-hand sides
+    evaluations: int  # number of right-hand-side evaluations
 
     @property
     def walks(self) -> bool:
@@ -70,7 +70,7 @@ class ScaledStarts:
         return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
     def settling_steps(self, walk: ContactWalkResult) -> int | None:
-        """Return the number of steps after which all periods and lengths match the gait; None if the last do not."""
+        """Return the number of steps after which periods and lengths match the gait; None if the last step does not."""
         if self.gait is None:
             return None
         period, length = self.gait
@@ -80,7 +80,7 @@ class ScaledStarts:
         return first if first < walk.periods_s.size else None
 
     def coarser(self, rtol: float, atol: float, budget: int) -> ScaledStarts:
-        """Return the same starts at the lower accuracy of a map, without locating switching points."""
+        """Return the same starts with the looser tolerances of a map, and without locating switching points."""
         quick = JudgedGround(self.ground.terrain, self.ground.frame._replace(locate_switching=False))
         return replace(self, ground=quick, tolerances=Tolerances(self.tolerances.method, rtol, atol, budget))
 
@@ -154,10 +154,10 @@ class Adjustment:
 def smallest_change(
     starts: ScaledStarts, quick: ScaledStarts, candidates: np.ndarray, cell: tuple[float, float]
 ) -> Adjustment | None:
-    """Find the walking start nearest to (1, 1), on successively finer grids around the nearest candidate that walks.
+    """Find the start nearest to (1, 1) that walks, on successively finer grids around the nearest walking candidate.
 
-    `candidates` (n, 2) are factors that walk on a map, `cell` apart. The `quick` starts have the map's tolerances, and
-    `starts` the config's; the result walks with both.
+    candidates  (n, 2) factors of a map's cells that lead to walking; `cell` is the spacing of the map
+    quick       starts with the map's tolerances; `starts` have the config's, and the result walks with both
     """
     order = np.argsort(np.hypot(*(candidates - 1.0).T), kind="stable")
     for swing, stance in candidates[order]:
@@ -181,7 +181,7 @@ def smallest_change(
 
 @dataclass(frozen=True)
 class StartMap:
-    """Results of walks over factors on both velocities; rows are factors on the stance leg's."""
+    """Results of walks over factors on both velocities; each row has one factor on the stance leg's velocity."""
 
     swing: Floats  # (columns,) factors on the swing leg's velocity
     stance: Floats  # (rows,) factors on the stance leg's velocity
@@ -191,7 +191,7 @@ class StartMap:
 
     @property
     def walking(self) -> Floats:
-        """Factors (n, 2) of the cells that walk and settle."""
+        """Factors (n, 2) of the cells whose walk is completed and settles on the gait."""
         rows, columns = np.nonzero((self.outcome == Outcome.WALKED) & (self.settled == 1))
         return np.column_stack((self.swing[columns], self.stance[rows]))
 

@@ -8,7 +8,7 @@ leading order the impact changes nothing. Its energy loss, M (L omega alpha)^2 /
 equals the energy from a step's descent, M g L alpha phi; omega is proportional to alpha, hence phi = kappa alpha^3.
 
 Short period: the swing foot comes down while still moving forward, and the whole motion is proportional to phi. The
-factor grows without bound as the feet's mass vanishes; in that limit this gait also grows as the cube root of phi.
+ratio grows without bound as the feet's mass vanishes; in that limit this gait also grows as the cube root of phi.
 
 Source: Garcia, Chatterjee, Ruina, Coleman, The simplest walking model: stability, complexity, and scaling, J. Biomech.
 Eng. 120 (1998), section 4 and appendix; in this module the legs have mass.
@@ -37,8 +37,9 @@ SCAN = 400  # number of samples that bracket a root
 LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding errors
 LONG_AMPLITUDE = 0.05  # rad, angle between the legs at which the long-period seed is accurate to a percent
 SHORT_AMPLITUDE = 0.002
-MAX_GROWTH = 30.0  # largest growth exponent of a fall over half a step; beyond it no digit of the start is left
-# linear maps on a slope of one radian: (z, 1) to the state, (z, 1) to z, and the state to theta_1 + theta_2
+MAX_GROWTH = 30.0  # largest growth exponent of a fall over half a step; a larger one leaves no digit of the start
+# matrices for a slope of 1 rad: STATE_OF turns (z, 1) into the state, SECTION_ROWS (z, 1) into z, and FEET_DOWN the
+# state into theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 SECTION_ROWS = np.eye(3, 4)
 FEET_DOWN = np.array([1.0, 1.0, 0.0, 0.0])
@@ -114,7 +115,7 @@ def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
 
 
 def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
-    """Return the gait at LONG_AMPLITUDE from theta_2 + phi, dtheta_1, dtheta_2 for a unit angle between the legs."""
+    """Return the gait at LONG_AMPLITUDE; `per_angle`: theta_2 + phi, dtheta_1, dtheta_2 per angle between the legs."""
     kappa = slope_for_loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
     z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
@@ -123,7 +124,7 @@ def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: flo
 
 @np.errstate(divide="raise", invalid="raise")
 def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
-    """Return slope / angle^3 for the slope that balances the heel strike's loss; the angle is that between the legs."""
+    """Return slope / angle^3, where the slope balances the heel strike's loss at this angle between the legs."""
     # In the limit the gait ends a step as it began it, with both legs at the same rates.
     flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
     omega = angle * float(per_angle[2])
@@ -217,7 +218,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
 
 def first_root(f: Callable[[Floats], Floats], longest: float) -> float | None:
     """Return the smallest root of f in (0, longest) by successively finer samples; None if f keeps its sign."""
-    # exclude the end, where the short gait's conditions degenerate into the long one's
+    # exclude the end, at which the short gait's conditions degenerate into those of the long gait
     samples = longest * np.arange(1, SCAN) / SCAN
     while True:
         values = f(samples)

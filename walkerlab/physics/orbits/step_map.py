@@ -99,14 +99,14 @@ class StepMap(Stepper, Protocol):
     probe: float  # size of a disturbance with a linear response, in units of the walker
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        """Return the worst value of each monitor (monitors,) over `steps` steps from z."""
+        """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk from z (d,) over heights (steps + 1,), current foothold first, after a hip push along the slope."""
 
     def settled(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
         """Return z (d,) with the stance foot at rest on the ground."""
-        # The depth at which a foot stands in compliant ground depends on the parameters; from another it would bounce.
+        # A foot stands in compliant ground at a depth that depends on the parameters; at another depth it would bounce.
         return z
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
@@ -120,7 +120,7 @@ class StepMap(Stepper, Protocol):
     ) -> VariedWalk | None:
         """Differentiate `disturbed` and its samples along columns (d + steps + 1, columns) of z and heights (m).
 
-        Takes difference quotients unless overridden. Returns None if the walk or a neighbouring one ends early.
+        Takes difference quotients unless overridden. Returns None if the walk, or a slightly changed one, ends early.
         """
         columns = [differentiate_along(self, z, p, heights_m, column, times_s) for column in along.T]
         if not columns or any(column is None for column in columns):
@@ -133,7 +133,7 @@ class StepMap(Stepper, Protocol):
         return VariedWalk(durations, lengths, angles, rates, samples)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Return work divided by weight times distance of a step from z (d,); None if it fails."""
+        """Return work divided by weight times distance for a step from z (d,); None if the step fails."""
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         """Return leg length (m) and pendulum time (s) of the walker at p."""
@@ -165,7 +165,7 @@ class StepMap(Stepper, Protocol):
 
 
 def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
-    """Return the outcome of steps from z (d,) near p, and the derivative (d,) of the step with respect to p."""
+    """Return the outcome of steps from z (d,) at values near p, and the derivative (d,) of a step with respect to p."""
     # This second-order difference only steers predictors and Newton's method and enters no result.
     h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
     for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
@@ -200,18 +200,19 @@ def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """Consecutive steps; for a gait they return to their start."""
+    """Consecutive steps; those of a gait return to their start."""
 
     outcome: Outcome | None  # outcome of the last step
     value: float  # value of the parameter
     z: Floats  # (d,) start
     steps: tuple[MappedStep, ...]  # completed steps
-    DP: Floats  # (d, d) derivative of the end by z
+    DP: Floats  # (d, d) derivative of the end with respect to z
     Dp: Floats = field(default_factory=no_values)  # (d,) derivative of the end by the parameter, if requested
-    monitors: Floats = field(default_factory=no_values)  # worst values over the steps; only on a branch
+    # (monitors,) worst values over the steps; empty for gaits that are not on a branch
+    monitors: Floats = field(default_factory=no_values)
 
     def mismatch(self) -> Evaluated[Cycle]:
-        """Return P^n(z) - z, which is zero for a gait, with its derivative by z."""
+        """Return P^n(z) - z, which is zero for a gait, with its derivative with respect to z."""
         off = self.steps[-1].z - self.z if self.outcome is Outcome.WALKED else self.z
         return Evaluated(self.outcome, off, self.DP - identity(self.z.size), self)
 
@@ -265,7 +266,7 @@ def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
 
 
 def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
-    """Return the cycle with its derivative by the parameter, or with the outcome of a neighbouring step that failed."""
+    """Return the cycle with its derivative by the parameter, or with the outcome if a step fails at a nearby value."""
     position, Dp = cycle.z, 0.0 * cycle.z
     for step in cycle.steps:
         outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value)

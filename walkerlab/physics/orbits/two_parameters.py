@@ -3,8 +3,8 @@
 A bifurcation is a gait at which a test function vanishes: P^n(z) = z and det(DP -+ 1) = 0, one more equation than for a
 gait, with the second parameter as one more unknown. The curve is continued by arclength like a branch.
 
-The cells are computed row by row of the second parameter, from the row of the known branches outwards. Newton's method
-corrects the period-1 gait of each cell from its neighbours. A stable gait is the attractor; otherwise a walk from a
+Cells are computed in rows of equal second parameter, outwards from the row of the known branches. Newton's method finds
+the period-1 gait of each cell from the gaits of its neighbours. A stable gait is the attractor; otherwise a walk from a
 neighbouring cell's attractor, or from near the unstable gait, finds the attractor.
 
 Source: Kuznetsov, Elements of applied bifurcation theory, section 10.3.
@@ -33,7 +33,7 @@ CURVE_CONTROL = StepControl(first=0.01, shortest=1e-6, longest=0.03, turn=0.97, 
 CACHED_MAPS = 256  # maps cached, one for each value of the second parameter
 PLANE_CELLS = (72, 36)
 ALL_FAILED = -1  # period of a cell in which every walk fails
-TRANSIENT_STEPS, KEPT_STEPS = 400, 96  # steps that are dropped, and steps that are examined
+TRANSIENT_STEPS, KEPT_STEPS = 400, 96  # number of steps that are dropped, and of steps that are examined
 CELL_EFFORT = Effort(1e-12, SEED_EVALUATIONS)  # accuracy of a cell's gait
 UNSTABLE_OFFSET = 1e-3  # offset from an unstable gait; coordinates are of magnitude one
 
@@ -43,7 +43,7 @@ MapAt = Callable[[float], StepMap | None]
 
 
 class Plane(NamedTuple):
-    """Second parameter of a family: its step maps over the first, its span, and its value in the family itself."""
+    """Second parameter of a family: step map at each of its values, its span, and its value in the family."""
 
     map_at: MapAt
     span: ValueSpan
@@ -144,7 +144,7 @@ class Regions:
     period: Integers  # (n, m) steps after which the attractor repeats; 0 if never, ALL_FAILED if every walk fails
 
 
-# Period-1 gait of each cell in a row, and a point on the section for each; None if the cell has no gait.
+# Period-1 gait of each cell in a row, and a section point for each cell; None for a cell without one.
 Row = list[Cycle | None]
 Points = list[Floats | None]
 
@@ -169,7 +169,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Interpolate a period-1 gait from the branches at each value, preferring stable ones; None where no branch is."""
+    """Interpolate a period-1 gait from the branches at each value, preferring stable ones; None without a branch."""
     gaits, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:
