@@ -165,7 +165,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """Compute `walk` minus `reference` (step, phase, leg) in steps of both walks; ValueError if there are none."""
+    """Compute `walk` minus `reference` (step, phase, leg) in steps of both walks; ValueError if no step is common."""
     steps = min(walk.steps, reference.steps)
     if steps == 0:
         raise ValueError("no step was completed by both")

@@ -38,7 +38,7 @@ LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
-    """Return the quantities to plot by default: preferred ones that vary or, if there are none, others that vary."""
+    """Return the quantities to plot by default: preferred ones that vary, otherwise any that vary."""
     varying = []
     for name in group.variables:
         if is_number(group, name, dims) and name not in parameters:
