@@ -4,8 +4,16 @@ Files that compile or compute longest come first: no worker is left alone with o
 One worker more than there are processors computes while others wait for programs, browsers and servers.
 """
 
+import os
+
 import pytest
 from hypothesis import settings
+
+from walkerlab.pipeline.workers import ONE_THREAD
+
+# As the command line does, before anything imports NumPy: the last digits of library methods depend on it.
+for name in ONE_THREAD:
+    os.environ.setdefault(name, "1")
 
 settings.register_profile("walkerlab", deadline=None, derandomize=True, database=None)
 settings.load_profile("walkerlab")

@@ -184,7 +184,7 @@ def test_what_a_scene_is_said_to_save_is_what_it_saves():
     )
     saved = {entry["what"]: entry["saves"] for entry in said}
     assert saved["tangential velocity and friction force"].startswith(
-        f"{MATERIAL - FRICTION_SWITCHES} of the {MATERIAL} "
+        f"{MATERIAL - FRICTION_SWITCHES} of a foot's {MATERIAL} event functions"
     )
     scene = contact_scene(load(None, ("contact.stance=pinned",)).config, 0.3714)
     free, hinged = scene.walker.size, 2 * int(scene.walker.forms[1, 0].bodies)

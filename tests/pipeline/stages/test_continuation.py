@@ -260,7 +260,7 @@ def test_a_key_touches_the_models_that_change_with_it(over, models):
         ),
         (["over=walker.hip_mass_kg", "from=-1", "to=2"], "cannot be -1 kg"),
         (["contact=null", "model=contact"], "needs a contact block"),
-        (["contact=null", "over=contact.stiffness"], "the config has no contact"),
+        (["contact=null", "over=contact.stiffness"], "the config has no block contact"),
         (["second.over=walker.hip_mass_kg", "second.from=1", "second.to=2"], "outside 1 to 2"),
         (["second.over=walker.hip_mass_kg", "second.from=-1", "second.to=20"], "second.from: walker.hip_mass_kg can"),
         (["second.over=slope_deg", "second.from=0.1", "second.to=5"], "is already the parameter that"),

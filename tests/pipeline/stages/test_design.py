@@ -125,7 +125,7 @@ def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_
         ((), "needs a quantity to optimise"),
         (("design.minimise=period_s",), "needs a quantity to optimise"),
         (("design.minimise=period_s", "design.over={walker.thigh.mass_kg: [1, 2]}"), "walker.thigh.mass_kg"),
-        (("design.minimise=period_s", "design.over={slope_deg: [3, 1]}"), "first below the second"),
+        (("design.minimise=period_s", "design.over={slope_deg: [3, 1]}"), "the lower one first"),
         (("design.minimise=period_s", "design.maximise=speed_m_s"), "remove one of them"),
         (("design.minimise=period_s", "design.over={walker.hip_mass_kg: [-5, 3]}"), "hip_mass_kg cannot be -5 kg"),
         (("design.minimise=height",), "design.minimise"),
