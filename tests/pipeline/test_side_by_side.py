@@ -52,7 +52,7 @@ def test_every_stage_tells_its_beginning_its_place_and_its_end(toy, listener):
     assert listener.begun[0][1] == "1 of 6"
     assert [place.split()[0] for _, place, _ in listener.begun] == ["1", "2", "3", "4", "5", "6"]
     assert re.fullmatch(r"page: ran in \d+\.\d\d s", listener.ended[-1])
-    assert "left: page" in listener.ended[-2]
+    assert "still to run: page" in listener.ended[-2]
     assert "dropping" in [label for label, _ in listener.started]
 
 

@@ -252,7 +252,7 @@ class _NumberTyping(_Refreshed):
 
 
 class _WithoutEnvironment:
-    """Code generator that ignores the environment of functions without machine code."""
+    """Code generator whose `set_env` does nothing: kernel parts have no machine code that could use an environment."""
 
     def __init__(self, codegen: Any) -> None:
         self._codegen = codegen
@@ -261,7 +261,7 @@ class _WithoutEnvironment:
         return getattr(self._codegen, name)
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Ignore the environment."""
+        """Do nothing."""
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc, valid-type]

@@ -44,7 +44,7 @@ class Begun:
 
 
 class Executor:
-    """Brings the results of some stages under one config up to date.
+    """Brings the results of some stages up to date for one config.
 
     stages    stages to bring up to date, each after the stages that it needs
     force     run every stage that is not left out, even if its result is current
@@ -81,7 +81,7 @@ class Executor:
         self._total = 0
 
     def plan(self) -> tuple[Step, ...]:
-        """Decide on all stages, assuming that each step succeeds; changes no file."""
+        """Decide for each stage whether to reuse, run or leave it out, assuming that all succeed; changes no file."""
         steps = []
         for stage in self.stages:
             step = self._decide(stage)
@@ -124,7 +124,7 @@ class Executor:
         return tuple(omission_of(name, self._why_absent(name)) for name in missing)
 
     def _decide(self, stage: Stage) -> Step:
-        """Decide whether to reuse, run or leave out a stage whose inputs have been decided on.
+        """Decide whether to reuse, run or leave out a stage, after the same decision for its inputs.
 
         Optional inputs outside this plan are looked up first; a damaged one is recorded as left out.
         """
@@ -247,7 +247,7 @@ class Executor:
 
     def _begin(self, step: Step) -> Begun:
         if step.damaged is not None:
-            self.reporter.warn(f"{step.damaged} is {step.reason}; recomputed")
+            self.reporter.warn(f"{step.damaged} is {step.reason}; recomputing it")
         stage, inputs = step.stage, self.inputs(step.stage)
         offered = self.results.begin(step, self.config, inputs, self.force)
         absent = self.missing_inputs(stage)
@@ -273,7 +273,7 @@ class Executor:
         self.done.append(done)
         self._left = [stage_left for stage_left in self._left if stage_left != name]
         answered = [] if stored.complete else ["no answer"]
-        rest = [f"left: {', '.join(self._left)}"] if self._left else []
+        rest = [f"still to run: {', '.join(self._left)}"] if self._left else []
         running_stage.reporter.end("; ".join([outcome_line(done), *answered, *rest]))
 
     def _draw_early(self) -> None:

@@ -57,7 +57,7 @@ def walks_and(*names: str) -> Inputs:
 
 
 def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """Require the known problems and, for a walker that belongs to no study, what `gait_for_start_or_pads` requires."""
+    """Require stage `known-problems` and, unless the walker is a study's, what `gait_for_start_or_pads` requires."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 
@@ -71,7 +71,7 @@ class Option:
     # takes a name with two numbers ("...=A:B"), with optional numbers ("[=A:B]") or with a value ("...=...,...")
     metavar: str
     help: str
-    type: type = str  # type of its value; list for an option that may be repeated
+    type: type = str  # type of the option's value; list for an option that may be repeated
     needs: tuple[str, ...] = ()  # flags that must be given with it
     runs: str = ""  # stage that the command then runs instead of its own; such an option sets no key
 
@@ -88,28 +88,28 @@ class Stage:
     purpose: str  # one line for the user
     # type of the config slice that `run` takes and its result depends on; None for the whole config
     takes: type | None
-    inputs: Inputs = nothing  # returns the stages, earlier in the table, whose results it needs under a config
-    if_current: tuple[str, ...] = ()  # stages whose results it uses only if they are current
-    options: tuple[Option, ...] = ()  # options of its command in addition to those of all stages
-    requires: tuple[str, ...] = ()  # config blocks that it needs; it is left out if one is missing
+    inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
+    if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
+    options: tuple[Option, ...] = ()  # options of the stage's command in addition to those of all stages
+    requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
     # "times": measures run times, so it runs alone; "draws": also writes files, from the results that exist
     work: Literal["computes", "times", "draws"] = "computes"
-    # function of its module that compiles its kernels while an earlier stage runs; empty if that does not pay
+    # function of the module that compiles the stage's kernels while an earlier stage runs; empty if that does not pay
     precompile: str = ""
-    # the only command that runs it (its own or `STAGE --full`); empty if any command that needs it runs it
+    # the only command that runs the stage (its own or `STAGE --full`); empty if any command that needs it runs it
     only_by: str = ""
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
-    does_without: Lacks = nothing  # returns the parts that it omits under a config: name, reason and saving
+    does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
     takes_of_scene: type | None = None  # replaces `takes` for a walker that belongs to no study
-    takes_of_paper: type | None = None  # type of the slice of the built-in paper config that its own cases use
-    # returns the versions of other programs that its result depends on, by name
+    takes_of_paper: type | None = None  # type of the slice of the built-in paper config that the stage's own cases use
+    # returns the versions of other programs that the stage's result depends on, by name
     programs: Callable[[], Mapping[str, str]] | None = None
-    # returns the digests of files that its result depends on, by config key
+    # returns the digests of files that the stage's result depends on, by config key
     files: Callable[[Config], Mapping[str, str]] | None = None
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """Return the dotted config keys that its result depends on."""
+        """Return the dotted config keys that the stage's result depends on."""
         if self.takes is not None:
             return tuple(reads.dotted_keys(self.takes))
         from walkerlab.config.schema import Config  # imported here: the command line's help does not need it
@@ -117,15 +117,15 @@ class Stage:
         return tuple(Config.model_fields)
 
     def takes_under(self, config: RigidConfig) -> type | None:
-        """Return the type of the config slice that its result depends on."""
+        """Return the type of the config slice that the stage's result depends on."""
         return self.takes if self.takes_of_scene is None or is_studied(config) else self.takes_of_scene
 
     def results(self, config: Config) -> tuple[str, ...]:
-        """Return the stages whose results it uses: required ones, then optional ones."""
+        """Return the stages whose results this stage uses: required ones, then optional ones."""
         return (*self.inputs(config), *self.if_current)
 
     def why_unsuited(self, config: Config) -> str | None:
-        """Return the reason why it cannot run under a config; None if it can."""
+        """Return the reason why the stage cannot run under a config; None if it can."""
         missing = (block for block in self.requires if getattr(config, block) is None)
         return next(map(without_block, missing), None)
 
@@ -153,7 +153,7 @@ class Stage:
 
     @property
     def draws(self) -> bool:
-        """Whether it writes files in addition to its artifact."""
+        """Whether the stage writes files in addition to its artifact."""
         return self.work == "draws"
 
     @property
@@ -162,7 +162,7 @@ class Stage:
 
     @property
     def on_demand(self) -> bool:
-        """Whether only its own command runs it."""
+        """Whether only the stage's own command runs it."""
         return self.only_by == self.name
 
 

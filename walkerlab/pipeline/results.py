@@ -107,7 +107,7 @@ class FolderResults:
 
 
 def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]) -> str:
-    """Name an input whose content has changed since the result was computed; empty if none has."""
+    """Name an input whose content has changed since the result was computed; empty if no input has."""
     for name, result in inputs.items():
         if stored.provenance.input_digests.get(name) != input_digest(stage, result):
             return f"input {name} was recomputed"

@@ -36,11 +36,11 @@ class RunSummary:
 
     name: str
     run_dir: Path
-    changes: tuple[str, ...]  # KEY=VALUE of each key in which its config differs from the config file
+    changes: tuple[str, ...]  # KEY=VALUE of each key in which the run's config differs from the config file
     stages: tuple[str, ...]  # names of stages with a stored result
     current: tuple[str, ...] | None  # names of stages that are up to date; None if the run's config is unknown
     sweeps: tuple[str, ...]  # names of sweep files
-    bytes: int  # total size of its files
+    bytes: int  # total size of the run's files
     changed_utc: str  # time of the last change, UTC, ISO 8601
 
 

@@ -30,7 +30,7 @@ class WorkUnit(NamedTuple):
     """Piece of work that is computed as a whole and stored under its name."""
 
     name: str
-    size: int  # number of parts that it adds to the progress
+    size: int  # number of parts that the unit adds to the progress
     run: Callable[[], Any]  # function that computes the result; any process can call it
 
 

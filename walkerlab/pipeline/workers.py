@@ -49,7 +49,7 @@ class WorkerDiedError(WalkerlabError):
     exit_code = 4
 
     def __init__(self, exit_code: int) -> None:
-        """Describe the end of a worker; the exit code is negative if a signal ended it."""
+        """Build the message from a worker's exit code, which is negative if a signal killed the worker."""
         how = signal.Signals(-exit_code).name if exit_code < 0 else f"exit code {exit_code}"
         super().__init__(
             f"a worker process ended before it had answered ({how}).",
@@ -229,7 +229,7 @@ def in_order(
 
     jobs   maximum number of processes
     first  indices of calls to run first and in this process, so that kernels are compiled once
-    rank   rank of an index; low ranks start first, as long calls should, so that none runs alone at the end
+    rank   rank of an index; low ranks start first; give long calls low ranks, so that no call runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:

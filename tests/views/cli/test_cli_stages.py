@@ -25,7 +25,7 @@ def test_results_go_to_stdout_and_messages_to_stderr(toy):
     told = [line.split()[:2] for line in first.stderr.splitlines()]
     assert told == [["drop:", "starts"], ["drop:", "ran"], ["roll:", "starts"], ["roll:", "ran"]]
     assert "drop: starts (1 of 2)\n" in first.stderr
-    assert re.search(r"^drop: ran in [\d.]+ s; left: roll$", first.stderr, re.MULTILINE)
+    assert re.search(r"^drop: ran in [\d.]+ s; still to run: roll$", first.stderr, re.MULTILINE)
     assert "not there yet" not in first.stderr
     second = toy("roll")
     assert second.stdout == first.stdout

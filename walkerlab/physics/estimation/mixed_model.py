@@ -141,7 +141,7 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
 
 
 class Whitening(NamedTuple):
-    """Transforms values of covariance G G' roughness^2 + noise^2 into independent values of unit variance."""
+    """Transforms values of covariance G G^T roughness^2 + noise^2 into independent values of unit variance."""
 
     scale: Floats  # (values,)
     U: Floats  # (values, heights)

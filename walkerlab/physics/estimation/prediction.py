@@ -138,14 +138,14 @@ class Forecast:
         return np.concatenate(parts)
 
     def differentiate(self, u: Floats, heights_m: Floats, exact: bool) -> Floats | None:
-        """Return the derivatives (values, unknowns) with respect to the unknowns; `exact` if they enter the result."""
-        # Derivatives by parameters are difference quotients of exact walks; the other ones follow from tangent columns.
+        """Return derivatives (values, unknowns); differences over parameters are forward, or 4th-order if `exact`."""
+        # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
         none = np.zeros((heights_m.size, 0))
         columns = self._columns_along(u, heights_m, none)
         return None if columns is None else self._with_parameters(u, heights_m, columns, exact)
 
     def differentiate_all(self, u: Floats, heights_m: Floats, exact: bool) -> tuple[Floats, Floats] | None:
-        """Return the derivatives by the unknowns, (values, unknowns), and by the heights, (values, heights) in 1/m."""
+        """Return derivatives with respect to unknowns, (values, unknowns), and to heights, (values, heights) in 1/m."""
         columns = self._columns_along(u, heights_m, np.eye(heights_m.size))
         J = None if columns is None else self._with_parameters(u, heights_m, columns, exact)
         if columns is None or J is None:
@@ -178,7 +178,7 @@ class Forecast:
         return np.asarray(touches[step] + self.measured.phase * np.diff(touches)[step] - touches[0])
 
     def _columns_along(self, u: Floats, heights_m: Floats, lifts: Floats) -> Floats | None:
-        """Return derivatives (values, columns) by coordinates of the start, heights along `lifts`, and nuisances."""
+        """Return derivatives (values, columns) for coordinates of the start, heights along `lifts`, and nuisances."""
         walk, sensors, count = self._walk(u, heights_m), self.sensors(u), self.steps.count
         if walk is None:
             return None
@@ -222,7 +222,7 @@ class Forecast:
         return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
 
     def _with_parameters(self, u: Floats, heights_m: Floats, columns: Floats, exact: bool) -> Floats | None:
-        """Join the derivatives by parameters with the `columns` of the other unknowns; returns (values, unknowns)."""
+        """Join the derivatives for parameters with the `columns` of the other unknowns; returns (values, unknowns)."""
         formula, step = (CENTRAL_4TH, EXACT_STEP) if exact else (FORWARD, QUICK_STEP)
         starts, own = self.directions.shape[1], []
         predict = cache(lambda place, offset: self.predict(u + offset * step * np.eye(u.size)[place], heights_m))

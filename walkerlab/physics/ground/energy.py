@@ -72,10 +72,11 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
 
 @kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
-    """Compute powers (W) that damping, (F_n - k d^e) d', and friction dissipate at a foot, and normal force F_n (N)."""
+    """Compute the powers (W) that a foot loses to damping and to friction, and the normal force (N) on it."""
     motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0
     force = foot_force(system, motion)
+    # damping takes (F_n - k d^e) d', where d' is the rate of the penetration d
     damping = -(force.normal.force - force.normal.spring) * motion.vertical_velocity
     return damping, -force.along * motion.slip, force.normal.force

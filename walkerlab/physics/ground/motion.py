@@ -95,7 +95,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Differentiate a foot's penetration, its rate, and slip by state component j; F, U (n,) are projected levers."""
+    """Differentiate a foot's penetration, its rate and slip with respect to y[j]; F, U (n,) are projected levers."""
     p, half = form.places, half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p

@@ -3,8 +3,8 @@
 The state is (along, height, theta_1 .. theta_n) and their rates: the position (m) of the centre of mass along the slope
 (positive downhill) and above it, and the bodies' absolute angles (rad) from the vertical. While an ideal lock holds a
 knee, thigh and shank are one body: theta = S z with a column of S for each group of bodies that turn together. The
-constants of the tree become S'AS, S'BS and S'c, every lever and radius S'd, and the form is an ordinary walker of fewer
-bodies. While the first stance foot is hinged, the root is the hinge and the state is the angles and their rates.
+tree's constants become S^T A S, S^T B S and S^T c, every lever and radius S^T d, and the form is an ordinary walker of
+fewer bodies. While the first stance foot is hinged, the root is the hinge and the state is the angles and their rates.
 """
 
 import math
@@ -154,7 +154,7 @@ class OnGround(NamedTuple):
     stop: Any
     has_ground: Any  # (2,) whether there is ground under each foot
     knee: Any  # (2,) state of each knee
-    level: Any  # (2,) m, height above the slope of the ground for each foot
+    level: Any  # (2,) m, height of the ground under each foot, above the slope
     progress: WalkProgress
 
 

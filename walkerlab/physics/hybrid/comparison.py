@@ -156,7 +156,7 @@ class WalkDifference:
 
 
 def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDifference]:
-    """Return the sample times (s) of either walk while both last, and `walk` minus `reference` at these times."""
+    """Return the sample times (s) of both walks where the two overlap, and `walk` minus `reference` at these times."""
     time = np.union1d(walk.time, reference.time)
     time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
     angle, velocity = walk.at(time)
@@ -165,7 +165,7 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """Compute `walk` minus `reference` (step, phase, leg) in steps of both walks; ValueError if no step is common."""
+    """Compute `walk` minus `reference` (step, phase, leg) in the steps of both; ValueError if either took no step."""
     steps = min(walk.steps, reference.steps)
     if steps == 0:
         raise ValueError("no step was completed by both")

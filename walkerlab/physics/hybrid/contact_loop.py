@@ -41,8 +41,8 @@ LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-REWINDS = 24  # rewinds of a step after which its end counts as the event; rounding moves the event at each attempt
-DOUBTS = 12  # rewinds of a step after which an event is dropped unless it occurs at the step's end
+REWINDS = 24  # maximum per step; then the step's end counts as the event, because rounding moves the event each time
+DOUBTS = 12  # maximum number of rewinds for a doubtful event; then it is dropped unless it occurs at the step's end
 
 
 @callable_kernel
@@ -80,9 +80,9 @@ def walk_in_form(
 ) -> tuple[int, int]:
     """Walk until the steps fill `walk_state`, the walker changes its form, a hinged step is complete, or the walk ends.
 
-    method  holds the start state, and the end state on return
-    until   NO_LIMIT; or a number of steps, after which the walk also ends when the feet pass each other; or AT_LIFT,
-            with which a full walk state does not end the walk until the foot that carried the last step has lifted
+    method  the start state on entry, the end state on return
+    until   NO_LIMIT; or a number of steps, after which the walk also ends when the feet pass each other; or AT_LIFT:
+            when the walk state is full, walk on until the foot that carried the last step has lifted
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
@@ -175,7 +175,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
 
 @kernel_part
 def forget_zeros(walk_state: WalkState, h: float) -> None:
-    """Clear `at_zero`, which prevents finding an event twice, unless the last step's length h (s) is too short."""
+    """Clear `at_zero`, the guard against finding an event twice; keep it if the last step h (s) was too short."""
     if h > 2.0 * EVENT_TIME:
         for i in range(walk_state.at_zero.size):
             walk_state.at_zero[i] = 0
@@ -201,7 +201,7 @@ def react(
         note_work(observer, system, method.y)
     if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
         return WALKED
-    # the caller must apply the tangent's jumps, at changes of form and if forces jump as the legs change roles
+    # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return CHANGES_FORM
     if not is_switching(event):
@@ -244,7 +244,7 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 @kernel_part
 def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
-    """Return the outcome if flight or step is too long at time t (s), or GOES_ON; updates `airborne_since`."""
+    """Return the outcome if the flight or the step is too long at t (s), else GOES_ON; updates `airborne_since`."""
     # A foot that lifts at t still counts as on the ground, because the event at the step's end is applied later.
     grounded = is_hinged(system)
     for foot in range(2):

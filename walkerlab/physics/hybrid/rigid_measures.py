@@ -14,14 +14,14 @@ from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWIN
 
 
 def energies(walker: RigidModel, states: Array) -> Array:
-    """Compute kinetic and potential energy (samples, 2), J, of states (samples, 2 n), relative to the stance foot."""
+    """Compute kinetic and potential energy (samples, 2) in J of states (samples, 2 n), heights from the stance foot."""
     out = np.zeros((len(states), 2))
     fill_energies(walker, np.ascontiguousarray(states), out)
     return out
 
 
 def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
-    """Compute the force on the stance foot (samples, 2), N, along and normal to the slope; `bent` marks a free knee."""
+    """Compute the force (N) on the stance foot along and normal to the slope (samples, 2); `bent` marks a free knee."""
     out = np.zeros((len(states), 2))
     free = np.zeros(len(states), np.bool_) if bent is None else bent
     fill_reactions(walker, np.ascontiguousarray(states), free, out)
@@ -70,7 +70,7 @@ def places(
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute the walker's points at angles (samples, n), rad, swing leg first; `knee_m`: x, y in the thigh's frame."""
+    """Compute the walker's points at angles (samples, n) in rad, swing leg first; `knee_m` is in the thigh's frame."""
     psi = angle + walker.slope
     rolled = -walker.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
     contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))

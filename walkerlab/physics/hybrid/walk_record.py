@@ -46,7 +46,7 @@ class DrivenWork(NamedTuple):
 
 
 def rough_heights(roughness_m: float, seed: int | tuple[int, ...], steps: int) -> Array:
-    """Draw heights (steps + 1,), m, of the footholds of rough ground: the first is 0, the rest normally distributed."""
+    """Draw the footholds' heights (steps + 1,) in m on rough ground: the first is 0, the rest normally distributed."""
     # The first heights do not depend on how many are drawn.
     return np.append(0.0, np.random.default_rng(seed).normal(0.0, roughness_m, steps))
 

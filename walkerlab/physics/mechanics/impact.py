@@ -1,7 +1,7 @@
 """Plastic impacts: project the velocities before impact onto those that the new constraints allow, in the mass metric.
 
 All masses have velocities u before and u+ = Z z+ after the impact, where Z follows from the new constraints and
-Z' M (u+ - u) = 0. The coordinates are those of the tree about the new stance foot: the velocity (v_x, v_y) of its
+Z^T M (u+ - u) = 0. The coordinates are those of the tree about the new stance foot: the velocity (v_x, v_y) of its
 centre, along the slope and normal to it, and the bodies' angular velocities.
 
 Source: (A.57) of the paper, with the impulse eliminated by the projection.
@@ -40,7 +40,8 @@ def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
 
 @kernel_part
 def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
-    """Apply a plastic impact with the constraints E[phase]; if `other_foot`, the swing foot becomes the stance foot."""
+    """Apply a plastic impact under constraints E[phase]; if `other_foot`, the swing foot becomes the stance foot."""
+    # E[phase] makes bodies follow others, such as a locked shank its thigh (see links.py).
     like = model.arm_x
     n, R = len(like), model.radius
     s, c, F, U, p, M, factors = (
@@ -164,8 +165,8 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     """Compute the work (strikes,) in J of the push-offs from states (strikes, 2 n) just before their heel strikes.
 
     At push-off the walker is free of the ground, its knees locked and its torso coupled. An impulse P along e does the
-    work (P^2 / 2) J M^-1 J', where J gives the velocity along e of the trailing contact point or, equally, of the hip.
-    Eliminating the angular velocities from M leaves the apparent mass at the hip, m - C' I^-1 C, with first moments C
+    work (P^2 / 2) J M^-1 J^T, where J gives the velocity along e of the trailing contact point or, equally, of the hip.
+    Eliminating the angular velocities from M leaves the apparent mass at the hip, m - C^T I^-1 C, with first moments C
     and inertia I about the hip. Source: Kuo (2002); with massless legs the work is P^2 / (2 m).
     """
     n, E = len(model.arm_x), model.E[STRAIGHT]
@@ -237,8 +238,8 @@ def project_change(
 
 @forced_inline
 def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
-    """Write the generalised momenta Z' M u into p (n,); u is (along, upward) in m/s and omega (n,) in rad/s."""
-    # M is M' of rigid_model.py and includes the rolling velocity -R omega of the root; `sliding` is the remainder.
+    """Write the generalised momenta Z^T M u into p (n,); u is (along, upward) in m/s and omega (n,) in rad/s."""
+    # M is M' of rigid_model.py and includes the root's rolling velocity -R omega; `sliding` is `along` minus that.
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[STANCE]
     for k in range(n):
@@ -251,7 +252,7 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
 
 @forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
-    """Write Z' dM w into p (n,); dM is the change of M due to `turn` (n,), and w the jump of all velocities."""
+    """Write Z^T dM w into p (n,); dM is the change of M due to `turn` (n,), and w the jump of all velocities."""
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)

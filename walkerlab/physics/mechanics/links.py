@@ -1,9 +1,9 @@
 """Bodies that follow others: a locked shank follows its thigh, a torso the bisector of the legs.
 
-If the angles are theta = E z with a constant E, then M alpha = r becomes E' M E dz = E' r with the accelerations dz of
-z. The system keeps its size: a follower's row and column are added to those of the bodies that it follows, and its own
-equation becomes trivial. A follower's row of E holds its weights, with zero on the diagonal; all other rows are those
-of the unit matrix. A model has an E for each phase.
+If the angles are theta = E z with a constant E, then M alpha = r becomes E^T M E dz = E^T r, where dz holds the
+accelerations of z. The system keeps its size: a follower's row and column are added to those of the bodies that it
+follows, and its own equation becomes trivial. A follower's row of E holds its weights, with zero on the diagonal; all
+other rows are those of the unit matrix. A model has an E for each phase.
 """
 
 from typing import Any, NamedTuple
@@ -34,7 +34,7 @@ def expand(model: Any, phase: int, z: Any) -> None:
 
 @forced_inline
 def factor_linked(model: Any, phase: int, M: Any) -> None:
-    """Replace M (n, n) by the factors of E' M E = L D L': 1/D on the diagonal, L' above it."""
+    """Replace M (n, n) by the factors of E^T M E = L D L^T: 1/D on the diagonal, L^T above it."""
     n = len(model.arm_x)
     for c in range(n):
         if model.E[phase, c, c] == 0.0:

@@ -178,7 +178,7 @@ def legs_apart_standing(system: Mode, y: Any) -> tuple[float, float]:
 @forced_inline
 def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -> None:
     """Add the torque `unpaired` sin(theta_1 - theta_2) omega_1^2 (N m) on the stance leg to r (n,)."""
-    # It has no reaction on the swing leg and does not conserve energy. In Lagrange's equations it is zero.
+    # This torque has no reaction on the swing leg and does not conserve energy. In Lagrange's equations it is zero.
     if model.unpaired != 0.0:
         r[STANCE] += model.unpaired * omega[SWING] * omega[SWING] * (s[SWING] * c[STANCE] - c[SWING] * s[STANCE])
 
@@ -210,7 +210,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
         by_angle, by_rate = matrix(like), matrix(like)
         torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
         for at in range(2 * n, len(y), 2 * n):
-            # from here on alpha holds d alpha, the solution of E' M' E d alpha = E' (dr' - dM' alpha)
+            # from here on alpha holds d alpha, the solution of E^T M' E d alpha = E^T (dr' - dM' alpha)
             for k in range(n):
                 total = 0.0
                 for l in range(n):
@@ -317,7 +317,7 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
 
 
 def energy_at_touch(model: RigidModel, touched: Any) -> Any:
-    """Compute the potential energy (J) of the total mass at the contact point of a leg at the angle `touched` (rad)."""
+    """Compute the potential energy (J) the total mass would have at the contact point of a leg at `touched` (rad)."""
     # zero is at the same height as in `energies`
     return model.mass * model.gravity_along * model.radius * (touched + model.slope)
 

@@ -38,10 +38,10 @@ MAX_CLOSE_RETURNS = 4  # seeds per period
 @dataclass(frozen=True, eq=False)
 class Attractor:
     value: float
-    period: int  # steps after which it repeats; 0 if aperiodic
-    periods_s: Floats  # (steps,) durations of its steps
+    period: int  # steps after which the attractor repeats; 0 if it is aperiodic
+    periods_s: Floats  # (steps,) durations of the attractor's steps
     angles: Floats  # (steps,) rad, as in `MappedStep`
-    last: Floats  # (d,) last point of the walk on it
+    last: Floats  # (d,) last point of the walk on the attractor
 
 
 @dataclass(frozen=True)

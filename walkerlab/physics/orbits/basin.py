@@ -187,7 +187,7 @@ def order_cycles(cycles: Sequence[Floats]) -> list[Floats]:
 
 
 def cycle_through(walker: Walker, point: Floats) -> Floats | None:
-    """Return the cycle (period, 3) of a walk from a point (3,), smallest angle first; None if aperiodic or failed."""
+    """Return the cycle (period, 3) through a point (3,), smallest angle first; None if the walk does not return."""
     orbit = [point]
     for _ in range(MAX_CYCLE_PERIOD):
         step = walk_to_attractor(walker, Attractors(), orbit[-1][None, :], 1, tolerances=(CYCLE_RTOL, CYCLE_ATOL))

@@ -123,7 +123,8 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
     passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
     if len(passing) < 2:
         return None
-    rate = (passing[0] - passing[1]) / (2.0 * gap)  # negative derivative by s of the multiplier that crosses -1
+    # negative derivative with respect to s of the multiplier that crosses -1
+    rate = (passing[0] - passing[1]) / (2.0 * gap)
     form, probe = None, NORMAL_FORM_STEP
     for _ in range(FORM_REFINEMENTS):
         terms = _cubic(equations, flip, v, w, probe)

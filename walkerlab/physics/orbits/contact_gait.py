@@ -58,7 +58,7 @@ def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tole
 
 
 def why_no_gait(walker: ContactWalker) -> tuple[str, str] | None:
-    """Return reason and advice if conservation of momentum or energy excludes a gait on this ground, or None."""
+    """Return reason and advice if conservation of momentum or energy excludes a gait on this ground, otherwise None."""
     if walker.slope <= 0.0 and not walker.driven:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
     friction, required = walker.friction.largest, abs(math.tan(walker.slope))

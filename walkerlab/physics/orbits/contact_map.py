@@ -148,7 +148,7 @@ def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
 
 
 def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats:
-    """Return the derivative (4 + 2 n, coordinates) of `state_on_section` by z, at a state that it returned."""
+    """Differentiate `state_on_section` with respect to z at one of its states; returns (4 + 2 n, coordinates)."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
@@ -320,7 +320,7 @@ class ContactMap(StepMap):
 
     monitors = (
         Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
-        Monitor("tripped", "1", "whether pads of its own step length trip the swing foot", 0.5),
+        Monitor("tripped", "1", "whether the swing foot trips on pads spaced by the gait's own step length", 0.5),
     )
     probe = 1e-6  # small compared with the penetration of stiff ground, which is below 0.01 mm
 

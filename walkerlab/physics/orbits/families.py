@@ -162,7 +162,7 @@ class BranchFollower:
                     (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
                     (*reversed(behind.crossings), *branch_ahead.crossings),
                 )
-            # `lies_on` misses gaits between a known branch's flip and its first gait, so check the other way round, too
+            # `lies_on` misses gaits between a branch's flip and first point, so look for that point on the new branch
             if not any(self.lies_on(branch_ahead, branch.points[0]) for branch in like):
                 branches.append(branch_ahead)
         for branch in branches:  # the list grows during the loop
@@ -294,7 +294,7 @@ class BranchFollower:
         return at_edge, step, BranchEnd(self.span.nearest(value), END_OF_SPAN)
 
     def at_edge(self, equations: GaitEquations, last: CurvePoint[Cycle], beyond: Floats) -> CurvePoint[Cycle] | None:
-        """Solve for the gait at the edge of the span, between `last` and a point `beyond` (d + 1,), or return None."""
+        """Solve for the gait at the span's edge, between `last` and a point `beyond` (d + 1,); None if that fails."""
         start, value = equations.value(last.x), equations.value(beyond)
         edge = self.span.nearest(value)
         guess = last.x + (edge - start) / (value - start) * (beyond - last.x)

@@ -99,7 +99,7 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 
 
 def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
-    """Differentiate a gait's quantities by the parameter of the step map; empty if the map fails at nearby values."""
+    """Differentiate a gait's quantities with respect to the parameter; empty if the step map fails at nearby values."""
     h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
         closer = family_direction(gait, part * h, along)
@@ -137,7 +137,7 @@ class Derivatives(NamedTuple):
 
 
 def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
-    """Improve a guess of the derivative (d,) of the gait's z by the parameter, using steps along it, or return None."""
+    """Improve a guess of dz/dp (d,) along the family, using steps in its direction; None if that fails."""
     # On compliant ground a step from z itself fails if the parameter changes the walker's dimensions: its foot would be
     # in the air or deep in the ground.
 

@@ -55,7 +55,7 @@ class Effort(NamedTuple):
 
 
 def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
-    """Solve m equations from a guess (m,); return the solution or, on failure, the outcome of the equations."""
+    """Solve m equations from a guess (m,); on failure, return NotConverged with the outcome of the walk."""
     tolerance, most, shortest, growth, rounding = effort
     x, current, corrections, evaluations = guess, equations(guess), 0, 1
     residual = current.residual

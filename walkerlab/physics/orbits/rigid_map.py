@@ -466,7 +466,8 @@ class SimilarWalker(NamedTuple):
     walker: RigidModel
     units: Units
     section: StrikeSection
-    feet: list[list[float]]  # by body: angle from the slope's normal at z = 0, its derivative by theta_2, foot levers
+    # by body: angle from the slope's normal at z = 0, derivative of that angle with respect to theta_2, and foot levers
+    feet: list[list[float]]
     radius: float
     apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
 

@@ -1,4 +1,4 @@
-"""Robustness of a gait: sensitivity to a floor drop and a push, the largest survivable ones, and rough ground.
+"""Robustness of a gait: sensitivity to a floor drop and a push, the largest of each that it survives, and rough ground.
 
 The gait sensitivity norm measures the response to a disturbance d of one step. With the section coordinates z after a
 step and an indicator e of the step, both minus the gait's values,
@@ -35,9 +35,9 @@ CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 
 FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
 # Offsets and weights of fourth-order formulas for a first derivative.
 FORMULAS = (CENTRAL_4TH, FORWARD_4TH, tuple((-offset, -weight) for offset, weight in FORWARD_4TH))
-# grid of the search and accuracy of its bisection, in units of the disturbance
+# grid of the search and accuracy of its bisection, as multiples of `unit_of`
 SEARCH_GRID, BISECTION_WIDTH = 1.0 / 5000.0, 1e-6
-MAX_DISTURBANCE = 0.5  # largest disturbance tried, in units of the disturbance
+MAX_DISTURBANCE = 0.5  # largest disturbance tried, as a multiple of `unit_of`
 
 
 class GaitOnMap(NamedTuple):
@@ -55,7 +55,7 @@ class GaitOnMap(NamedTuple):
 
 
 def derivative(function: Callable[[float], Floats | None], step: float) -> Floats | None:
-    """Differentiate a function at 0 to fourth order, one-sided if values are missing on one side; None if on both."""
+    """Differentiate a function at 0 to fourth order, one-sided if one side lacks values; None if both do."""
     for formula in FORMULAS:
         values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
         if len(values) == len(formula):
@@ -70,7 +70,7 @@ def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | Non
     """
     if np.abs(multipliers_of(A)).max() >= 1.0:
         return None
-    # X, the sum of z z' over all steps, satisfies X = A X A' + B B'
+    # X, the sum of z z^T over all steps, satisfies X = A X A^T + B B^T
     d = len(B)
     summed = np.linalg.solve(np.eye(d * d) - np.kron(A, A), np.outer(B, B).ravel()).reshape(d, d)
     later = np.einsum("ij,jk,ik->i", C, summed, C)
@@ -104,7 +104,7 @@ def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return the norms and the response of the disturbed step, with `times` the usual difference step, or None."""
+    """Return norms and the disturbed step's response (None if either fails); `times` scales the difference step."""
     d, h = gait.z.size, times * gait.step_map.probe
 
     def after(size: float) -> Floats | None:
@@ -155,7 +155,7 @@ class RoughWalks:
     standard_error: float | None  # None if it cannot be estimated
     walks: int
     capped: int  # walks that reached the maximum number of steps
-    # mean over all walks; total steps per failure; total steps if no walk failed
+    # all-failed: mean over all walks; censored: total steps per failure; lower-bound: total steps, no walk failed
     method: Literal["all-failed", "censored", "lower-bound"]
 
 

@@ -38,7 +38,7 @@ ZOOM_OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=
 class StartTrial(NamedTuple):
     outcome: int
     steps: int
-    settled: bool  # whether its last step matches the gait's period and length within 2 %
+    settled: bool  # whether the walk's last step matches the gait's period and length within 2 %
     evaluations: int  # number of right-hand-side evaluations
 
     @property

@@ -37,7 +37,7 @@ SCAN = 400  # number of samples that bracket a root
 LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding errors
 LONG_AMPLITUDE = 0.05  # rad, angle between the legs at which the long-period seed is accurate to a percent
 SHORT_AMPLITUDE = 0.002
-MAX_GROWTH = 30.0  # largest growth exponent of a fall over half a step; a larger one leaves no digit of the start
+MAX_GROWTH = 30.0  # largest exponent of growth while falling for half a step; above it, rounding errors swamp the start
 # matrices for a slope of 1 rad: STATE_OF turns (z, 1) into the state, SECTION_ROWS (z, 1) into z, and FEET_DOWN the
 # state into theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
@@ -160,7 +160,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> SmallSlopeSeed | None:
-    """Return the gait that is proportional to the slope, with a period below `longest` (s), or None."""
+    """Return the gait proportional to the slope, with a period below `longest` (s); None if it does not exist."""
     try:
         conditions = step_conditions(walker, modes)
         period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)

@@ -102,7 +102,7 @@ class StepMap(Stepper, Protocol):
         """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk from z (d,) over heights (steps + 1,), current foothold first, after a hip push along the slope."""
+        """Walk from z (d,) over heights (steps + 1,) from the present foothold on, after a hip push along the slope."""
 
     def settled(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
         """Return z (d,) with the stance foot at rest on the ground."""
@@ -181,7 +181,7 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[
 def differentiate_along(
     step_map: StepMap, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats
 ) -> tuple[Floats, ...] | None:
-    """Differentiate step quantities (steps,) and samples (times, 2) along a column of z and heights, or return None."""
+    """Differentiate step quantities (steps,) and samples (times, 2) in direction `along`; None if a walk ends early."""
     ends, h = [], VARIATION / np.abs(along).max()
     for offset, weight in CENTRAL_2ND:
         moved, heights = z + offset * h * along[: z.size], heights_m + offset * h * along[z.size :]
@@ -207,7 +207,7 @@ class Cycle:
     z: Floats  # (d,) start
     steps: tuple[MappedStep, ...]  # completed steps
     DP: Floats  # (d, d) derivative of the end with respect to z
-    Dp: Floats = field(default_factory=no_values)  # (d,) derivative of the end by the parameter, if requested
+    Dp: Floats = field(default_factory=no_values)  # (d,) derivative of the end with respect to p, if requested
     # (monitors,) worst values over the steps; empty for gaits that are not on a branch
     monitors: Floats = field(default_factory=no_values)
 
@@ -266,7 +266,7 @@ def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
 
 
 def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
-    """Return the cycle with its derivative by the parameter, or with the outcome if a step fails at a nearby value."""
+    """Return the cycle with its derivative `Dp`, or with the outcome if a step fails at a nearby parameter value."""
     position, Dp = cycle.z, 0.0 * cycle.z
     for step in cycle.steps:
         outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value)

@@ -80,14 +80,14 @@ class BifurcationCurve:
     period: int
     first: Floats  # (points,) values of the first parameter
     second: Floats  # (points,) values of the second parameter
-    ends: tuple[BranchEnd, BranchEnd]  # where and why it ends; `value` is the second parameter's
+    ends: tuple[BranchEnd, BranchEnd]  # where and why the curve ends; `value` is the second parameter's
 
 
 def follow_curve(
     bifurcation: Bifurcation, period: int, first: ValueSpan, plane: Plane, points: int,
     advance: Callable[[], None], control: StepControl,
 ) -> BifurcationCurve | None:  # fmt: skip
-    """Follow the curve through a bifurcation within both spans, up to `points` points each way, or return None."""
+    """Follow the curve through a bifurcation within both spans, up to `points` points each way; None if that fails."""
     spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)
     equations = critical_gaits(plane.map_at, bifurcation.kind, period, scales)
@@ -169,7 +169,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Interpolate a period-1 gait from the branches at each value, preferring stable ones; None without a branch."""
+    """Interpolate a period-1 gait from the branches at each value, preferably stable; None if no branch has one."""
     gaits, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:

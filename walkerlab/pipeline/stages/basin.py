@@ -76,7 +76,7 @@ def run(
     gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config)
     if len(rigid.section_indices) != len(COORDINATES):
         raise ConfigError(
-            f"basin takes walkers with {len(COORDINATES)} coordinates just after heel strike; this one has "
+            f"basin needs a walker with {len(COORDINATES)} coordinates just after heel strike; this one has "
             f"{len(rigid.section_indices)}.",
             "Lock the knees at heel strike: --set walker.knee.at_heel_strike=locked.",
         )

@@ -173,7 +173,7 @@ def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
 
 
 def contact_seeds(question: FamilyQuestion, progress: Progress) -> Begun | None:
-    """Find a gait of the contact model at the first start value that has one; None if none has."""
+    """Find a gait of the contact model at the first start value that has one; None if no value has one."""
     from walkerlab.scene.contact import gait_off_pads
 
     progress.start("continuation: a gait of the contact model")

@@ -170,7 +170,7 @@ def branch_group(
 
 
 def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:
-    """Build the groups of sampled walks of some gaits of each rigid branch, such as branch_0/motion_7."""
+    """Build groups such as branch_0/motion_7: sampled walks of a few gaits, evenly spread along each rigid branch."""
     return {
         f"branch_{number}/motion_{place}": group
         for number, branch in enumerate(branches)

@@ -31,7 +31,7 @@ NUMBERS = {
     "min_normal_force": Label("N", "minimum normal force on the stance foot", name="min_normal_force_N"),
     "max_friction_ratio": Label("1", "largest ratio of tangential to normal force"),
     "min_normal_impulse": Label(
-        "N s", "minimum normal impulse of the ground in a strike of heel or knee", name="min_normal_impulse_N_s"
+        "N s", "minimum normal impulse of the ground in a heel or knee strike", name="min_normal_impulse_N_s"
     ),
     "max_impulse_ratio": Label("1", "largest ratio of tangential to normal impulse in a strike"),
     "max_scuff_depth": Label("m", "largest depth of the swing foot below the slope", name="max_scuff_depth_m"),

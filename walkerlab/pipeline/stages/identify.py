@@ -200,7 +200,7 @@ def prior_row(estimate: Estimate, value: float, sigma: float) -> dict[str, Any]:
 def worst_moves(known: Information) -> Floats | None:
     """Return one-sigma changes (2, parameters) along the two parameter combinations that the walk determines worst.
 
-    They are independent, in the keys' units, the worst first; None if fewer than two combinations are determined.
+    The changes are independent and in the keys' units, the worst first; None if fewer than two are determined.
     """
     worst = known.directions[~is_open(known.singular_values)][-2:]
     if len(worst) < 2:

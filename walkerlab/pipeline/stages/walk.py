@@ -165,7 +165,7 @@ def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Varia
 
 
 def legs() -> dict[str, Variable]:
-    """Build the coordinate of the legs, which are numbered 1 and 2 in any role."""
+    """Build the coordinate of the legs; they keep the numbers 1 and 2, whichever is the stance leg."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 

@@ -68,7 +68,9 @@ class Group:
             check_name(name)
         for name, variable in self.variables.items():
             if name in sizes and variable.dims != (name,):
-                raise ValueError(f"{name!r} is a dimension and a variable with other dimensions, {variable.dims}")
+                raise ValueError(
+                    f"{name!r} names both a dimension and a variable, but the variable has dimensions {variable.dims}"
+                )
         for name, value in self.attrs.items():
             if not isinstance(value, Attribute):
                 raise TypeError(f"attribute {name!r} must be text, a bool or a number, not {value!r}")
@@ -116,7 +118,7 @@ class Content:
                 check_name(part)
             parent = self.groups.get(above, Group({}))
             if name in parent.variables or name in parent.sizes:
-                raise ValueError(f"group {path!r} has the name of a variable or dimension next to it")
+                raise ValueError(f"group {path!r} has the same name as a variable or dimension of its parent group")
 
     def __getitem__(self, path: str) -> Group:
         return self.groups[path]

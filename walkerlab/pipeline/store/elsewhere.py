@@ -37,7 +37,7 @@ def mentions(path: Path, key: str) -> bool:
 def take_over(origin: Path, target: Path) -> None:
     """Link or copy a result's file to `target`.
 
-    Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if both fail.
+    Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if neither works.
     """
     with replacing(target) as temporary:
         try:

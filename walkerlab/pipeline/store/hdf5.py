@@ -124,7 +124,7 @@ class Budget:
     """Number of bytes that the datasets not yet read may declare; a file may not declare more than it holds."""
 
     def __init__(self, size: int) -> None:
-        """Start with the size of the file, in bytes."""
+        """Set the budget to the size of the file, in bytes."""
         self.left = size
 
     def spend(self, size: int) -> None:

@@ -33,7 +33,7 @@ Labels = Mapping[str, tuple[str, str]]
 FOLDER: Final = "sweep-chunks"
 NOT_OF_THE_POINT: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
-"""Number of memories (see `memory_for`) that a process keeps."""
+"""Number of caches of stage inputs (see `memory_for`) that a process keeps."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -61,8 +61,8 @@ class Chunk:
 
 
 @lru_cache(maxsize=MEMORIES)
-def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one memory for each forced sweep
-    """Return this process's memory of inputs, which is kept from chunk to chunk; arguments as in `compute_point`."""
+def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
+    """Return this process's cache of stage inputs, which is kept between chunks; arguments as in `compute_point`."""
     module, _, name = graph.partition(":")
     return MemoryResults(getattr(importlib.import_module(module), name))
 

@@ -48,7 +48,7 @@ class SweepEngine:
 
     @contextlib.contextmanager
     def start_early(self, order: Order) -> Iterator[SweepEngine]:
-        """Give the engine for one sweep; local workers start now and import modules while the points are prepared."""
+        """Yield the engine for one sweep; local workers start now and import modules while the points are prepared."""
         if self.opened is not local:
             yield self
             return
