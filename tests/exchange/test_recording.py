@@ -127,7 +127,7 @@ def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_pat
         ("walk.csv", "\n".join(OWN.splitlines()[:2]), "1 samples"),
         ("walk.csv", OWN.replace(repr(float(ANGLES[1, 0])), "abc"), "line 3: 'abc' is not a number"),
         ("walk.csv", OWN + ",7", "4 values where the header names 3"),
-        ("walk.csv", "\n".join([*OWN.splitlines(), OWN.splitlines()[2]]), "time does not rise"),
+        ("walk.csv", "\n".join([*OWN.splitlines(), OWN.splitlines()[2]]), "time does not increase"),
         ("walk.csv", OWN.replace("\n0.2,", "\n,"), "time is missing"),
         ("walk.res", RES[:-40], "not complete XML"),
         ("walk.res", RES.replace('id="3"', 'id="2"'), "not unique"),

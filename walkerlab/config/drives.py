@@ -37,7 +37,7 @@ class PushOff(Block):
 
     impulse_N_s: float = key(0.0, "N s", "impulse at the trailing foot, 0 for none", KUO, ge=0.0, le=STRONGEST)
     duration_s: float = key(
-        0.005, "s", "duration in the contact model; in the rigid model it acts at once", ge=1e-9, le=10.0
+        0.005, "s", "duration in the contact model; in the rigid model it acts instantaneously", ge=1e-9, le=10.0
     )
 
 

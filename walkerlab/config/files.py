@@ -120,7 +120,7 @@ def _refuse_named_files(root: Mapping) -> None:
 
 
 def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
-    """Return the file named under stability.cases (relative to `folder`) and the name's position; None for a list."""
+    """Return the file under stability.cases (relative to `folder`) and where the config names it; None for a list."""
     block = layer.entries.get("stability")
     file_name = block.entries.get("cases") if isinstance(block, Mapping) else None
     if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):

@@ -35,9 +35,11 @@ class Identify(Block):
         (), "", "clock and sensor properties to estimate as well", bounds=f"a list of {', '.join(get_args(Nuisance))}"
     )
     model: Literal["rigid", "contact", "both"] = key("rigid", "", "model to fit")
-    starts: int = key(1, "1", "starts of the fit: the config's values, others within 10 %", ge=1, le=100)
+    starts: int = key(
+        1, "1", "number of starts of the fit: the config's values first, then values within 10 % of them", ge=1, le=100
+    )
     robustness: bool = key(
-        False, "", "whether to report the identified gait's sensitivity norm (step period for a drop of the floor)"
+        False, "", "whether to report the identified gait's sensitivity norm (floor drop to step period)"
     )
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
@@ -46,7 +48,10 @@ class Identify(Block):
         dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
     )
     units: dict[str, str] = key(
-        dict, "", "units by kind (time, length, angle), quantity or column", bounds="a unit for each"
+        dict,
+        "",
+        "units by kind (time, length, angle), quantity or column",
+        bounds="a unit for each kind, quantity or column",
     )
 
     @field_validator("fit")

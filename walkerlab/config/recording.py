@@ -24,5 +24,8 @@ class RecordedFile(Block):
         dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
     )
     units: dict[str, str] = key(
-        dict, "", "units by kind (angle, length, ...), quantity or column", bounds="a unit for each"
+        dict,
+        "",
+        "units by kind (angle, length, ...), quantity or column",
+        bounds="a unit for each kind, quantity or column",
     )

@@ -19,7 +19,7 @@ from walkerlab.errors import ConfigError
 
 COLUMNS: Final = 79
 OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
-"""Kind of the block that a key's name may contain, such as `(kneed)`; it appears only in this reference."""
+"""Kind in parentheses in a key's name, such as `(kneed)`: only blocks of that kind have the key."""
 SCHEMA_REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
 

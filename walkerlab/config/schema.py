@@ -205,7 +205,7 @@ class Config(Block):
         0.0174,
         "rad",
         "slope, positive where it descends in the walking direction",
-        "not stated; both feet of x_p (eq. 11) stand on it",
+        "not stated in the paper; follows from x_p (eq. 11), with both feet on the slope",
         bounds="between -pi/2 and pi/2, both excluded",
         gt=-RIGHT_ANGLE,
         lt=RIGHT_ANGLE,

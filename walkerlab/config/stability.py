@@ -33,7 +33,7 @@ class Case(Block):
     agreement: float = key(
         1e-4,
         "1",
-        "largest change of times at a ten times tighter tolerance, in pendulum times; also between twins",
+        "largest difference of times from the walk with a ten times tighter tolerance or the twin, in pendulum times",
         gt=0.0,
     )
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)

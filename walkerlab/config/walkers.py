@@ -79,7 +79,7 @@ class Torso(Block):
     """An upper body at the hip, kept on the bisector of the legs."""
 
     mass_kg: float = mass(..., "mass of the torso")
-    above_hip_m: float = key(..., "m", "its centre of mass above the hip", ge=0.0, le=MAX_LENGTH_M)
+    above_hip_m: float = key(..., "m", "height of its centre of mass above the hip", ge=0.0, le=MAX_LENGTH_M)
     inertia_kg_m2: float = inertia(0.0, "the torso")
     held: Literal["bisecting"] = key(
         "bisecting", "", "what holds the torso", "Wisse, Schwab, van der Helm, Robotica 22 (2004)"

@@ -73,7 +73,7 @@ class AdamsContact:
     foot: str
     pads: tuple[str, ...]
     normal: NormalLaw  # stiffness in N/mm^e, damping in N s/mm, penetration in mm
-    friction: Coulomb | None  # velocities in mm/s; None without friction
+    friction: Coulomb | None  # velocities in mm/s; None if there is no friction
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,7 @@ def foot_text(ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
 
 
 def walker_text(export: Exported, head: Iterable[str]) -> str:
-    """Write a model with pads and a keyframe `gait`; a walker without drives walks from it under plain `mj_step`.
+    """Write a model with pads and a keyframe `gait`, from which a walker without drives walks under plain `mj_step`.
 
     head  lines of the header comment
 
@@ -193,7 +193,7 @@ def custom_texts(export: Exported) -> Iterator[str]:
 
 
 def coupling_texts(export: Exported) -> Iterator[str]:
-    """Yield the constraints of coupled hinges; raises ConfigError if a coupling has more than two."""
+    """Yield the constraints of coupled hinges; raises ConfigError for a coupling of more than two hinges."""
     for coupling in export.couplings:
         if len(coupling.links) > 2:
             raise ConfigError(
@@ -213,8 +213,9 @@ def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
     static = float(export.scene.ours.friction.largest)
     yield (
         f"Contact tuned to ADAMS's law under {target.mass:.6g} kg: penetration at rest {target.penetration:.4g} m, "
-        f"damping ratio {target.damping_ratio:.4g}, friction {target.friction:.4g} of a sliding foot, creep of "
-        f"{target.creep_velocity:.4g} m/s under a tangential load of {target.creep_load:.4g} of the normal force."
+        f"damping ratio {target.damping_ratio:.4g}, friction coefficient {target.friction:.4g} of a sliding foot, "
+        f"creep at {target.creep_velocity:.4g} m/s under a tangential load of {target.creep_load:.4g} times the normal "
+        "force."
     )
     yield (
         f"Not expressed: the exponent {target.exponent:.4g} (the force is linear), damping that grows with the "

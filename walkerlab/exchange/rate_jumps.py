@@ -28,11 +28,11 @@ MOST_FOUND: Final = 4
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
-    """Return likely sums (rad) of the leg angles at heel strikes, where their rates jump, the clearest jumps first.
+    """Return likely values (rad) of the leg angles' sum at heel strikes, where leg rates jump; clearest jumps first.
 
     time   (samples,) s
     angle  (samples, 2) rad, from the vertical
-    total  function from angles (samples, 2) to their sums (samples,) from the normal
+    total  function from angles (samples, 2), from the vertical, to their sum (samples,), from the slope's normal
     """
     spread, sums = angle[:, 0] - angle[:, 1], total(angle)
     runs = apart_runs(np.abs(spread) > AHEAD * np.abs(spread).max(), spread > 0.0)
@@ -44,7 +44,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
 
 
 def evidence_for(time: Array, angle: Array, over: Array, runs: Sequence[tuple[int, int]], half: float) -> float:
-    """Return the scatter of the angles that rate jumps explain, as a multiple of the variance that remains.
+    """Return the squared scatter of the angles explained by rate jumps, divided by the variance that remains.
 
     A jump is fitted in each run (first sample, last sample), where `over` (samples,) last falls through zero.
     """

@@ -95,7 +95,8 @@ def checked_time(recording: Recording) -> Recording:
     if steps_back.size:
         row = int(steps_back[0])
         raise ConfigError(
-            f"{path}: time does not rise from sample {row + 1} ({time[row]:.9g}) to {row + 2} ({time[row + 1]:.9g}).",
+            f"{path}: time does not increase from sample {row + 1} ({time[row]:.9g}) "
+            f"to {row + 2} ({time[row + 1]:.9g}).",
             "Sort the rows by time, and remove duplicate times.",
         )
     return recording
@@ -142,7 +143,7 @@ def without_last_delimiters(lines: list[str]) -> list[str]:
 
 
 def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
-    """Find the header, the first row of names followed by as many values; return its index and the delimiter.
+    """Find the header, the first row of names above a row of as many values; return its index and the delimiter.
 
     A table with several columns takes precedence over a table with one column.
     """

@@ -149,7 +149,7 @@ def wants_own_pitch(contact: Contact) -> bool:
 
 
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
-    """Return the pad pitch (m); for terrain without pads, its reference length, the rigid step length."""
+    """Return the pad pitch (m); terrain without pads uses the rigid step length as reference length."""
     if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":
         return rigid_step_length_m
     if contact.pad_pitch == "own":

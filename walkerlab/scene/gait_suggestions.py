@@ -101,7 +101,7 @@ def suggest_gaits(config: Config, typed: str = "") -> str:
         slope = suitable.nearest_slope(config.slope_rad)
         setting = f"slope_rad={slope:.4g}" if "slope_rad=" in typed else f"slope_deg={math.degrees(slope):.3g}"
         command = f"`walkerlab fixedpoint{typed} --set {setting}`"
-        advice.append(f"{description} exists from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: {command}.")
+        advice.append(f"{description} exists at least from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: {command}.")
     if not advice:
         feet_tried = name_feet_tried(config)
         advice.append(f"No gait was found on gentler or steeper slopes{feet_tried}.{suggest_walkers(config)}")
@@ -109,7 +109,7 @@ def suggest_gaits(config: Config, typed: str = "") -> str:
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
-    """Return how far (m) ahead of the shanks the feet give the most stable gait, and that gait; None without a gait."""
+    """Return the distance (m) of feet ahead of the shanks with the most stable gait, and the gait; None if no gait."""
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).over(config, rigid_walker)(ahead_m)

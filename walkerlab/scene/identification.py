@@ -40,7 +40,7 @@ Values = tuple[float, ...]
 CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
-SPREAD_OF_STARTS: Final = 0.1  # maximum relative change of a parameter in the starts of the fit
+SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
@@ -169,7 +169,7 @@ class Fit:
 
 
 def in_time(first: Fit) -> Fit | None:
-    """Refit angles at their sample times, from a fit in phase; None for measured steps or if the fit fails."""
+    """Refit angles at their sample times, from the fit at equal phase; None for measured steps or a failed fit."""
     forecast, u = first.problem.forecast, first.fitted.u
     if not isinstance(forecast.measured, MeasuredAngles):
         return None
@@ -265,7 +265,7 @@ def measurement_noise(fit: Fit) -> dict[str, float]:
 
 
 def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
-    """Return the floor's roughness and its standard error, from the curvature of the restricted likelihood."""
+    """Return the floor's roughness, with its standard error from the curvature of the restricted likelihood."""
     roughness = fitted.noise.roughness_m
     if roughness == 0.0:
         return {"roughness_m": 0.0, "standard_error": None, "at_bound": True}

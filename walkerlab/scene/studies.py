@@ -28,5 +28,5 @@ def with_equations(model: RigidModel, equations: Equations) -> RigidModel:
 
 
 def equation_sets(config: Any) -> tuple[Equations, ...]:
-    """Return the sets of equations to search gaits with: all sets for the study's walker, otherwise the config's."""
+    """Return the sets of equations for the gait search: all sets for the study's walker, otherwise the config's."""
     return (LAGRANGE_EQUATIONS, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)

@@ -215,7 +215,7 @@ def test_without_states_and_energies_the_numbers_are_still_held_against_the_walk
 def test_a_walk_that_ended_at_once_has_no_motion_to_compare(compared):
     content = compared(steps=0, outcome="off-pad", samples=1)
     assert content.summary["max_angle_error_rad"]["raw"] is None
-    assert any("ended at once" in entry["why"] for entry in content.summary["left_out"])
+    assert any("ended immediately" in entry["why"] for entry in content.summary["left_out"])
 
 
 def test_a_set_of_equations_without_a_gait_leaves_its_column_empty(compared, gaits):

@@ -74,7 +74,7 @@ def test_a_name_to_show_that_there_is_not_ends_a_sweep_with_its_first_chunk(toy)
     few = ("--jobs", "1", "--chunk-seconds", "1e-9")
     done = toy("sweep", "--over", "gravity_m_s2=1:9:400", "--stage", "drop", "--show", "nonsense", *few)
     assert done.returncode == 3
-    assert "is not a quantity of the first results" in done.stderr
+    assert "is not among the quantities of the points computed so far" in done.stderr
     again = toy("sweep", "--over", "gravity_m_s2=1:9:400", "--stage", "drop", "--dry-run", "--json")
     assert 0 < json.loads(again.stdout)["reused"] < 400
 

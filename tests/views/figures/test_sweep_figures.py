@@ -85,7 +85,7 @@ def test_pictures_of_walks_begin_with_the_last_steps_period_and_length():
 def test_a_name_that_no_first_result_has_is_refused_and_headlines_and_nested_ones_are_not():
     known = ("steps", "last_step_period_s", "gaits.3.period_s")
     check_options("contact-sim", {f"--show {name}": name for name in known}, ["steps"])
-    with pytest.raises(ConfigError, match="--show nonsense is not a quantity"):
+    with pytest.raises(ConfigError, match="--show nonsense is not among the quantities"):
         check_options("contact-sim", {"--show nonsense": "nonsense"}, ["steps"])
 
 

@@ -19,7 +19,7 @@ def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its
     made = section.section(Results(load().config, families()))
     (paragraph, table) = made.blocks
     assert "stable from 1\u00a0deg to 4\u00a0deg" in made.finding
-    assert "0.2 a step" in paragraph.text
+    assert "0.2 per step" in paragraph.text
     assert "the attractor of the rigid model disappears: the walker falls." in paragraph.text
     assert [cell.text for cell in next(iter(table.groups.values()))[0]][:4] == ["flip", "rigid", "1", "4"]
 

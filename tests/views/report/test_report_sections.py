@@ -159,7 +159,7 @@ def test_a_spring_alone_does_not_drive_a_walker():
 def test_work_that_is_rounding_is_not_told():
     record = {"work_per_step_J": {"gravity": -2e-14, "push_off": 1.69, "hip": 0.0}}
     told = [column.title for column in works(str) if column.value(record) is not None]
-    assert told == ["work of the push-off a step (J)"]
+    assert told == ["work of the push-off per step (J)"]
 
 
 def test_figures_of_the_paper_that_are_not_drawn_are_explained():

@@ -116,7 +116,7 @@ def try_first_end(trial: Trial) -> End | WalkEndsError:
 
 
 def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
-    """Make a postponed run, after a warm-up because it may be the first in its process."""
+    """Time a run that was postponed, after a warm-up because it may be the first in its process."""
     trial.prepare(method, tolerance, WARM_UP_BUDGET)()
     return measure(trial, method, tolerance, RUN_BUDGET)
 

@@ -50,7 +50,7 @@ def percentages() -> Iterator[tuple[Printed, str]]:
 
 
 def percent_left_open(row: StartRow) -> Interval:
-    """Return the range of the change in magnitude from MATLAB's to ADAMS's value (%), given the rounding of both."""
+    """Return the change in magnitude from MATLAB's to ADAMS's value (%), as the interval that their rounding allows."""
     return interval(lambda adams, matlab: 100.0 * (abs(adams) / abs(matlab) - 1.0), row.adams, row.matlab)
 
 

@@ -47,7 +47,7 @@ class Comparison:
     """Difference between the walks of both models."""
 
     errors: Errors  # differences by alignment; alignments that cannot be compared are absent
-    orbit: list[float] | None = None  # distance between the orbits of each leg; None without a complete stride
+    orbit: list[float] | None = None  # distance between the orbits of each leg; None if no stride was completed
     groups: Mapping[str, Group] = field(default_factory=dict)
     left_out: tuple[dict[str, str], ...] = ()  # omitted comparisons, with reasons
 
@@ -67,7 +67,7 @@ def compare_motion(
 ) -> Comparison:
     """Compare two walks in time, in phase and as orbits, second minus first; `meaning` describes the difference."""
     if rigid is None or contact is None:
-        why = "states of both walks are not available: outputs omits them, or a walk ended at once"
+        why = "states of both walks are not available: outputs omits them, or a walk ended immediately"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
     steps, orbit = min(rigid.steps, contact.steps), None
     time, raw = comparison.difference_in_time(contact, rigid)

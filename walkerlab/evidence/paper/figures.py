@@ -37,7 +37,7 @@ LEG_QUANTITIES = (
     ("a", "angle", "angle_error_rad"),
     ("b", "angular velocity", "velocity_error_rad_s"),
 )
-"""Compared quantities: letter of the panel, name, variable of the errors (stored raw and aligned)."""
+"""Compared quantities: panel letter, name, and error variable, which is stored as raw_NAME and as aligned_NAME."""
 RAW_ERRORS = Need(COMPARE_STAGE, "errors", ("time", *(f"raw_{name}" for _, _, name in LEG_QUANTITIES)), NO_STATES)
 ALIGNED_ERRORS = Need(
     COMPARE_STAGE,

@@ -92,7 +92,7 @@ class TuneRun:
     walks       walks of the procedure: `hinged`, with a revolute joint at the first stance foot; `released`, without
                 it; and `adjusted`, from the adjusted start, if there is one
     printed     summaries of these walks
-    adjustment  smallest change of the velocities with which the contact model walks, or None
+    adjustment  smallest change of the velocities with which the contact model walks; None if it never walks
     """
 
     def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
@@ -327,7 +327,7 @@ def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
 def groups(tune: TuneRun) -> dict[str, Group]:
     stored, walker = {"map": map_group(tune)}, tune.scene.walker
     if tune.margins:
-        labels = {"name": Label("", "what is scaled"), "factor": Label("1", "last factor that walks")}
+        labels = {"name": Label("", "what is scaled"), "factor": Label("1", "last factor at which the start walks")}
         stored["margins"] = rows_group(tune.margins, labels, "margin", "number")
     if tune.gait.gait is not None:
         stored["gait"] = gait_group(tune.gait.gait, tune.scene)

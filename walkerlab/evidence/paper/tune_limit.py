@@ -133,7 +133,7 @@ def limit_findings(
 
 
 def limit_summary(findings: LimitFindings) -> dict[str, Any]:
-    """Summarise orders of convergence, settings that reach the paper's 1e-4 rad, and contributions of the causes."""
+    """Summarise convergence orders, settings that reach the paper's 1e-4 rad, and causes of the period difference."""
     reaches = {}
     for name in findings.walk_series:
         distances = [distance for distance in findings.series[name] if distance.angle is not None]

@@ -1,4 +1,4 @@
-"""Judgement of cases; walks are repeated at a ten times tighter tolerance, by another method and as scaled twins."""
+"""Judgement of cases; walks are repeated with a ten times tighter tolerance, another method and a scaled twin."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -48,7 +48,7 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile; then the largest budgets start first."""
+    """Yield results in case order. One case per model runs first, to compile; the others start by decreasing budget."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
@@ -65,7 +65,7 @@ def judge(case: Case, config: Config) -> CaseResult:
     walk = start.walk(case, methods, sampled=case.steps <= SAMPLED_STEPS)
     wall_s = time.perf_counter() - began
     findings: list[Measure | NotMeasured] = [
-        Measure("values that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
+        Measure("number of values that are not finite", float(np.count_nonzero(~np.isfinite(walk.numbers))), 0.0),
         Measure(f"{start.residual_name} over energy", finite(walk.residual_J / start.energy), case.balance),
         Measure(BUDGET_USED, walk.rhs_evaluations / case.budget, 1.0 + 20.0 / case.budget),
         *start.measures(walk, case),
@@ -95,15 +95,16 @@ def judge(case: Case, config: Config) -> CaseResult:
 
 def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:
     """Return the walks that must agree with the first, as pairs (description, walk)."""
-    again = [("ten times tighter tolerance", start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR)))]
+    tighter = start.walk(case, case_tolerances(start, case, TIGHTER_FACTOR))
+    again = [("the walk with ten times tighter tolerance", tighter)]
     if second.walk is not None:
-        again.append((second.method, second.walk))
+        again.append((f"the walk with {second.method}", second.walk))
     if case.twin:
         scale = to_twin(config)
         twin_case = case.model_copy(update={"lowered_m": case.lowered_m * scale.length})
         twin = prepare_start(scaled(config, scale), twin_case)
         if twin is not None:
-            again.append(("twin", twin.walk(case, case_tolerances(twin, case))))
+            again.append(("the walk of the twin", twin.walk(case, case_tolerances(twin, case))))
     return again
 
 

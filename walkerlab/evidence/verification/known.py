@@ -106,15 +106,15 @@ class Known:
 
     name: Annotated[str, Label("", "name of the problem")]
     quantity: Annotated[str, Label("", "compared quantity, with its unit")]
-    value: Annotated[float, Label("1", "by the contact code, in the quantity's unit")]
-    reference: Annotated[float, Label("1", "by another route, in the quantity's unit")]
+    value: Annotated[float, Label("1", "value computed by the contact code, in the quantity's unit")]
+    reference: Annotated[float, Label("1", "reference value, computed by another route, in the quantity's unit")]
     source: str
     limit: float  # largest relative error, justified by `why_limit`
     why_limit: str
     wall_s: float
 
     @property
-    def error(self) -> Annotated[float, Label("1", "difference over reference")]:
+    def error(self) -> Annotated[float, Label("1", "relative difference from the reference")]:
         return abs(self.value - self.reference) / abs(self.reference)
 
     @property

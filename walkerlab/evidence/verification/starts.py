@@ -102,7 +102,7 @@ class ContactStart(CaseStart):
     scene: ContactScene
 
     def again(self, case: Case) -> Case:
-        """Return the case unchanged, because the outcomes of complete walks are compared as well."""
+        """Return the case for a repeated walk: unchanged, because outcomes are compared, too, not only touch times."""
         return case
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:

@@ -262,9 +262,9 @@ class Film:
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """Return `model` or, if None, contact-sim (simulate if only that has run); ConfigError if `model` is not a walk."""
+    """Return `model` or, if None, contact-sim (simulate if only that has run); ConfigError if `model` does not walk."""
     if model is not None and model not in MODEL_NAMES:
-        raise ConfigError(f"--model {model} is not a walk.", f"Choose from {', '.join(MODEL_NAMES)}.")
+        raise ConfigError(f"--model {model} is not a stage that walks.", f"Choose from {', '.join(MODEL_NAMES)}.")
     rigid, contact = MODEL_NAMES
     alone = folder.artifact(rigid).is_file() and not folder.artifact(contact).is_file()
     return model or (rigid if alone else contact)

@@ -113,7 +113,7 @@ def bounds(flag: str, values: Sequence[str], form: str) -> str:
 
 
 def pairs(flag: str, values: Sequence[str], kind: type) -> str:
-    """Convert arguments NAME=VALUE,... to a YAML block; with `--units`, a unit without a name applies to its kind."""
+    """Convert NAME=VALUE,... arguments to YAML; with `--units`, a bare unit applies to all quantities of its kind."""
     # Imported here: few commands read files of other programs.
     from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units

@@ -47,7 +47,7 @@ class SweepRequest(Request):
         "--engine-option", metavar="NAME=VALUE", help="For Slurm: slurm_partition, timeout_min, cluster, ..."
     )
     at_once: int = option(
-        "--jobs", default=0, metavar="N", min=0, help="Chunks computed at once; 0: all cores, on Slurm 16."
+        "--jobs", default=0, metavar="N", min=0, help="Chunks computed simultaneously; 0: all cores, on Slurm 16."
     )
     chunk_seconds: float | None = option(
         "--chunk-seconds", metavar="S", help="Target duration of a chunk; default: depends on the engine."

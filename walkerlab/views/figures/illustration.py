@@ -32,7 +32,7 @@ class Need:
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why the requirement is not met, or None; `absent`: reason for each missing result, by stage."""
+        """Return why the requirement is not met, None if it is; `absent`: reason for each missing result, by stage."""
         if self.stage not in results:
             why = absent.get(self.stage)
             return f"it needs {self.stage}" + (f": {why}" if why else "")
@@ -79,7 +79,7 @@ class Illustration:
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why the illustration cannot be drawn, or None; `absent`: reason for each missing result, by stage."""
+        """Return why it cannot be drawn, None if it can; `absent`: reason for each missing result, by stage."""
         reasons = (need.missing_in(results, absent) for need in self.needs)
         return next((reason for reason in reasons if reason is not None), None)
 

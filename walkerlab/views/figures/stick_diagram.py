@@ -71,13 +71,13 @@ class Sticks:
     slope: float  # rad
     knees: Array | None = None  # (samples, leg, 2); None for straight legs
     radius: float = 0.0  # radius of the soles' arcs, m; the feet are their lowest points
-    head: Array | None = None  # (samples, 2) centre of mass of the torso; None without a torso
+    head: Array | None = None  # (samples, 2) centre of mass of the torso; None if there is no torso
     ground: tuple[Array, Array] | None = None  # ground levels as returned by `ground_levels`; None on even ground
     pushes: bool = False  # whether the trailing foot pushes off as the other one lands
     ending: str = ""  # outcome of a walk that failed, such as fell; otherwise empty
 
     def pushing(self, time: float) -> int | None:
-        """Return the leg whose push-off is shown at a time (s), or None."""
+        """Return the leg whose push-off is shown at a time (s); None if no push-off is shown."""
         step = int(np.searchsorted(self.strikes, time, side="right")) - 1
         late = step < 0 or time - self.strikes[step] > SEEN_S
         return None if late or not self.pushes else 1 - step % 2
@@ -250,7 +250,7 @@ def entries(sticks: Sticks) -> list[Artist]:
 
 
 PAD_HEIGHT = 0.028
-"""Height at which a pad is drawn (leg lengths); the model's pads have no thickness."""
+"""Thickness of a drawn pad (leg lengths); the model's pads have none."""
 PADS: Final[tuple[dict[str, Any], ...]] = tuple(
     {"facecolor": "white", "edgecolor": look.colour, "hatch": hatch, "linewidth": 0.7}
     for look, hatch in zip(LEGS, ("////", "||||"), strict=True)

@@ -66,7 +66,7 @@ def works(written: Callable[[Any], str]) -> Iterator[Column]:
             work = record.get("work_per_step_J") or {}
             return work[name] if work and abs(work[name]) > WORK_ROUNDING * max(map(abs, work.values())) else None
 
-        yield Column(f"work of {source} a step (J)", source_work, written)
+        yield Column(f"work of {source} per step (J)", source_work, written)
 
 
 def state_at(place: int, gait: Mapping[str, Any]) -> float:

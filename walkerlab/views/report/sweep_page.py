@@ -77,7 +77,9 @@ def check_options(stage: str, names: Mapping[str, str], variables: Collection[st
     for option, name in names.items():
         if name not in available and "." not in name:
             listed = ", ".join(quantity for quantity in available if "." not in quantity)
-            raise ConfigError(f"{option} is not a quantity of the first results.", f"Choose from {listed}.")
+            raise ConfigError(
+                f"{option} is not among the quantities of the points computed so far.", f"Choose from {listed}."
+            )
 
 
 PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))

@@ -52,7 +52,7 @@ class Column:
     # formats a value as text or as a cell with a tone; values that are already cells are kept
     written: Callable[[Any], str | Cell] = format_plain
     numeric: bool = False  # whether to align as numbers
-    wide: bool = False  # whether cells hold sentences, which a terminal omits
+    wide: bool = False  # whether cells hold sentences; tables on a terminal leave out such columns
 
     def value(self, record: Any, place: int = 0) -> Any:
         if self.of is None:
@@ -109,7 +109,7 @@ def table(
     note: str = "",
     by: str = "",
 ) -> Table:
-    """Build a table with a row per record; a mapping gives groups by title. ValueError for rows of unequal length."""
+    """Build a table with a row per record; a mapping gives groups by title. ValueError for rows of the wrong length."""
     groups = records if isinstance(records, Mapping) else {"": records}
     for record in chain.from_iterable(groups.values()):
         if isinstance(record, list | tuple) and len(record) != len(columns):
@@ -138,7 +138,7 @@ def side_by_side(
     numeric: bool = True,
     note: str = "",
 ) -> Table:
-    """Build a table with a column per record and a row per line; lines without any value are left out."""
+    """Build a table with a column per record and a row per entry of `lines`; rows without any value are left out."""
     rows = []
     for line in lines:
         cells = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}

@@ -19,7 +19,7 @@ DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
 ESCAPED_POWER = re.compile(r"\\\^\{\}(-?\d+)")
 """A power in escaped text."""
 SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
-"""A symbol in plain letters in escaped text."""
+r"""A spelled-out symbol with a subscript in escaped text, such as dtheta\_1."""
 IN_MATHS = {
     **{f"{sign}{DOT}": rf"$\dot{{\{name}}}$" for name, sign in LETTERS.items()},
     **{sign: rf"$\{name}$" for name, sign in LETTERS.items()},

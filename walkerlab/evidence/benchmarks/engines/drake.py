@@ -176,7 +176,7 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Join a link to its parent by a hinge, or the base to the world with its freedoms; returns the joints."""
+    """Join a link to its parent by a hinge, or the base to the world with its degrees of freedom; return the joints."""
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 

@@ -39,7 +39,7 @@ EXPLICIT_METHODS = ("ExplicitEuler", "RK44")
 
 
 def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
-    """Compute the settings that meet the target, including the slip velocity at which friction is full."""
+    """Compute the settings that meet the target, including the slip velocity at which friction is fully developed."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {
         "contact_stiffness": target.mass * target.gravity / target.penetration**target.exponent,

@@ -160,7 +160,7 @@ class RuleFollower:
             self._end(int(Outcome.WALKED))
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
-        """Return the first lock or release of a knee within a step of h (s), or None."""
+        """Return the first lock or release of a knee within a step of h (s); None if no knee locks or is released."""
         walk_state, turns = self.walk_state, []
         stance = walk_state.progress.stance
         pushing_s = pulse_left(self._fixed[0], self.time_s)

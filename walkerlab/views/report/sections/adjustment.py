@@ -94,7 +94,7 @@ GAIT_LINES = (
     Column("largest multiplier", "spectral_radius", partial(number, digits=4)),
     Column("multipliers", "multipliers", factors),
     Column("stable", "stable"),
-    Column("slip a step", "slip_m", length),
+    Column("slip per step", "slip_m", length),
     *(
         Column(f"energy lost {label}", partial(lost_energy, channel), partial(quantity, unit="J"))
         for channel, (label, _) in LOSS_HEADS.items()
@@ -116,7 +116,7 @@ def gait_table(summary: Summary, rigid: Summary) -> Table:
 
 MARGIN_COLUMNS = (
     Column("scaled velocity", "name", in_signs),
-    Column("last factor that walks", "factor", number, numeric=True),
+    Column("last factor at which the start walks", "factor", number, numeric=True),
     Column("outcome beyond", "beyond", lambda outcome: outcome or "no failure in the search range"),
     Column("steps beyond", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),
 )

@@ -24,7 +24,7 @@ RELEASE_COLUMNS = (
     measured("period", "period_s"),
     measured("length", "length_m", partial(number, digits=4)),
     measured("knee locks after", "knee_strike_s", partial(number, digits=4)),
-    Column("knee strikes (J a step)", "dissipated_J_per_step/knee_strikes", partial(number, digits=3), numeric=True),
+    Column("knee strikes (J per step)", "dissipated_J_per_step/knee_strikes", partial(number, digits=3), numeric=True),
     measured("rigid period", "rigid/period_s"),
 )
 
@@ -48,7 +48,7 @@ def section(results: Results) -> Section | None:
 
 
 def departure(results: Results) -> str:
-    """Describe where the contact model departs from the rigid one; empty without a comparison."""
+    """Describe where the contact model departs from the rigid one; empty if they were not compared."""
     summary = results.summary("compare")
     if "steps" not in summary or summary["steps"]["contact"]["period_s"] is None:
         return ""
