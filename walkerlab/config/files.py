@@ -111,7 +111,7 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
 
 
 def _refuse_named_files(root: Mapping) -> None:
-    """Raise ConfigError if a stored config, which may be untrusted and needs no other file, refers to one."""
+    """Raise ConfigError if a stored config names another file; stored configs are complete, and may be untrusted."""
     cases = cases_file(root, Path())
     places = [root.entries["extends"].position] if "extends" in root.entries else []
     places += [] if cases is None else [cases[1]]

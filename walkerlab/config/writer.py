@@ -68,7 +68,7 @@ def _commented(block: Block, values: dict[str, Any], indent: str, path: str = ""
             yield f"{indent}{name}:"
             yield from _commented(content, value, f"{indent}  ", f"{path}{name}.")
         elif value is None and block_of(field) is Source:
-            continue  # a user's config does not reproduce a study
+            continue  # omit an absent `source`: only a config that reproduces a study has one
         elif value is None and block_of(field) is not None:
             yield f"{indent}# {name}: {ELSEWHERE.format(path + name)}"
         elif isinstance(content, tuple) and (listed := block_of(field)) is not None:

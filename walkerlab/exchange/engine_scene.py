@@ -46,7 +46,7 @@ class EngineScene:
 
     @property
     def gravity(self) -> tuple[float, float]:
-        """Gravity along the slope and towards it (m/s^2)."""
+        """Gravity (m/s^2) along the slope and normal to it, into the ground."""
         return self.ours.gravity_along, self.ours.gravity_down
 
     @cached_property

@@ -47,7 +47,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class PlanarModel:
-    """Tree of links under gravity, whose components (m/s^2) are along the slope and towards it."""
+    """Tree of links, and the components of gravity (m/s^2) along the slope and normal to it, into the ground."""
 
     links: tuple[Link, ...]  # base first, every link after its parent
     freedoms: tuple[Freedom, ...]  # freedoms of the base relative to the world
@@ -74,7 +74,7 @@ def planar_model(
 ) -> PlanarModel:
     """Build the tree of an assembly's links, depth first, from a point of its base.
 
-    gravity  along the slope and towards it, m/s^2
+    gravity  along the slope and normal to it, into the ground, m/s^2
     welds    locked knees, whose shank and thigh form one link
     """
     root = base.body

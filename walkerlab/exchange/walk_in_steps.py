@@ -60,7 +60,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     """Find the steps of a recorded walk.
 
     source         name of the recording, for messages
-    touch_sum_rad  sum of the leg angles from the slope's normal at heel strikes; 0 unless slope or sensors are off
+    touch_sum_rad  sum of the leg angles from the slope's normal at heel strike; not 0 if slope or sensors have an error
 
     Raises ConfigError for implausible values, a gap within a step, or a recording without a complete step.
     """

@@ -221,7 +221,7 @@ class Executor:
         self._finish(None, answer)
 
     def _watch(self, future: Future[Any]) -> None:
-        """Track a future; its completion enters the event queue."""
+        """Track a future; when it completes, an event is put in the queue."""
         self._working.add(future)
         future.add_done_callback(lambda ended: self._events.put(partial(self._ended, ended)))
 

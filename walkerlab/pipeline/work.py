@@ -151,7 +151,7 @@ def complete(
     shared_from  minimum total size for which starting processes saves time
     compiled     whether all kernels are compiled; if not, the first unit runs alone and compiles them once
 
-    Returns the numbers of each unit, and the total size of the units computed now.
+    Returns the values computed for each unit, and the total size of the units computed now.
     """
     waiting = [unit for unit in units if unit.name not in checkpoint.kept]
     size = sum(unit.size for unit in waiting)

@@ -1,4 +1,4 @@
-"""Conditions of a measurement (the machine, an omitted hinge), and the format of error levels."""
+"""Conditions of benchmarks: machine, omission of a hinged first step; and formatting of error levels."""
 
 import os
 import platform

@@ -90,7 +90,7 @@ def ascend(trial: Trial, method: str) -> Ascent:
 def complete_ascents(
     trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
-    """Compute the references' first end states (or why one is missing) and, with `long_runs`, the postponed runs."""
+    """Compute each trial's first reference end (or why it is missing) and, with `long_runs`, the postponed runs."""
     # longest first: the last trial is near the rigid limit, where the explicit reference method takes the most steps
     ends = [partial(try_first_end, trial) for trial in reversed(trials)]
     postponed = [ascent for ascent in ascents if ascent.unfinished and long_runs]

@@ -75,7 +75,7 @@ def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
 
 
 def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, float, float, float, float]:
-    """Entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-; w = (w_1, w_2) numbers the legs as before the impact.
+    """Entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-; legs 1 and 2 are numbered as before the impact.
 
     They follow from (A.57): the constraint E dq+ = 0 gives dq+ = Z w+, so Z' D_e Z w+ = Z' D_e dq- without the impulse.
     With the right sign in (A.55) they depend on cos(theta_2 - theta_1) alone, and B_21 = 0 because the trailing leg

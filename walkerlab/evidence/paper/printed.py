@@ -189,7 +189,7 @@ def softening_in_metres() -> float:
 
 
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
-    """Walker of the paper at rest, with contact parameters read in N, mm, s; in SI; as ADAMS defaults in metres.
+    """Return the paper's resting foot for three readings of Fig. 4b: N, mm, s; SI; ADAMS defaults in metres.
 
     Adams View converts a default stiffness as force over length, whatever the exponent. The same dialog in a model in
     metres therefore means a stiffness 1000^(exponent - 1) times lower than 10^5 N/mm^exponent.

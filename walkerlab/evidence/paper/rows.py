@@ -47,7 +47,7 @@ class JudgedNumber:
 
 INPUT, REPRODUCED, EXPLAINED, CONTRADICTED, NOT_REPRODUCED = NumberVerdict
 Scene = Literal["rigid", "contact", "any"]
-"""The model whose scene must be the paper's for a mismatch to count; "any" if the paper's own values decide."""
+"""Model whose scene must equal the paper's for a mismatch to count; "any" if the paper's values alone decide."""
 
 
 def count_verdicts(rows: Iterable[JudgedNumber]) -> dict[str, int]:

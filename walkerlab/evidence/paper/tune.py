@@ -1,4 +1,4 @@
-"""Stage `tune`: the paper's parameter adjustment for any walker, with its necessity, size and causes."""
+"""Stage `tune`: repeat the paper's parameter adjustment for any walker; report its need, size and causes."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -38,7 +38,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quanti
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
-    """Reduce information (unknowns, unknowns) to the parameters, which come first, for known standard deviations."""
+    """Marginalise information (unknowns, unknowns) to the parameters, its first rows; noise levels count as known."""
     reduced = free_the_rest(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]

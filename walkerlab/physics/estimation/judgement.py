@@ -66,7 +66,7 @@ def whitened_residuals(forecast: Forecast, fitted: Fitted) -> Floats:
 
 
 def alternation_of(residuals: Floats) -> float:
-    """Return the difference between odd and even steps: the normal deviate with the same probability as Student's t."""
+    """Return how much odd and even steps differ, as a normal deviate with the same tail probability as Student's t."""
     odd, even = residuals[::2], residuals[1::2]
     if min(odd.size, even.size) < 2:
         return 0.0

@@ -25,7 +25,8 @@ Without this prior, the floor could explain one quantity of a short walk exactly
 """
 NOISE_RANGE: Final = 1e6  # ratio of the largest allowed standard deviation of a measurement to the smallest
 ROUNDING: Final = 1e-14  # relative rounding error of sums of products
-LOG_STEP: Final = 1e-4  # difference step of logarithms, in derivatives of the restricted likelihood
+# difference step in the logarithms of the standard deviations, for derivatives of the restricted likelihood
+LOG_STEP: Final = 1e-4
 # eigenvalues of scaled information below this fraction of the largest are rounding errors
 LOST_INFORMATION: Final = 1e-13
 
@@ -80,7 +81,7 @@ def products_of(data: Linearised) -> Products:
 
 
 def evaluate(products: Products, noise: Noise) -> Evaluation:
-    """Evaluate the likelihoods at one set of standard deviations, or at several: measurement (..., quantities)."""
+    """Evaluate the likelihoods for one or more noise levels; `noise.measurement` has shape (..., quantities)."""
     deviations, rough = np.asarray(noise.measurement), np.asarray(noise.roughness_m)
     total = np.einsum("qij,...q->...ij", products.sums, deviations**-2.0)
     fixed = 1 + products.unknowns

@@ -23,7 +23,7 @@ class Terrain(NamedTuple):
     pitch: float  # [S] m, length of a pad, and scale of the criteria for steps and slides
     lanes: tuple[float, float]  # m, position along the slope of the centre of pad 0 in each foot's lane
     has_pads: bool  # whether there are pads, over whose edges a foot can trip, or a plane
-    order_matters: bool  # whether a foot can touch only after it was above the ground ahead of the other foot
+    order_matters: bool  # whether a foot can touch only after it was ahead of the other foot while above the ground
     heights: Any  # (footholds,) m above the slope, the start's foothold first; later footholds have the last height
 
 
@@ -33,7 +33,7 @@ def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
 
 
 def after_mid_swing(pitch: float) -> Terrain:
-    """Create a plane that a foot can touch only after it was above the ground ahead of the other foot."""
+    """Create a plane that a foot can touch only after it was ahead of the other foot while above the ground."""
     return Terrain(pitch, (0.0, 0.0), False, True, EVEN)
 
 

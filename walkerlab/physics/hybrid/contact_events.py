@@ -28,7 +28,7 @@ FARTHEST_SLIDE = 0.25  # largest slide of a stance foot's material from where it
 
 
 class Frame(NamedTuple):
-    """Values that the criteria of events use: dimensions of the walker, and a setting."""
+    """Values that the event criteria use: the walker's scales, and whether to locate the law's switching points."""
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)

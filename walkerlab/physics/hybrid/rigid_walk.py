@@ -161,10 +161,10 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
 def take_step(
     model: RigidModel, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
-    """Take one step from time t (s), a swing and its heel strike; y then holds the state and tangent columns after it.
+    """Take one step, a swing and its heel strike, from time t (s); afterwards y holds the state and tangent columns.
 
-    Returns WALKED and the time of the heel strike, and leaves the state before it in `method`; or another outcome and
-    its time. The time of the knee strike is written into `strikes`.
+    Returns WALKED and the time of the heel strike, with the state before the strike in `method`; if the step fails,
+    returns its outcome and the time at which it ended. The time of a knee strike is written into `strikes`.
     """
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
     phase = BENT if model.shank != NO_SHANK else STRAIGHT
@@ -236,9 +236,9 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
 def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> float:
     """Apply the strike at the end of a phase, after a last Newton correction of its time; return that time (s).
 
-    Afterwards `method` holds the state before the strike, `new` the state after it, and `strikes` the waits of tangent
-    columns. A column Phi becomes J (Phi + f wait) at a heel strike, which keeps it on the section, and J (Phi + f wait)
-    - f+ wait at a knee strike (saltation). f, f+: rates before and after the strike; J: derivative of the jump.
+    Afterwards `method` holds the state before the strike, `new` the state after it, and `strikes` how much later each
+    tangent column strikes (its wait). A heel strike turns a column Phi into J (Phi + f wait), to stay on the section; a
+    knee strike turns it into J (Phi + f wait) - f+ wait. f, f+: rates before and after; J: derivative of the jump.
     """
     model, y, waits = system.model, method.y, strikes.waits
     n, knee = len(model.arm_x), is_bent(system)

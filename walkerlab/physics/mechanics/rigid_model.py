@@ -132,7 +132,7 @@ class Mode(NamedTuple):
 
 @block.case(Mode)
 def state_or_column(system: Mode) -> Any:
-    """Return zeros (2 n,), as long as the state and each variational column."""
+    """Return zeros (2 n,), the shape of the state and of each variational column."""
     return zeros(system.model.zero_state)
 
 

@@ -58,7 +58,7 @@ class Follower:
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Start from `first`; `solve` returns the solution (m,) near a prediction, smooth in `abscissa`, or None."""
+        """Start from `first`; `solve` returns a solution (m,), smooth in `abscissa(value)`, near a guess; or None."""
         self._solve, self._strides, self._abscissa, self._states = solve, strides, abscissa, [first]
 
     def to(self, target: float) -> FollowerState:

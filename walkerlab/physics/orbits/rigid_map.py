@@ -233,8 +233,8 @@ def solve_from_starts(section: StrikeSection, memory: Memory, gaits: KnownGaits,
 def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
     """Run Newton's method from z (d,), overwritten with the last point tried.
 
-    A move is halved until it reduces the residual. A start that reaches no heel strike, or stands still, is given up. A
-    known gait is recognised if it is close and one move with its derivative removes most of the distance.
+    A correction is halved until it reduces the residual. A start without a heel strike, or at rest, is given up.
+    The search stops if a known gait is close and one correction with its derivative would almost reach it.
     """
     method, y, places = memory.varied, memory.y, section.places
     (d, size), like = section.basis.shape, model.section

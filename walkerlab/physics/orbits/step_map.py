@@ -110,7 +110,7 @@ class StepMap(Stepper, Protocol):
         return z
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        """Sample the legs' angles (times, 2) from the vertical in the walk of `disturbed`, the first swing leg's first.
+        """Sample both legs' angles (times, 2) from the vertical in the walk of `disturbed`, first swing leg first.
 
         times_s  increasing times from the first heel strike on, all before the last heel strike
         """

@@ -43,7 +43,7 @@ MapAt = Callable[[float], StepMap | None]
 
 
 class Plane(NamedTuple):
-    """Second parameter of a family: step map at each of its values, its span, and its value in the family."""
+    """Second parameter of a family: function from its value to the step map, its span, and the family's own value."""
 
     map_at: MapAt
     span: ValueSpan

@@ -189,7 +189,7 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
 
 
 def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]:
-    """Describe each attractor by its period and either one of its states (SI) or the contact model's step."""
+    """Describe each attractor: its period, and a state (SI) or, for the contact model, the step's period and length."""
     if isinstance(question, ContactQuestion):
         own = question.starts.gait
         return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]

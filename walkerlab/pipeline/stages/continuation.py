@@ -305,7 +305,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
 
 
 def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:
-    """Describe branch ends where walks fail and crossings where they trip over pads, with the role of the ground."""
+    """Describe branch ends where walks fail, with causes in the ground, and crossings where gaits trip over pads."""
     for branch in family.branches:
         gait = f"the {family.model} model's gait of {branch.period} {steps_word(branch.period)}"
         for end in branch.ends:
@@ -403,7 +403,7 @@ def curve_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def region_rows(family: Family) -> Iterator[dict[str, Any]]:
-    """Yield a row for each period of attractors: the fraction of the plane of both parameters that it occupies."""
+    """Yield a row for each attractor period: the fraction of the parameter plane that it occupies."""
     if family.regions is not None:
         periods, counts = np.unique(family.regions.period, return_counts=True)
         for period, cells in zip(periods.tolist(), counts.tolist(), strict=True):

@@ -56,9 +56,9 @@ def read_measured(block: Identify, config: RigidConfig) -> Measured:
 
 
 def read_divisions(block: Identify, config: RigidConfig) -> Iterator[Measured]:
-    """Read the block's file, and yield the walk, then other divisions of its angles into steps.
+    """Read the file that the block names, and yield its walk in steps; angles may be divided in several ways.
 
-    Other divisions exist only if the slope or the sensors' offset is estimated, since heel strikes depend on both.
+    They are divided in more than one way only if slope or sensor offset is estimated: heel strikes depend on both.
     Raises ConfigError for a file without a walk.
     """
     path = Path(block.data)

@@ -35,7 +35,7 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Return tighter tolerances (or another method at the tightest ones) with a larger budget, and a description."""
+    """Return tighter tolerances, or another method if they cannot be tightened, with more budget; and a description."""
     tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor

@@ -235,7 +235,7 @@ def cap(model: str, config: RobustnessConfig) -> int:
 
 
 def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
-    """Count the steps of some walks; each has its own ground, which is the same in every process."""
+    """Count the steps of each walk on its own rough ground, which depends only on the seed and the walk's number."""
     gait = subject.at(exact=False)
     return [float(steps_on_rough_ground(gait, roughness, (seed, walk), most)) for walk in walks]
 

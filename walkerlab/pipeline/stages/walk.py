@@ -1,4 +1,4 @@
-"""Common parts of stages that walk: the start, stored groups, the summary and the numerical error.
+"""Parts shared by the stages that compute walks: start, stored groups, summary and numerical error.
 
 Both models store a walk under the same names, in the same shapes, with the same meanings; quantities that a model
 lacks are absent. Long walks are thinned: all samples of the first and last steps are stored, fewer of the others.

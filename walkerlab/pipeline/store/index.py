@@ -23,7 +23,7 @@ def index(folder: Path, files: Iterable[Path]) -> Group:
     return Group(
         {
             "file": Variable(np.array(names, dtype=object), ("file",), "", "path in the run folder"),
-            # drawings of run times differ from run to run, so the content's digest leaves these digests out
+            # figures that plot run times differ between runs, so the content's digest excludes the digests of files
             "sha256": Variable(np.array(digests, dtype=object), ("file",), "", "sha256 of the file", timing=True),
         }
     )

@@ -223,7 +223,7 @@ def close_of(results: Results) -> tuple[float, float] | None:
 
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:
-    """Return axis limits that fit the stable gaits in the range shown and, over the full range, all one-step gaits."""
+    """Return axis limits that fit the stable gaits shown and, if the full range is shown, all one-step gaits."""
     shown: list[NDArray[Any]] = [cloud[name].ravel() for _, cloud in clouds(results)]
     for branch in branches_of(results):
         curve = curve_of(branch.group, name)

@@ -152,7 +152,7 @@ def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
 
 
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
-    """Draw the stability bound, mark the parameter values `missing` of points without an answer, and set the scales."""
+    """Draw the stability bound, mark points without an answer (at parameter values `missing`), and set the scales."""
     if name == RADIUS:
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:

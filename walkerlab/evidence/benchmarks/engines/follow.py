@@ -245,6 +245,6 @@ def foot_within_step(old: FootMotion, new: FootMotion, share: float, h: float) -
 
 
 def cubic(x0: float, v0: float, x1: float, v1: float, h: float, s: float) -> float:
-    """Return the value, at the fraction s of a step, of the cubic through values and rates at its ends."""
+    """Evaluate a cubic at the fraction s of a step from its values and rates at both ends of the step."""
     r = 1.0 - s
     return r * r * ((1.0 + 2.0 * s) * x0 + s * h * v0) + s * s * ((3.0 - 2.0 * s) * x1 - r * h * v1)

@@ -14,7 +14,7 @@ MAX_DERIVATIVES = 12
 BUILDER_KEYS = ("walker.", "push_off.")
 """Prefixes of the keys that a builder can change."""
 NORM = "gait_sensitivity_norm_scaled"
-"""Quantity that ranks the parameters; dimensionless, since leg length would change a norm in s/m by its unit alone."""
+"""Quantity that ranks the parameters; dimensionless, since a norm in s/m depends on the walker's size."""
 MODEL_COLUMN = Column("model", "model")
 NORM_COLUMNS = (
     MODEL_COLUMN,
