@@ -47,12 +47,12 @@ def test_stiff_ground_is_walked_by_a_multistep_method():
     result = judge(CASES["stiction-1e-4"], config_of(CASES["stiction-1e-4"]))
     assert result.ok
     assert (result.second_method, result.second_tried) == ("scipy-bdf", "dop853 budget-exhausted")
-    assert any("from scipy-bdf" in finding.measure for finding in result.findings)
+    assert any("from the walk with scipy-bdf" in finding.measure for finding in result.findings)
 
 
 def test_a_rigid_walk_too():
     result = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"]))
-    (finding,) = [finding for finding in result.findings if "from radau5" in finding.measure]
+    (finding,) = [finding for finding in result.findings if "from the walk with radau5" in finding.measure]
     assert 0.0 < finding.value < finding.limit < 1e-6
 
 
