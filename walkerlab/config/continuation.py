@@ -60,5 +60,5 @@ class Continuation(Span):
 
     model: FollowedModel = key("rigid", "", "model whose gaits are followed: rigid, contact, or both on the same axes")
     periods: int = key(16, "1", "period-doubling cascades are followed up to gaits of this many steps", ge=1, le=64)
-    points: int = key(400, "1", "maximum points of one branch", ge=2, le=100_000)
+    points: int = key(400, "1", "maximum number of points on one branch", ge=2, le=100_000)
     second: Span | None = key(None, "", "second parameter, for fold and flip curves in the plane of both")

@@ -284,7 +284,7 @@ class PartFoot(Block):
 
     body: str = name_key("the body it belongs to")
     centre_m: Point = point("the arc's centre in the body's frame")
-    radius_m: float = key(0.0, "m", "radius of the arc, 0 is a point", ge=0.0, le=MAX_LENGTH_M)
+    radius_m: float = key(0.0, "m", "radius of the arc, 0 for a point", ge=0.0, le=MAX_LENGTH_M)
 
 
 class PartCoupling(Block):

@@ -78,8 +78,8 @@ def test_both_fates_of_the_papers_adams_start_are_told_with_model_and_ground():
     rigid, contact = start["reason"].split("the contact model on ")
     assert "in the rigid model, whose stance foot is hinged to an even slope" in rigid
     assert "with its foot held down the walk ends (fell) at 0.347 s" in rigid
-    assert contact.startswith("its checkerboard of pads cannot pull")
-    assert f"ends there at {start['end_time_s']:.3g} s" in contact
+    assert contact.startswith("its checkerboard of pads, the ground, which cannot pull, carries no more than")
+    assert f"and the walk ends at {start['end_time_s']:.3g} s" in contact
     assert "off-pad: a foot meets a pad from the side, where the rigid model has no pads" in contact
     # pads are what ends it: without them it flies on
     assert small("paper", "contact.terrain=after-mid-swing").summary["paper_start"]["outcome"] != "off-pad"

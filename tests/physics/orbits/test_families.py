@@ -398,7 +398,7 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
 
     follower = BranchFollower(map_of(walker_at, 10.0), ValueSpan(8.0, 18.0))
     branch = follower.family(seeds_at(walker_at, 10.0), 1)[0]
-    assert branch.ends[1].reason == NO_WALKER == "the parameter's next value makes no walker"
+    assert branch.ends[1].reason == NO_WALKER == "the parameter's next value gives no valid walker"
     assert 12.5 < branch.ends[1].value < 13.0
 
 

@@ -345,6 +345,11 @@ class ContactMap(StepMap):
     def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units)
 
+    def _valid_site(self, p: float) -> WalkerOnGround:
+        site = self._at(p)
+        assert site is not None, "p must give a valid walker"
+        return site
+
     def _terrain(self, site: WalkerOnGround) -> Terrain:
         own = site.ground.terrain
         return after_mid_swing(self._measure) if own.has_pads else own
@@ -365,8 +370,7 @@ class ContactMap(StepMap):
         return replace(step, z=step.z / self._units, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        site = self._at(p)
-        assert site is not None, "p must make a walker"
+        site = self._valid_site(p)
         slip, tripped, start = 0.0, 0.0, z
         for _ in range(steps):
             step = self._walk(site, start, False)
@@ -378,8 +382,7 @@ class ContactMap(StepMap):
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
-        site = self._at(p)
-        assert site is not None, "p must make a walker"
+        site = self._valid_site(p)
         ground = site.ground._replace(terrain=self._terrain(site))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
@@ -390,8 +393,7 @@ class ContactMap(StepMap):
         return z if site is None else stand(site.walker, z * self._units, STANCE_FOOT) / self._units
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        site, touch = self._at(p), self.step(z, p, derived=False)
-        assert site is not None, "p must make a walker"
+        site, touch = self._valid_site(p), self.step(z, p, derived=False)
         ground = site.ground._replace(terrain=self._terrain(site))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
@@ -402,8 +404,7 @@ class ContactMap(StepMap):
         return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        site = self._at(p)
-        assert site is not None, "p must make a walker"
+        site = self._valid_site(p)
         return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
     def at(self, tolerances: Tolerances) -> ContactMap:

@@ -34,7 +34,7 @@ MAX_MULTIPLIER_CHANGE = 0.6  # change of a multiplier near the unit circle from 
 CRITICAL_RANGE = 1.6  # multipliers are near the unit circle if their magnitude or its inverse is below this
 SEED_EVALUATIONS = 20  # evaluations in Newton's method from a seed
 CLOSED_LOOP = "returns to its first point"
-NO_WALKER = "the parameter's next value makes no walker"
+NO_WALKER = "the parameter's next value gives no valid walker"
 END_OF_SPAN = "end of the span"
 EDGE_TOLERANCE = 1e-12  # relative to the size of the span
 # maximum number of points per branch; growth of a disturbance over a cycle beyond which gaits cannot be resolved

@@ -319,6 +319,11 @@ class RigidMap(StepMap):
     def _quick(self) -> RigidStepper:
         return RigidStepper(self._like, LONG_WALKS)
 
+    def _valid_unit(self, p: float) -> SimilarWalker:
+        unit = self._unit_at(p)
+        assert unit is not None, "p must give a valid walker"
+        return unit
+
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         unit = self._unit_at(p)
         if unit is None:
@@ -333,8 +338,7 @@ class RigidMap(StepMap):
         return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        unit = self._unit_at(p)
-        assert unit is not None, "p must make a walker"
+        unit = self._valid_unit(p)
         walker, units = unit.walker, unit.units
         walk = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
         extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
@@ -342,8 +346,7 @@ class RigidMap(StepMap):
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
-        unit = self._unit_at(p)
-        assert unit is not None, "p must make a walker"
+        unit = self._valid_unit(p)
         walker, units, start = unit.walker, unit.units, np.array(state_on_section(unit.walker, z))
         start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
         walk = self._walk_over(unit, z, heights_m, start)
@@ -360,8 +363,7 @@ class RigidMap(StepMap):
         return self._exact.walk(unit.section, z, floor[0].size - 1, False, floor, start, observer)
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        unit = self._unit_at(p)
-        assert unit is not None, "p must make a walker"
+        unit = self._valid_unit(p)
         start = np.array(state_on_section(unit.walker, z))
         observer = new_observer(times_s / unit.units.time, start.size)
         self._walk_over(unit, z, heights_m, start, observer)
@@ -411,8 +413,7 @@ class RigidMap(StepMap):
     def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
         # Negative values mean that the ground would have to pull.
-        unit = self._unit_at(p)
-        assert unit is not None, "p must make a walker"
+        unit = self._valid_unit(p)
         walker, units, start = unit.walker, unit.units, state_on_section(unit.walker, z)
         pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
         impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
@@ -420,8 +421,7 @@ class RigidMap(StepMap):
         return impulse * units.impulse, walk.min_normal_force * units.force
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        unit = self._unit_at(p)
-        assert unit is not None, "p must make a walker"
+        unit = self._valid_unit(p)
         return unit.units.length, unit.units.time
 
     def at(self, tolerances: Tolerances) -> RigidMap:

@@ -242,7 +242,7 @@ def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
 def identified_config(config: IdentifyConfig, result: Identification) -> IdentifyConfig:
     parameters = [parameter_of(estimate.key, config) for estimate in result.estimates]
     changed = config_with(config, parameters, [estimate.value for estimate in result.estimates])
-    assert changed is not None, "estimates make a walker"
+    assert changed is not None, "estimates give a valid walker"
     return changed
 
 

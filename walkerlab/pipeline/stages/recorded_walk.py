@@ -71,7 +71,7 @@ def read_artifact(path: Path) -> Recording:
         ) from None
     group = groups.get("trajectory")
     if group is None or "angle" not in group.variables:
-        raise ConfigError(f"{path} holds no walk over time.", "Run it with outputs: [states, energies, forces].")
+        raise ConfigError(f"{path} contains no walk over time.", "Run it with outputs: [states, energies, forces].")
     columns, units = {TIME: np.asarray(group["time"], float)}, {TIME: "s"}
     for name, variable in group.variables.items():
         if variable.dims[:1] != ("time",) or name not in (*OF_LEG, *OF_WALKER) or name == TIME:

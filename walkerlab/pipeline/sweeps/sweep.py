@@ -190,7 +190,7 @@ class SweepRun:
         started = time.perf_counter()
         reporter = reporter or Silent()
         for key in self.unread():
-            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it coincide")
+            reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it are equal")
         make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
             claim(self.folder, self.loaded.config)
