@@ -243,7 +243,7 @@ def test_the_verdict_of_a_run_is_three_paragraphs():
     numbers = {"verdicts": {}, "paper_numbers": rows}
     cases = {"passed": 5, "failed": 0, "cases": [], "known": []}
     judged = "5 of 5 extreme cases and problems with known answers ended as expected."
-    of_the_paper = "Of 4 values that the paper prints 1 is an input, 3 are reproduced,"
+    of_the_paper = "Of 4 values that the paper prints, 1 is an input, 3 are reproduced,"
     begun = ("On a slope of 0.0174", "The rigid model walks all 20000 steps.", of_the_paper)
     said = verdict({"fixedpoint": GAIT, "simulate": WALK, "compare": numbers, "stability": cases})
     assert [head for line in said for head in begun if line.startswith(head)] == [*begun]

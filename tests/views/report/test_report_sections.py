@@ -118,7 +118,7 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
         return plain(sections(**changed)["verdict"].blocks[0].text)
 
     assert opening() == (
-        f"Both models walk all 4 steps, and the gait is stable; of the 4 values that the paper prints {SHARES}. "
+        f"Both models walk all 4 steps, and the gait is stable; of the 4 values that the paper prints, {SHARES}. "
         "Eq. A.5 has a sign error; use the corrected equations."
     )
     slower = {"step_periods_s": [0.7, 0.7, 0.7, 0.707]}
@@ -231,7 +231,7 @@ def test_every_end_of_a_walk_is_told_with_its_numbers(outcome, changed, said):
 def test_the_papers_numbers_are_counted_by_verdict():
     printed = sections()["printed"]
     (shares,) = blocks(printed, Shares)
-    assert printed.finding == f"Of 4 values that the paper prints {SHARES}."
+    assert printed.finding == f"Of 4 values that the paper prints, {SHARES}."
     assert shares.parts == (("reproduced", 1, "good"), ("explained", 1, "fair"), ("contradicted", 2, "bad"))
     assert sum(count for _, count, _ in shares.parts) == len(PAPER_ROWS)
 
