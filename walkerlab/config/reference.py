@@ -50,9 +50,7 @@ def keys() -> Iterator[KeyReference]:
 
 
 def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
-    default = annotation_of(field, "default_in_words") or _spelled(
-        field.get_default(call_default_factory=True, validated_data={})
-    )
+    default = field.get_default(call_default_factory=True, validated_data={})
     return KeyReference(
         key=".".join(path),
         type=type_words(field.annotation),
