@@ -8,7 +8,7 @@ from walkerlab.views.cli.stored import state_of
 
 
 def actions(report):
-    return {done.stage: done.action for done in report.steps}
+    return {done.stage.name: done.action for done in report.steps}
 
 
 def states(toy, *sets):

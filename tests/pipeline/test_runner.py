@@ -17,11 +17,11 @@ STEEP = "slope_rad=1.2"
 
 
 def actions(report):
-    return {done.stage: done.action for done in report.steps}
+    return {done.stage.name: done.action for done in report.steps}
 
 
 def reasons(report):
-    return {done.stage: done.reason for done in report.steps}
+    return {done.stage.name: done.reason for done in report.steps}
 
 
 def test_a_stage_runs_what_it_needs_first_and_stores_it(toy):

@@ -4,13 +4,12 @@ import importlib
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.physics.kernel_cache import watch_compilation
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, without_block
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
@@ -18,19 +17,9 @@ from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.task import Precompiler, StageTask, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.pipeline.task import Precompiler, Task, nothing_compiled_yet, run_in_worker, task_of
 from walkerlab.pipeline.workers import WorkerPool
 from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
-
-
-@dataclass(frozen=True)
-class StageDone:
-    """Outcome of a stage: the action taken (as in `Step`), its reason and the run time (s)."""
-
-    stage: str
-    action: str
-    reason: str
-    wall_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +27,7 @@ class Begun:
     """A running stage."""
 
     step: Step
-    task: StageTask
+    task: Task
     reporter: StageReporter
     started: float
 
@@ -52,7 +41,7 @@ class Executor:
     again     whether to repeat walks at tighter tolerances to measure their numerical error
     answers   results so far, by stage
     left_out  reasons why stages are left out, by stage
-    done      outcomes so far
+    done      steps that have ended so far
     """
 
     def __init__(
@@ -71,7 +60,7 @@ class Executor:
         self.force, self.jobs, self.again, self.reporter = force, jobs, again, reporter or Silent()
         self.answers: dict[str, Content] = {}
         self.left_out: dict[str, str] = {}
-        self.done: list[StageDone] = []
+        self.done: list[Step] = []
         self._keys: dict[str, str] = {}
         self._waiting: list[Stage] = []
         self._running: dict[Future[Any] | None, Begun] = {}
@@ -102,16 +91,15 @@ class Executor:
                     while self._working and not self._events.get()():
                         pass
                     self._draw_early()
-                precompiler.raise_bugs({done.stage for done in self.done if done.action == "run"})
+                precompiler.raise_bugs({done.stage.name for done in self.done if done.action == "run"})
         finally:
             for running_stage in self._running.values():
                 running_stage.reporter.end("")
 
     def skip(self, step: Step) -> None:
         """Record a stage that does not run."""
-        done = StageDone(step.stage.name, step.action, step.reason)
-        self.done.append(done)
-        self.reporter.note(outcome_line(done))
+        self.done.append(step)
+        self.reporter.note(outcome_line(step))
 
     def inputs(self, stage: Stage) -> dict[str, Content]:
         """Return the available results that a stage uses, required or optional, by stage."""
@@ -182,25 +170,25 @@ class Executor:
     def _start_ready_stages(self, pool: WorkerPool | None, precompiler: Precompiler) -> None:
         """Start all ready stages in `pool`, or run the next one in this process if `pool` is None."""
         for stage in list(self._waiting):
-            timing = any(running_stage.step.stage.work == "times" for running_stage in self._running.values())
+            timing = any(begun.step.stage.work == "times" for begun in self._running.values())
             if timing or len(self._working) == self.jobs:
                 return
-            if not self._is_ready(stage):
+            if not self._unsettled().isdisjoint(stage.results(self.config)):  # it is not ready
                 if stage.name in self._left and (compiling := precompiler.begin(stage, only_first=True)) is not None:
                     self._watch(compiling)
                 continue
             step = self._decide(stage)
+            if step.action == "run" and stage.work == "times" and self._running:
+                continue
+            self._waiting.remove(stage)
             if step.action != "run":
-                self._waiting.remove(stage)
                 self.results.take_over(step)
                 self._expect(step)
                 self.skip(step)
             elif pool is None:
-                self._waiting.remove(stage)
                 self._run_here(step, precompiler)
                 return
-            elif not (stage.work == "times" and self._running):
-                self._waiting.remove(stage)
+            else:
                 running_stage = self._begin(step)
                 future = pool.start(
                     partial(run_in_worker, running_stage.task), partial(self._hear, running_stage.reporter)
@@ -216,9 +204,7 @@ class Executor:
             precompiler.begin(slow[0], only_first=False)
         precompiler.wait_for(step.stage)
         running_stage = self._running[None] = self._begin(step)
-        with watch_compilation(running_stage.reporter.compiling):
-            answer = running_stage.task.run(running_stage.reporter)
-        self._finish(None, answer)
+        self._finish(None, running_stage.task(running_stage.reporter))
 
     def _watch(self, future: Future[Any]) -> None:
         """Track a future; when it completes, an event is put in the queue."""
@@ -237,13 +223,8 @@ class Executor:
             self._finish(future, future.result())
         return True
 
-    def _is_ready(self, stage: Stage) -> bool:
-        return self._unsettled().isdisjoint(stage.results(self.config))
-
     def _unsettled(self) -> set[str]:
-        return {stage.name for stage in self._waiting} | {
-            running_stage.task.name for running_stage in self._running.values()
-        }
+        return {stage.name for stage in (*self._waiting, *(begun.step.stage for begun in self._running.values()))}
 
     def _begin(self, step: Step) -> Begun:
         if step.damaged is not None:
@@ -263,13 +244,13 @@ class Executor:
     def _finish(self, future: Future[Any] | None, answer: Content) -> None:
         """Store a stage's result (partial if the stage found no answer) and report that the stage has ended."""
         running_stage = self._running[future]
-        step, name = running_stage.step, running_stage.task.name
+        step, name = running_stage.step, running_stage.step.stage.name
         awaited = any(name in stage.results(self.config) for stage in self._waiting)
         stored = self.results.keep(step, answer, awaited)
         del self._running[future]
         self._settle(step, stored)
         reason = step.reason if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
-        done = StageDone(name, "run", reason, time.perf_counter() - running_stage.started)
+        done = replace(step, reason=reason, wall_s=time.perf_counter() - running_stage.started)
         self.done.append(done)
         self._left = [stage_left for stage_left in self._left if stage_left != name]
         answered = [] if stored.complete else ["no answer"]
@@ -290,13 +271,9 @@ class Executor:
             if not stage.early_with or not computing or not inputs or unsettled & set(stage.early_with):
                 continue
             absent = [entry for entry in self.missing_inputs(stage) if entry.what not in pending]
-            absent += [
-                LeftOut(stage_pending.name, STILL_COMPUTED)
-                for stage_pending in self.stages
-                if stage_pending.name in pending
-            ]
+            absent += [LeftOut(other.name, STILL_COMPUTED) for other in self.stages if other.name in pending]
             task = task_of(stage, self.config, inputs, folder=folder, left_out=tuple(absent))
-            self.reporter.announce_page(task.run(Silent()).summary, folder)
+            self.reporter.announce_page(task(Silent()).summary, folder)
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
@@ -305,12 +282,7 @@ def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[
 
 
 def answer_in_memory(
-    config: Config,
-    target: str,
-    memory: MemoryResults,
-    *,
-    again: bool = True,
-    reporter: Reporter | None = None,
+    config: Config, target: str, memory: MemoryResults, *, again: bool = True, reporter: Reporter | None = None
 ) -> Content:
     """Compute a stage's result without files, reusing inputs from memory.
 
@@ -346,12 +318,8 @@ def short_reason(why: str) -> str:
     return why.partition(": ")[0] if why.startswith(("it needs ", "no answer: ")) else why.partition(": no answer: ")[0]
 
 
-def outcome_line(done: StageDone) -> str:
-    why = short_reason(done.reason)
-    match done.action:
-        case "run":
-            return f"{done.stage}: ran in {done.wall_s:.2f} s"
-        case "reuse":
-            return f"{done.stage}: reused ({why})"
-        case _:
-            return f"{done.stage}: left out ({why})"
+def outcome_line(done: Step) -> str:
+    if done.action == "run":
+        return f"{done.stage.name}: ran in {done.wall_s:.2f} s"
+    action = "reused" if done.action == "reuse" else "left out"
+    return f"{done.stage.name}: {action} ({short_reason(done.reason)})"

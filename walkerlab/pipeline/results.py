@@ -1,5 +1,8 @@
 """Stores of results: a run's folder, or the memory of this process."""
 
+import mmap
+import os
+import shutil
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +16,7 @@ from walkerlab.pipeline.store import artifact, provenance
 from walkerlab.pipeline.store.artifact import Stored, Verdict
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.elsewhere import find_elsewhere, take_over
+from walkerlab.pipeline.store.files import replacing
 from walkerlab.pipeline.store.index import broken_file
 from walkerlab.pipeline.store.key import Identity, changed_parts
 from walkerlab.pipeline.store.provenance import Provenance
@@ -28,7 +31,7 @@ REMEMBERED = 256
 
 @dataclass(frozen=True)
 class Step:
-    """Planned action for one stage."""
+    """Action for one stage, planned or taken."""
 
     stage: Stage
     action: Action
@@ -37,6 +40,7 @@ class Step:
     found: Content | None = None  # the intact stored result: the one to reuse, or an outdated one
     damaged: Path | None = None  # file of the stored result, if it is damaged
     origin: Path | None = None  # file of the result to reuse, if it is in another run's folder
+    wall_s: float = 0.0  # run time; 0 if the stage has not run
 
 
 class FolderResults:
@@ -70,12 +74,19 @@ class FolderResults:
         return Step(stage, "run", why, identity, stored, damaged)
 
     def take_over(self, step: Step) -> None:
-        """Take a result over from another run's folder, if the step reuses one."""
+        """Link or copy the file of a result in another run's folder, if the step reuses one.
+
+        Sharing is safe, since artifacts are replaced but never modified. Raises StorageError if neither works.
+        """
         if step.origin is not None:
-            take_over(step.origin, self.run.artifact(step.stage.name))
+            with replacing(self.run.artifact(step.stage.name)) as temporary:
+                try:
+                    os.link(step.origin, temporary)
+                except OSError:
+                    shutil.copyfile(step.origin, temporary)
 
     def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:
-        """Prepare to store a result; return the optional arguments of the stage, see `StageTask`.
+        """Prepare to store a result; return the optional arguments of the stage, see `call_stage`.
 
         With `force`, the checkpoint of an interrupted run is dropped.
         """
@@ -119,6 +130,29 @@ def input_digest(stage: Stage, result: Content) -> str:
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 
+def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
+    """Find the file and result for a key in another run folder; None if no folder has it. Damaged files are ignored."""
+    try:
+        names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
+    except OSError:
+        return None
+    for path in (RunFolder(folder.runs_dir, name).artifact(stage) for name in names if name != folder.name):
+        if mentions(path, key):
+            verdict = artifact.check(path, key)
+            if verdict.accepted and verdict.artifact is not None:
+                return path, verdict.artifact
+    return None
+
+
+def mentions(path: Path, key: str) -> bool:
+    """Whether a file contains a key; a cheap test before the file is read and verified."""
+    try:
+        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            return data.find(key.encode()) >= 0
+    except (OSError, ValueError):  # the file is missing, not a regular file, or empty
+        return False
+
+
 class LoadedCodeKeys(Keys):
     """Builds identities for this process only; its code does not change, so they need no code digest."""
 
@@ -131,8 +165,8 @@ class MemoryResults:
 
     folder = None
 
-    def __init__(self, graph: Graph = PIPELINE, size: int = REMEMBERED) -> None:
-        self.keys, self.size = LoadedCodeKeys(graph), size
+    def __init__(self, graph: Graph = PIPELINE) -> None:
+        self.keys = LoadedCodeKeys(graph)
         self._kept: OrderedDict[str, Content] = OrderedDict()
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:  # noqa: ARG002
@@ -153,7 +187,7 @@ class MemoryResults:
         """Keep a result if another stage waits for it."""
         if awaited and step.identity is not None:
             self._kept[step.identity.key] = answer
-            if len(self._kept) > self.size:
+            if len(self._kept) > REMEMBERED:
                 self._kept.popitem(last=False)
         return answer
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.executor import Executor, StageDone, omission_of
+from walkerlab.pipeline.executor import Executor, omission_of
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.results import FolderResults, Step
@@ -28,7 +28,7 @@ class StageReport:
     wall_s: float  # total time, inputs included
     left_out: tuple[LeftOut, ...]  # results that were not computed, with the reasons
     summary: dict[str, Any]  # summary of the result; empty if there is no result
-    steps: tuple[StageDone, ...]  # outcome of each stage
+    steps: tuple[Step, ...]  # action taken for each stage
     # error of the stage if it has no answer, otherwise of the first stage without one; None if all have answers
     no_answer: NoAnswer | None = None
     # summaries of all stages with a complete result, by stage
@@ -46,7 +46,11 @@ class StageReport:
         }
         own = {key: value for key, value in self.summary.items() if key not in (*common, "no_answer")}
         error = {} if self.no_answer is None else {"error": self.no_answer.as_json()}
-        return common | own | {"stages": [asdict(done) for done in self.steps]} | error
+        stages = [
+            {"stage": step.stage.name, "action": step.action, "reason": step.reason, "wall_s": step.wall_s}
+            for step in self.steps
+        ]
+        return common | own | {"stages": stages} | error
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) ->
         stage=target.name,
         run_dir=folder.path,
         artifact=folder.artifact(target.name) if result is not None else None,
-        reused=any(done.stage == target.name and done.action == "reuse" for done in run.done),
+        reused=any(done.stage.name == target.name and done.action == "reuse" for done in run.done),
         wall_s=wall_s,
         left_out=all_left_out(run, target, summary.pop("left_out", [])),
         summary=summary,
@@ -142,11 +146,11 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
     """
     missing = run.missing_inputs(target) if target.draws else ()
     absent = [entry for entry in missing if not run.graph[entry.what].only_by]
-    absent += [omission_of(done.stage, done.reason) for done in run.done if done.action == "leave out"]
+    absent += [omission_of(done.stage.name, done.reason) for done in run.done if done.action == "leave out"]
     entries = [*by_stage]
     for done in run.done:
         if done.action != "leave out":
-            entries += run.graph[done.stage].does_without(run.config)
+            entries += done.stage.does_without(run.config)
     absent += [LeftOut(**entry) for entry in entries]
     return tuple(dict.fromkeys(absent))
 
@@ -158,7 +162,7 @@ def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | No
     """
     if message is not None:
         return NoAnswer(message["message"], message["advice"])
-    for name, answer in ((done.stage, run.answers.get(done.stage)) for done in run.done):
+    for name, answer in ((done.stage.name, run.answers.get(done.stage.name)) for done in run.done):
         reason = None if answer is None else answer.summary.get("no_answer")
         if reason is not None:
             return NoAnswer(f"{name}: {reason['message']}", reason["advice"])

@@ -5,7 +5,7 @@ import importlib
 import sys
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -15,49 +15,49 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer, WalkerlabError
 from walkerlab.physics import kernel_cache
 from walkerlab.pipeline.graph import Stage
-from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.progress import StageReporter
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import drawing_into
 from walkerlab.pipeline.workers import WorkerPool, tell
 
-
-@dataclass(frozen=True)
-class StageTask:
-    """A stage with its arguments."""
-
-    name: str
-    module: str
-    config: Any  # the config slice that it takes
-    inputs: Mapping[str, Content]  # results of other stages, by name
-    # optional arguments of its `run`, by name:
-    #   jobs        maximum number of processes for independent work units
-    #   checkpoint  work units that an interrupted run has computed
-    #   again       whether to repeat walks to measure their numerical error
-    #   folder      run folder that the stage draws into
-    #   left_out    results that are missing in a drawing, with the reasons
-    offered: Mapping[str, Any]
-
-    def run(self, progress: Progress) -> Content:
-        """Call the stage's `run` with the arguments that it declares."""
-        # imported only now, because a stage loads libraries and compiled code
-        run = importlib.import_module(self.module).run
-        arguments = {name: self.offered[name] for name in self.offered.keys() & signature(run).parameters.keys()}
-        folder = arguments.get("folder")
-        try:
-            with contextlib.nullcontext() if folder is None else drawing_into(folder):
-                content = run(self.config, self.inputs, progress, **arguments)
-        except NoAnswer as error:
-            partial = error.partial if isinstance(error.partial, Content) else Content()
-            why = {"no_answer": {"message": error.message, "advice": error.advice}}
-            return replace(partial, summary={**partial.summary, **why}, complete=False)
-        if not isinstance(content, Content):
-            raise TypeError(f"{self.module}.run returned {type(content).__name__}, not Content")
-        return content
+Task = Callable[[StageReporter], Content]
+"""A stage with its arguments; called with a reporter, it runs the stage."""
 
 
-def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> StageTask:
-    """Build the task of a stage under a config; `offered` as in `StageTask`."""
-    return StageTask(stage.name, stage.module, only(config, stage.takes_under(config)), inputs, offered)
+def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> Task:
+    """Build the task of a stage under a config, for this or another process; arguments as in `call_stage`."""
+    return partial(call_stage, stage.module, only(config, stage.takes_under(config)), inputs, offered)
+
+
+def call_stage(
+    module: str, config: Any, inputs: Mapping[str, Content], offered: Mapping[str, Any], reporter: StageReporter
+) -> Content:
+    """Call the `run` of a stage's module with the optional arguments that it declares.
+
+    config   the config slice that it takes
+    inputs   results of other stages, by name
+    offered  optional arguments, by name:
+               jobs        maximum number of processes for independent work units
+               checkpoint  work units that an interrupted run has computed
+               again       whether to repeat walks to measure their numerical error
+               folder      run folder that the stage draws into
+               left_out    results that are missing in a drawing, with the reasons
+    """
+    # imported only now, because a stage loads libraries and compiled code
+    run = importlib.import_module(module).run
+    arguments = {name: offered[name] for name in offered.keys() & signature(run).parameters.keys()}
+    folder = arguments.get("folder")
+    drawing = contextlib.nullcontext() if folder is None else drawing_into(folder)
+    try:
+        with kernel_cache.watch_compilation(reporter.compiling), drawing:
+            content = run(config, inputs, reporter, **arguments)
+    except NoAnswer as error:
+        partial_content = error.partial if isinstance(error.partial, Content) else Content()
+        why = {"no_answer": {"message": error.message, "advice": error.advice}}
+        return replace(partial_content, summary={**partial_content.summary, **why}, complete=False)
+    if not isinstance(content, Content):
+        raise TypeError(f"{module}.run returned {type(content).__name__}, not Content")
+    return content
 
 
 class PipeReporter:
@@ -68,12 +68,10 @@ class PipeReporter:
         return lambda *arguments: tell((call, *arguments))
 
 
-def run_in_worker(task: StageTask) -> Content:
+def run_in_worker(task: Task) -> Content:
     """Run a stage in a worker and send its progress to the parent."""
     reporter: Any = PipeReporter()
-    importlib.import_module(task.module)
-    with kernel_cache.watch_compilation(reporter.compiling):
-        return task.run(reporter)
+    return task(reporter)
 
 
 def nothing_compiled_yet() -> bool:
@@ -107,8 +105,8 @@ class Precompiler:
         """
         if not stage.precompile or stage.name in self._begun:
             return None
-        work = partial(compile_kernels, stage.module, stage.precompile, self._config, only_first)
-        future = self._begun[stage.name] = self._pool.start(work)
+        future = self._pool.submit(compile_kernels, stage.module, stage.precompile, self._config, only_first)
+        self._begun[stage.name] = future
         return future
 
     def wait_for(self, stage: Stage) -> None:

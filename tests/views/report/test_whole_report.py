@@ -57,7 +57,7 @@ def results(run):
 def test_every_stage_ran_and_the_page_is_there(run):
     _, folder, report = run
     assert report.no_answer is None
-    assert {done.stage for done in report.steps if done.action == "run"} == {
+    assert {done.stage.name for done in report.steps if done.action == "run"} == {
         stage.name for stage in PIPELINE.needed_for("report", load().config)
     }
     page = Page((folder.path / report.summary["html"]).read_text(encoding="utf-8"))

@@ -120,7 +120,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
 
 def plan_lines(report: StageReport) -> list[str]:
     """Describe what would be computed."""
-    rows = [[done.stage, done.action, done.reason] for done in report.steps]
+    rows = [[done.stage.name, done.action, done.reason] for done in report.steps]
     return [f"in {report.run_dir}:", *aligned(rows), *describe_omissions(report)]
 
 
