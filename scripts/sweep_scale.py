@@ -24,7 +24,7 @@ from walkerlab.pipeline.graph import Graph, Stage
 from walkerlab.pipeline.store.content import Content
 
 HERE = Path(__file__)
-GRAPH = Graph(Stage("echo", HERE.stem, "Say what a fixed point says.", RigidConfig))
+GRAPH = Graph(Stage("echo", HERE.stem, "Say what a fixed point says.", RigidConfig), at=f"{HERE.stem}:GRAPH")
 
 
 def run(config: Any, _inputs: Any, _progress: Any) -> Content:
@@ -79,7 +79,7 @@ def measure(points: int) -> None:
     real_summary()
     before, started, used = peak_mb(), time.perf_counter(), time.process_time()
     question = build_sweep("echo", [axis_of_text(f"slope_deg=0.5:5:{points}")])
-    swept = SweepRun(question, load(), RunFolder(runs, "scale"), GRAPH).run(SweepWork(graph=f"{HERE.stem}:GRAPH"))
+    swept = SweepRun(question, load(), RunFolder(runs, "scale"), GRAPH).run(SweepWork())
     wall, used = time.perf_counter() - started, time.process_time() - used
     size, chunks = swept.path.stat().st_size, list(swept.path.parent.glob("sweep-chunks/*.h5"))
     print(

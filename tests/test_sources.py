@@ -10,7 +10,7 @@ import pytest
 
 import walkerlab
 from walkerlab.code_digest import Sources
-from walkerlab.pipeline.graph import STAGES
+from walkerlab.pipeline.graph import PIPELINE
 
 NUMBER = itertools.count()
 NO_CACHES = shutil.ignore_patterns("__pycache__")
@@ -109,7 +109,9 @@ def test_a_module_that_does_not_exist_is_an_error(package):
 
 
 ROOT = Path(walkerlab.__file__).parent.parent
-WRITTEN = [stage.module for stage in STAGES if (ROOT / stage.module.replace(".", "/")).with_suffix(".py").exists()]
+WRITTEN = [
+    stage.module for stage in PIPELINE.stages if (ROOT / stage.module.replace(".", "/")).with_suffix(".py").exists()
+]
 STARTS = ["walkerlab.pipeline.runner", "walkerlab.views.cli.stored", "walkerlab.physics.kernels", *WRITTEN]
 LIBRARIES = ["h5py", "jinja2", "matplotlib.figure", "numba", "pydantic", "ruamel.yaml", "scipy.integrate", "typer"]
 IMPORTED = """

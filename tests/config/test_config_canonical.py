@@ -21,7 +21,7 @@ from walkerlab.config.reads import ContactConfig, SceneConfig, SimulateConfig, S
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.schema import Config, Contact
 from walkerlab.config.stability import Case
-from walkerlab.pipeline.graph import STAGES, Stage
+from walkerlab.pipeline.graph import PIPELINE, Stage
 
 CONFIG = Config(contact=Contact())
 
@@ -68,10 +68,10 @@ def blocks_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     reads.keys_of.cache_clear()
 
 
-KEYS = {stage.name: stage.reads for stage in STAGES}
+KEYS = {stage.name: stage.reads for stage in PIPELINE.stages}
 
 
-@pytest.mark.parametrize("stage", STAGES, ids=KEYS)
+@pytest.mark.parametrize("stage", PIPELINE.stages, ids=KEYS)
 def test_what_a_stage_takes_does_not_depend_on_what_is_imported(stage: Stage, blocks_imported: None) -> None:
     assert stage.reads == KEYS[stage.name]
 

@@ -16,11 +16,11 @@ from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.reads import CompassCasesConfig, ContactConfig, SceneCasesConfig, dotted_keys, keys_of, only
 from walkerlab.config.schema import QUESTIONS, Config
-from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Stage, results_of
+from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, results_of
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.store.key import differences
 
-NAMES = [stage.name for stage in STAGES]
+NAMES = [stage.name for stage in PIPELINE.stages]
 EXPLICIT = "start=[-0.2, 0.17, -0.6, -0.86]"
 
 
@@ -29,21 +29,21 @@ def needed(target, *sets, config=None):
 
 
 @pytest.mark.parametrize("config", builtin_names())
-@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+@pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
 def test_inputs_stand_earlier_in_the_table(stage, config):
     inputs = (*stage.inputs(load(Path(config)).config), *stage.if_current)
     assert set(inputs) <= set(NAMES[: NAMES.index(stage.name)])
 
 
 @pytest.mark.parametrize("config", builtin_names())
-@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+@pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
 def test_what_a_stage_reads_is_in_the_config(stage, config):
     loaded = load(Path(config)).config
     slice_of(loaded, stage.takes)
     slice_of(loaded, stage.takes_under(loaded))
 
 
-@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+@pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
 def test_the_table_names_what_the_stage_itself_says_that_it_takes(stage):
     module = importlib.import_module(stage.module)
     named = {Config if takes is None else takes for takes in (stage.takes, stage.takes_of_scene or stage.takes)}
@@ -53,7 +53,7 @@ def test_the_table_names_what_the_stage_itself_says_that_it_takes(stage):
 
 
 @pytest.mark.parametrize("config", ["paper", "kneed"])
-@pytest.mark.parametrize("stage", STAGES, ids=NAMES)
+@pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
 def test_a_stage_is_given_what_its_key_is_made_of_and_nothing_else(stage, config):
     loaded = load(Path(config)).config
     takes = stage.takes_under(loaded)
@@ -140,14 +140,14 @@ def test_the_table_is_read_without_loading_config_or_arrays():
     assert done.stdout.strip() == "[]", done.stderr
 
 
-DRAW = {stage.name for stage in STAGES if stage.draws}
+DRAW = {stage.name for stage in PIPELINE.stages if stage.draws}
 EVIDENCE = ("compare", "tune", "accuracy", "engines", "known-problems", "stability", "stability-maps")
 
 
 @pytest.fixture(scope="module")
 def made_of():
     sources = Sources()
-    return {stage.name: {module.name for module in sources.closure(stage.module)} for stage in STAGES}
+    return {stage.name: {module.name for module in sources.closure(stage.module)} for stage in PIPELINE.stages}
 
 
 @pytest.mark.parametrize("stage", EVIDENCE)
@@ -155,7 +155,7 @@ def test_an_edited_stage_of_evidence_renews_its_own_key_alone(made_of, stage):
     assert {name for name in set(made_of) - DRAW if PIPELINE[stage].module in made_of[name]} == {stage}
 
 
-@pytest.mark.parametrize("stage", [stage.name for stage in STAGES if not stage.draws])
+@pytest.mark.parametrize("stage", [stage.name for stage in PIPELINE.stages if not stage.draws])
 def test_no_result_is_made_with_the_registry_of_stages_figures_or_sections(made_of, stage):
     registries = {"walkerlab.pipeline.graph", "walkerlab.views.figures.registry", "walkerlab.views.report.registry"}
     assert not registries & made_of[stage]

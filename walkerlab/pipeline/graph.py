@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from walkerlab.config import reads
 from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
 from walkerlab.errors import ConfigError
-from walkerlab.registration import later
+from walkerlab.registration import later, registered
 from walkerlab.scene.omissions import contact_walk_omissions, rigid_walk_omissions
 from walkerlab.scene.studies import is_studied
 
@@ -167,14 +167,21 @@ class Stage:
 
 
 class Graph:
-    """Stages of a pipeline, each after the stages that it needs."""
+    """Stages of a pipeline, each after the stages that it needs.
 
-    def __init__(self, *stages: Stage) -> None:
+    at  import path, module:NAME, by which other processes find it; sweeps need it
+    """
+
+    def __init__(self, *stages: Stage, at: str = "") -> None:
         """Store the stages; raises ValueError if two have the same name."""
-        self.stages = stages
+        self.stages, self.at = stages, at
         self._by_name = {stage.name: stage for stage in stages}
         if len(self._by_name) != len(stages):
             raise ValueError("two stages have the same name")
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
+        """Pickle the import path alone: stages hold functions that cannot be pickled."""
+        return registered, tuple(self.at.split(":"))
 
     def __getitem__(self, name: str) -> Stage:
         return self._by_name[name]
@@ -347,7 +354,7 @@ PIPELINE = Graph(
         early_with=WALKED,
         if_current=("engines", "stability-maps", "continuation", "basin", "robustness", "identify", "plan"),
     ),
+    at="walkerlab.pipeline.graph:PIPELINE",
 )  # fmt: skip
-STAGES = PIPELINE.stages
 check_cases = later("walkerlab.evidence.verification.catalogue", "all_cases")
 """Check the stability cases that a config defines; raises ConfigError for an unusable one."""

@@ -4,7 +4,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, Final, NamedTuple
@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 from walkerlab.errors import NoAnswer, WalkerlabError
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
-from walkerlab.pipeline.workers import WorkerDiedError, WorkerPool
+from walkerlab.pipeline.workers import SizedExecutor, WorkerDiedError, WorkerPool
 
 SCOUTS: Final = 2
 """Size of the first batch, which runs alone; it compiles the kernels once and measures the run time of a unit."""
@@ -40,8 +40,10 @@ Timed = tuple[Any, float]
 """Result of a unit and its run time (s)."""
 
 
-class InPlace(Executor):
+class InPlace(SizedExecutor):
     """Executor that runs each call immediately, in this process."""
+
+    size = 0
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Run a call; any error is raised immediately."""
@@ -73,16 +75,16 @@ class Spread:
     _deaths: int = 0
     _alive: bool = False
 
-    def run(self, executor: Executor, workers: int) -> None:
-        """Compute all units; `workers` is 0 if the executor works in this process.
+    def run(self, executor: SizedExecutor) -> None:
+        """Compute all units.
 
         Raises NoAnswer if workers keep dying before they compute anything; re-raises bugs immediately.
         """
         while self.left or self._again or self._running:
             # one batch more than there are workers, so that no worker waits
-            most = 1 if self.unit_s is None else workers + 1
+            most = 1 if self.unit_s is None else executor.size + 1
             while len(self._running) < most and (self._again or self.left):
-                batch, failures = self._again.popleft() if self._again else (self._next_batch(workers), 0)
+                batch, failures = self._again.popleft() if self._again else (self._next_batch(executor.size), 0)
                 self._running[executor.submit(compute, batch)] = batch, failures
             ended, _ = wait(self._running, return_when=FIRST_COMPLETED)
             for future in ended:
@@ -169,5 +171,5 @@ def complete(
 
     workers = min(jobs, len(waiting)) if min(jobs, len(waiting)) > 1 and size >= shared_from else 0
     with WorkerPool(workers) if workers else InPlace() as executor:
-        Spread(iter(waiting), len(waiting), keep, give_up, 0.0, 0.0 if compiled else None).run(executor, workers)
+        Spread(iter(waiting), len(waiting), keep, give_up, 0.0, 0.0 if compiled else None).run(executor)
     return [checkpoint.kept[unit.name] for unit in units], size

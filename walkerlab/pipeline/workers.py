@@ -164,7 +164,13 @@ class Worker:
         self._line.close()
 
 
-class WorkerPool(Executor):
+class SizedExecutor(Executor):
+    """Executor that runs `size` calls at the same time; 0 if it runs each call immediately, in this process."""
+
+    size: int
+
+
+class WorkerPool(SizedExecutor):
     """Executor that starts workers as needed, replaces dead ones and ends all of them when it is shut down."""
 
     def __init__(self, size: int, modules: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> None:

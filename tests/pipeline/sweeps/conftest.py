@@ -11,18 +11,18 @@ import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.pipeline.sweeps.chunk import memory_for
-from walkerlab.pipeline.sweeps.engines import Order, Pool, SweepEngine
+from walkerlab.pipeline.sweeps.engines import Order, SweepEngine
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
 from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
 
 HERE = Path(__file__).parent
-AT = "toy_sweep.sweep_pipeline:GRAPH"
 
 
 @contextlib.contextmanager
 def in_this_process(_order):
     with ThreadPoolExecutor(1) as executor:
-        yield Pool(executor, 1)
+        executor.size = 1
+        yield executor
 
 
 HERE_AND_NOW = SweepEngine(in_this_process, chunk_s=5.0)
@@ -41,7 +41,7 @@ class Toy:
         return SweepRun(question, read, RunFolder(self.runs, read.run_name), self.graph)
 
     def run(self, stage, *over, engine=HERE_AND_NOW, order=None, chunk_s=None, reporter=None, force=False, **options):
-        work = SweepWork(engine, order or Order(), chunk_s, force=force, graph=AT)
+        work = SweepWork(engine, order or Order(), chunk_s, force=force)
         return self.sweep(stage, *over, **options).run(work, reporter)
 
 

@@ -38,7 +38,7 @@ def opened(swept):
 
 def test_every_number_of_the_stage_is_a_variable_over_the_parameters(toy):
     swept = toy.run("drop", GRAVITIES, "walker.hip_mass_kg=[1, 2]")
-    assert (swept.done, swept.failed, swept.reused) == (10, 0, 0)
+    assert (swept.summary["done"], swept.failed, swept.reused) == (10, 0, 0)
     with opened(swept) as dataset:
         assert dataset.period_s.dims == ("gravity_m_s2", "hip_mass_kg")
         assert dataset.gravity_m_s2.values.tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
@@ -65,7 +65,7 @@ def test_a_row_is_what_the_stage_says_for_that_config(toy):
 
 def test_points_without_an_answer_are_rows_that_say_why(toy):
     swept = toy.run("drop", "slope_rad=[0.1, 0.35, 1.2]")
-    assert (swept.done, swept.failed) == (3, 0)
+    assert (swept.summary["done"], swept.failed) == (3, 0)
     with opened(swept) as dataset:
         assert dataset.outcome.values.tolist() == ["answered", "answered", "no-answer"]
         assert str(dataset.reason.values[2]) == "too steep: 1.2"
@@ -136,7 +136,7 @@ def test_nothing_is_computed_twice(toy, marks):
     assert marks() == 5
     assert toy.run("drop", GRAVITIES).reused == 5
     more = toy.run("drop", "gravity_m_s2=1:9:9")
-    assert (more.reused, more.done) == (5, 9)
+    assert (more.reused, more.summary["done"]) == (5, 9)
     assert marks() == 9
     other_run = toy.run("drop", GRAVITIES, sets=["strides=7"])
     assert other_run.path.parent.name == "paper@strides=7"
@@ -148,7 +148,7 @@ def test_points_that_differ_in_nothing_the_stage_reads_are_computed_once(toy, ma
     notes = []
     reporter = type("Listener", (sweeps.Silent,), {"note": lambda self, text: notes.append(text)})()
     swept = toy.run("drop", GRAVITIES, "strides=[2, 3, 4]", reporter=reporter)
-    assert swept.done == 15
+    assert swept.summary["done"] == 15
     assert marks() == 5
     assert any("drop does not read strides" in note for note in notes)
 
@@ -310,7 +310,7 @@ def test_the_file_says_what_was_asked(toy):
 @pytest.mark.parametrize("stage", ["simulate", "contact-sim"])
 def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
     config = load(sets=("strides=1",)).config
-    (row,) = compute_point(config, "key", sweeps.PIPELINE_AT, stage, again=True).rows
+    (row,) = compute_point(config, "key", PIPELINE, stage, again=True).rows
     alone = answer_in_memory(config, stage, MemoryResults())
     assert "trajectory" in alone.groups
     assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))

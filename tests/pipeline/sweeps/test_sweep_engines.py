@@ -48,7 +48,7 @@ def test_workers_of_this_machine_may_begin_before_there_are_points():
     with LOCAL.start_early(Order(workers=2)) as begun:
         workers = set(processes_below(os.getpid()))
         with begun.opened(Order(workers=2)) as pool:
-            assert pool.executor.submit(os.getpid).result() in workers
+            assert pool.submit(os.getpid).result() in workers
 
 
 def test_only_a_forced_sweep_computes_again_what_its_workers_remember(toy, marks, tmp_path):
@@ -87,7 +87,7 @@ read = load()
 question = build_sweep("deadly", [axis_of_text("seed=100:179:80")])
 sweep = SweepRun(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
 order = Order(2, modules=("toy_sweep.deadly",))
-swept = sweep.run(SweepWork(order=order, chunk_s=0.05, graph="toy_sweep.sweep_pipeline:GRAPH"))
+swept = sweep.run(SweepWork(order=order, chunk_s=0.05))
 print(swept.content.digest(), swept.failed)
 """
 
@@ -155,7 +155,7 @@ def test_a_job_that_is_cancelled_or_fails_says_so_and_is_forgotten():
         def result(self):
             raise self.error
 
-    executor = JobExecutor(Job)
+    executor = JobExecutor(Job, 1)
     for error in (CancelledError("its worker is gone"), ValueError("no result")):  # the first is no Exception
         assert executor.submit(error).exception(timeout=10.0) is error
     deadline = time.monotonic() + 10.0
@@ -206,8 +206,8 @@ def test_the_job_that_slurm_is_given_asks_for_what_was_said(tmp_path, monkeypatc
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     options = {"slurm_partition": "short", "timeout_min": "30", "python": "/opt/python"}
     with ENGINES["slurm"].opened(Order(options=options, folder=tmp_path)) as pool:
-        assert pool.workers == 16
-        pool.executor.submit(os.getpid)
+        assert pool.size == 16
+        pool.submit(os.getpid)
     job = (tmp_path / "submitted.sh").read_text()
     for line in ("--partition=short", "--time=30", "--cpus-per-task=1", "--job-name=walkerlab"):
         assert f"#SBATCH {line}" in job

@@ -37,4 +37,5 @@ GRAPH = Graph(
         if_current=("census",),
         work="draws",
     ),
+    at="toy.pipeline:GRAPH",
 )

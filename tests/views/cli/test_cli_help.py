@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.config.fields import block_of, words_of
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE, STAGES, Graph, Option, Stage
+from walkerlab.pipeline.graph import PIPELINE, Graph, Option, Stage
 from walkerlab.pipeline.store.provenance import git_commit
 from walkerlab.pipeline.workers import ONE_THREAD
 from walkerlab.views.cli.main import program
@@ -52,16 +52,16 @@ def test_help_loads_no_library(arguments):
 def test_help_names_every_command(walker):
     done = walker("--help")
     commands = {line.split()[0] for line in done.stdout.split("Commands:")[1].splitlines() if line.strip()}
-    assert {*(stage.name for stage in STAGES), "status", "show", "schema", "clean"} <= commands
+    assert {*(stage.name for stage in PIPELINE.stages), "status", "show", "schema", "clean"} <= commands
 
 
 def test_help_says_what_each_command_is_for_without_cutting_it_short(walker):
     words = " ".join(walker("--help").stdout.split("Commands:")[1].split())
-    assert all(stage.purpose in words for stage in STAGES)
+    assert all(stage.purpose in words for stage in PIPELINE.stages)
     assert "..." not in words
 
 
-@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+@pytest.mark.parametrize("stage", PIPELINE.stages, ids=lambda stage: stage.name)
 def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stage):
     words = set(walker(stage.name, "--help").stdout.replace(",", " ").split())
     assert set(OPTIONS) <= words
@@ -70,7 +70,7 @@ def test_every_stage_has_the_common_options_and_strides_if_it_walks(walker, stag
     assert ("--open" in words) == (stage.name == "report")
 
 
-OF_STAGES = [(stage.name, option) for stage in STAGES for option in stage.options if not option.runs]
+OF_STAGES = [(stage.name, option) for stage in PIPELINE.stages for option in stage.options if not option.runs]
 BLOCKS_OF_OTHERS = {("compare", "recording"), ("identify", "plan"), ("plan", "identify")}
 
 
@@ -180,7 +180,7 @@ def test_a_flag_may_have_a_hyphen():
 
 
 def test_an_option_that_runs_another_stage_names_one_with_the_options_that_need_it():
-    redirects = [(stage, option) for stage in STAGES for option in stage.options if option.runs]
+    redirects = [(stage, option) for stage in PIPELINE.stages for option in stage.options if option.runs]
     assert [(stage.name, option.flag, option.runs) for stage, option in redirects] == [("identify", "--plan", "plan")]
     for stage, option in redirects:
         needing = {other.flag for other in stage.options if option.flag in other.needs}

@@ -3,7 +3,7 @@
 import pytest
 
 import walkerlab
-from walkerlab.pipeline.graph import STAGES
+from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headlines
 from walkerlab.pipeline.runs import headline_values
 from walkerlab.pipeline.store import artifact
@@ -40,7 +40,7 @@ def test_every_number_of_a_point_of_a_sweep_can_be_asked_for(stage, tmp_path):
 
 
 def test_headlines_are_of_stages_that_there_are_and_few():
-    assert HEADLINES.keys() <= {stage.name for stage in STAGES}
+    assert HEADLINES.keys() <= {stage.name for stage in PIPELINE.stages}
     assert max(map(len, HEADLINES.values())) <= MOST
     assert all(has_quantity(stage, name) for stage in QUANTITIES for name in HEADLINES[stage])
     assert not has_quantity("fixedpoint", "froud")

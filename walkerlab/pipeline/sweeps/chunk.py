@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import json
 import re
 import traceback
@@ -61,25 +60,22 @@ class Chunk:
 
 
 @lru_cache(maxsize=MEMORIES)
-def memory_for(graph: str, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
+def memory_for(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
     """Return this process's cache of stage inputs, which is kept between chunks; arguments as in `compute_point`."""
-    module, _, name = graph.partition(":")
-    return MemoryResults(getattr(importlib.import_module(module), name))
+    return MemoryResults(graph)
 
 
-def compute_point(config: Config, key: str, graph: str, target: str, again: bool, forced: str = "") -> Chunk:
+def compute_point(config: Config, key: str, graph: Graph, target: str, again: bool, forced: str = "") -> Chunk:
     """Compute one point in this process; an error becomes its result.
 
     key     stage key of the point's result
-    graph   import path of the pipeline, module:NAME
     again   whether to repeat its walk to measure the numerical error
     forced  identifies a sweep that reuses no earlier result; empty for other sweeps
     """
     memory = memory_for(graph, forced)
-    stages = memory.keys.graph
     try:
-        config = without_outputs(config, target, stages)
-        answer = answer_in_memory(config, target, memory, again=again or STRIDES not in stages[target].options)
+        config = without_outputs(config, target, graph)
+        answer = answer_in_memory(config, target, memory, again=again or STRIDES not in graph[target].options)
     except WalkerlabError as error:
         return Chunk((PointResult(key, "failed", error.message),), {})
     except Exception as error:

@@ -8,14 +8,14 @@ import importlib
 import os
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from multiprocessing import current_process
 from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.workers import ONE_THREAD, WorkerPool
+from walkerlab.pipeline.workers import ONE_THREAD, SizedExecutor, WorkerPool
 
 GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
 
@@ -32,18 +32,11 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Pool:
-    """A running executor."""
-
-    executor: Executor
-    workers: int  # number of chunks that it computes at the same time
-
-
-@dataclass(frozen=True)
 class SweepEngine:
     """Engine that computes the chunks of a sweep."""
 
-    opened: Callable[[Order], contextlib.AbstractContextManager[Pool]]  # opens a pool and closes it afterwards
+    # opens a pool, whose `size` is the number of chunks that it computes at the same time, and closes it afterwards
+    opened: Callable[[Order], contextlib.AbstractContextManager[SizedExecutor]]
     chunk_s: float  # target duration of a chunk, s: long compared with the engine's overhead
 
     @contextlib.contextmanager
@@ -53,18 +46,15 @@ class SweepEngine:
             yield self
             return
         with local(order) as pool:
-            pool.executor.start_all()  # type: ignore[attr-defined]
+            pool.start_all()
             yield replace(self, opened=lambda _order: contextlib.nullcontext(pool))
 
 
-@contextlib.contextmanager
-def local(order: Order) -> Iterator[Pool]:
+def local(order: Order) -> WorkerPool:
     """Run workers on this machine, one thread each."""
     refuse_address("local", order)
-    workers = order.workers or os.cpu_count() or 1
     modules = ("walkerlab.pipeline.sweeps.chunk", *order.modules)
-    with WorkerPool(workers, modules, dict.fromkeys(ONE_THREAD, "1")) as executor:
-        yield Pool(executor, workers)
+    return WorkerPool(order.workers or os.cpu_count() or 1, modules, dict.fromkeys(ONE_THREAD, "1"))
 
 
 @contextlib.contextmanager
@@ -83,7 +73,7 @@ def one_thread_each() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def dask(order: Order) -> Iterator[Pool]:
+def dask(order: Order) -> Iterator[JobExecutor]:
     """Use a Dask cluster at an address, or start one on this machine."""
     distributed = extra("distributed", "dask")
     # Dask copies these variables into this process's environment whenever it starts or replaces a worker.
@@ -102,15 +92,16 @@ def dask(order: Order) -> Iterator[Pool]:
             client = stack.enter_context(distributed.Client(cluster))
         # Worker deaths are handled chunk by chunk, as in every engine; Dask's own executor reports an error for a
         # result whose worker dies before handing it over.
-        executor = JobExecutor(functools.partial(client.submit, retries=0, pure=False))
+        size = order.workers or max(1, len(client.scheduler_info()["workers"]))
+        executor = JobExecutor(functools.partial(client.submit, retries=0, pure=False), size)
         try:
-            yield Pool(executor, order.workers or max(1, len(client.scheduler_info()["workers"])))
+            yield executor
         finally:
             client.cancel(list(executor.jobs))
 
 
 @contextlib.contextmanager
-def slurm(order: Order) -> Iterator[Pool]:
+def slurm(order: Order) -> Iterator[JobExecutor]:
     """Submit a Slurm job for each chunk; `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", order)
@@ -124,9 +115,9 @@ def slurm(order: Order) -> Iterator[Pool]:
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
-    executor = JobExecutor(job_runner.submit)
+    executor = JobExecutor(job_runner.submit, order.workers or 16)
     try:
-        yield Pool(executor, order.workers or 16)
+        yield executor
     finally:
         for job in list(executor.jobs):
             with contextlib.suppress(OSError):  # the job may have ended meanwhile
@@ -134,15 +125,15 @@ def slurm(order: Order) -> Iterator[Pool]:
                     job.cancel(check=False)
 
 
-class JobExecutor(Executor):
+class JobExecutor(SizedExecutor):
     """Executor that starts jobs of a library; a thread waits for each job."""
 
-    def __init__(self, start: Callable[..., Any]) -> None:
+    def __init__(self, start: Callable[..., Any], size: int) -> None:
         """Store the function that starts a job.
 
         start  called with a function and its arguments; returns a job whose `result()` waits
         """
-        self._start = start
+        self._start, self.size = start, size
         self.jobs: set[Any] = set()
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:

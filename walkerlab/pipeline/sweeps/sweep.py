@@ -34,8 +34,6 @@ from walkerlab.pipeline.sweeps.question import SweptStage
 from walkerlab.pipeline.sweeps.result import Merge
 from walkerlab.pipeline.work import Spread, WorkUnit
 
-PIPELINE_AT = "walkerlab.pipeline.graph:PIPELINE"
-
 
 @dataclass(frozen=True)
 class SweepWork:
@@ -46,7 +44,6 @@ class SweepWork:
     chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
-    graph: str = PIPELINE_AT  # import path of the pipeline, module:NAME
     # called after each chunk with an answer, with the names of all quantities so far; may raise an error
     check: Callable[[Collection[str]], None] = lambda _names: None
 
@@ -70,11 +67,6 @@ class Swept:
     def group(self) -> Group:
         """Variables over the points; each is read from the file on access."""
         return GroupOnDisk(self.path)
-
-    @property
-    def done(self) -> int:
-        """Number of points with a result, answered or not."""
-        return int(self.summary["done"])
 
     @property
     def failed(self) -> int:
@@ -187,8 +179,7 @@ class SweepRun:
         Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
         StorageError, and NoAnswer if workers keep dying.
         """
-        started = time.perf_counter()
-        reporter = reporter or Silent()
+        started, count, reporter = time.perf_counter(), len(self.question), reporter or Silent()
         for key in self.unread():
             reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it are equal")
         make_folder(self.folder.path)
@@ -199,16 +190,14 @@ class SweepRun:
                 merge.put(chunk, self.places)
             reused = int(merge.has_row[self.inverse].sum())
             if reused:
-                reporter.note(f"sweep: {reused} of {len(self.question)} points exist already")
+                reporter.note(f"sweep: {reused} of {count} points exist already")
             origin = provenance.begin(self.loaded.config, {})
-            progress = reporter.begin(
-                "sweep", f"{len(self.question) - reused} of {len(self.question)} points to compute"
-            )
+            progress = reporter.begin("sweep", f"{count - reused} of {count} points to compute")
             try:
                 bugs = self._compute(merge, work, reporter, progress, origin)
             except KeyboardInterrupt:
                 stored = int(merge.has_row[self.inverse].sum())
-                reporter.note(f"sweep: interrupted; {stored} of {len(self.question)} points are kept")
+                reporter.note(f"sweep: interrupted; {stored} of {count} points are kept")
                 raise
             finally:
                 progress.end("")
@@ -255,17 +244,17 @@ class SweepRun:
         todo, chunk_s = self._units(missing.tolist(), work), work.chunk_s or work.engine.chunk_s
         spread = Spread(todo, int(missing.size), lambda _units, points: keep(join_points(points)), give_up, chunk_s)
         with work.engine.opened(work.order) as pool:
-            spread.run(pool.executor, pool.workers)
+            spread.run(pool)
         return tuple(bugs.values())
 
     def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
         """Iterate over the points to compute; a sample of their walks is repeated to measure the numerical error."""
-        stage, forced = self.question.stage, token_hex() if work.force else ""
+        stage, graph, forced = self.question.stage, self.keys.graph, token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)
             key = self.keys.of(config, stage)[stage]
-            yield WorkUnit(key, 1, partial(compute_point, config, key, work.graph, stage, index in sample, forced))
+            yield WorkUnit(key, 1, partial(compute_point, config, key, graph, stage, index in sample, forced))
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:

@@ -2,7 +2,6 @@
 
 import importlib
 import os
-import sys
 import threading
 from collections.abc import Collection
 from dataclasses import dataclass, fields
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.pipeline.graph import Graph
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command, option
 from walkerlab.views.report.text import paragraph
@@ -113,20 +112,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
                 check_options(question.stage, flags, available)
 
             seconds, waits = request.chunk_seconds, not request.no_wait
-            work = SweepWork(engine, order, seconds, waits, request.force, where(graph), check)
+            work = SweepWork(engine, order, seconds, waits, request.force, check)
             swept = run.run(work, request.console)
         show_result(request, swept)
-
-
-def where(graph: Graph) -> str:
-    """Return the import path of the pipeline for workers, as module:NAME."""
-    from walkerlab.pipeline.sweeps.sweep import PIPELINE_AT
-
-    if graph is PIPELINE:
-        return PIPELINE_AT
-    package = graph.stages[0].module.partition(".")[0]
-    own = [(name, module) for name, module in list(sys.modules.items()) if name.partition(".")[0] == package]
-    return next(f"{name}:{key}" for name, module in own for key, value in vars(module).items() if value is graph)
 
 
 def show_plan(request: Request, foreseen: "Foreseen") -> None:

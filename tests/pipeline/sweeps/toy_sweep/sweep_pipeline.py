@@ -14,4 +14,5 @@ GRAPH = Graph(
     Stage("deadly", "toy_sweep.deadly", "End the worker.", keys("seed")),
     Stage("count", "toy_sweep.counting", "Count in parts.", keys("seed")),
     Stage("picture", "toy_sweep.falling_stone", "Draw it.", keys("name"), work="draws"),
+    at="toy_sweep.sweep_pipeline:GRAPH",
 )
