@@ -74,6 +74,12 @@ def model_reads(model: str, config: ContactConfig, key: str) -> bool:
     return not allowed or any(model_differs(model, config, parameter, (value, changed)) for changed in allowed)
 
 
+def refuse_unread(where: str, key: str, config: ContactConfig, models: Sequence[str]) -> None:
+    """Raise ConfigError for the config key `where`, if none of the models reads the parameter `key` that it names."""
+    if not any(model_reads(model, config, key) for model in models):
+        raise unused_key_error(where, key, models)
+
+
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
     """Build the error for the config key `where`, which names a parameter `key` that none of the models uses."""
     return ConfigError(

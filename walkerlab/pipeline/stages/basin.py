@@ -45,7 +45,6 @@ from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.scene.contact import (
     ContactScene,
     contact_gait,
-    require_contact,
     scene_on_pads,
     start_state,
     tolerances_of,
@@ -98,15 +97,10 @@ def run(
         edge_shares, more = complete(units, checkpoint, "basin: edges", progress, jobs, shared_from)
         walking[edges], walks = np.concatenate(edge_shares), walks + more
     rate = {"trajectories_per_s": walks / (time.perf_counter() - started_at)} if walks else {}
-    aperiodic = isinstance(question, RigidQuestion) and question.attractors.aperiodic
-    reached = attractors_of(question, rigid)
-    answer = summary(config.basin, window, ends, walking.reshape(window.cells), reached, aperiodic)
-    pads = None
-    if isinstance(question, ContactQuestion):
-        pads = Pads((question.scene.pitch_m, question.scene.pitch_m), laid=str(require_contact(config).pad_pitch))
+    answer = summary(config.basin, window, ends, walking.reshape(window.cells), question)
     answer |= {
         "numerical_error": sample_again(question, window, ends),
-        "endings": describe_endings(answer["outcomes"], config, config.basin.model == "contact", pads),
+        "endings": describe_endings(answer["outcomes"], config, config.basin.model == "contact", question.pads),
         "edge_cells": int(edges.size),
         **margin_of(config, window, ends, gait),
         **rate,
@@ -146,7 +140,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: Wind
     generator = np.random.default_rng(config.seed)
     starts = np.concatenate([np.array([window.rest]), window.draw(SEARCHED_STARTS, generator)])
     attractors = find_attractors(walker, starts * np.array(scale), config.seed)
-    question = RigidQuestion(walker, scale, attractors, config.basin.steps)
+    question = RigidQuestion(rigid, walker, scale, attractors, config.basin.steps)
     one_by_one = replace(question, cells_at_once=500, edges_at_once=50, shared_from=10_000)
     return question if legs is not None else one_by_one
 
@@ -163,7 +157,8 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     answer = contact_gait(config, step_length_m, state)
     scene = replace(scene_on_pads(config, step_length_m, state, answer), pinned=False)
     starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
-    return ContactQuestion(scene, rigid, for_a_map(starts, starts.walk(1.0, 1.0).evaluations))
+    pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
+    return ContactQuestion(scene, rigid, for_a_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
 
 def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
@@ -188,22 +183,8 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})
 
 
-def attractors_of(question: Question, rigid: RigidModel) -> list[dict[str, Any]]:
-    """Describe each attractor: its period, and a state (SI) or, for the contact model, the step's period and length."""
-    if isinstance(question, ContactQuestion):
-        own = question.starts.gait
-        return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
-    rows = []
-    for cycle in question.attractors.cycles:
-        state = state_on_section(rigid, tuple((cycle.points[0] / np.array(question.scale)).tolist()))
-        rows.append({"period": cycle.period, "state": list(state), "reached_within": cycle.reach})
-    return rows
-
-
-def summary(
-    settings: Basin, window: Window, ends: WalkEnds, walking: Floats, attractors: list[dict[str, Any]], aperiodic: bool
-) -> dict[str, Any]:
-    walks = ends.outcome == Outcome.WALKED
+def summary(settings: Basin, window: Window, ends: WalkEnds, walking: Floats, question: Question) -> dict[str, Any]:
+    walks, attractors = ends.outcome == Outcome.WALKED, question.attractor_rows()
     for number, row in enumerate(attractors):
         reaches = walks & (ends.attractor == number)
         row["cells"] = int(np.count_nonzero(reaches))
@@ -221,7 +202,7 @@ def summary(
         "share_walking_gaussian": float(np.sum(walking * gaussian(window))),
         "outcomes": count_outcomes(ends.outcome),
         "attractors": attractors,
-        "aperiodic": aperiodic,
+        "aperiodic": question.aperiodic,
         "unsettled_cells": int(np.count_nonzero(walks & (ends.attractor == UNREACHED))),
         "steps_wanted": settings.steps if settings.model == "rigid" else settings.contact_steps,
     }
@@ -249,6 +230,7 @@ def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping
 class RigidQuestion:
     """Rigid model whose walks are classified by their ends."""
 
+    rigid: RigidModel
     walker: Walker  # the unit walker
     scale: tuple[float, float, float]  # factors from section coordinates in SI to those of the unit walker
     attractors: Attractors
@@ -257,6 +239,19 @@ class RigidQuestion:
     edges_at_once: int = 1_000
     shared_from: int = 200_000  # minimum number of walks for which starting processes saves time
     tolerances: tuple[float, float] = (RTOL, ATOL)
+    pads = None  # its ground has none
+
+    @property
+    def aperiodic(self) -> bool:
+        return self.attractors.aperiodic
+
+    def attractor_rows(self) -> list[dict[str, Any]]:
+        """Describe each attractor: its period, and a state (SI) on it."""
+        rows = []
+        for cycle in self.attractors.cycles:
+            state = state_on_section(self.rigid, tuple((cycle.points[0] / np.array(self.scale)).tolist()))
+            rows.append({"period": cycle.period, "state": list(state), "reached_within": cycle.reach})
+        return rows
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI, until each walk ends or reaches an attractor."""
@@ -276,9 +271,16 @@ class ContactQuestion:
     scene: ContactScene
     rigid: RigidModel
     starts: ScaledStarts
+    pads: Pads
     cells_at_once: int = 100
     edges_at_once: int = 10
     shared_from: int = 500
+    aperiodic = False  # no attractor but its gait is looked for
+
+    def attractor_rows(self) -> list[dict[str, Any]]:
+        """Describe the attractor by the period and length of its step; empty if the model has no gait."""
+        own = self.starts.gait
+        return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""

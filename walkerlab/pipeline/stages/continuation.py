@@ -208,6 +208,9 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
         return [{"model": family.model, **row} for family in families for row in of_model(family)]
 
+    def by_model(of_model: Callable[[Family], Any]) -> dict[str, Any]:
+        return {family.model: value for family in families if (value := of_model(family)) is not None}
+
     return {
         "over": parameter.key,
         "unit": parameter.unit,
@@ -215,15 +218,11 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
         "to": config.continuation.most,
         "branches": rows(branch_rows),
         "bifurcations": rows(bifurcation_rows),
-        "first_doubling": {
-            family.model: flip for family in families if (flip := first_doubling(family.branches)) is not None
-        },
+        "first_doubling": by_model(lambda family: first_doubling(family.branches)),
         "lyapunov": rows(lambda family: map(asdict, family.exponents)),
         "cascades": rows(cascade_rows),
         "limits": rows(limit_rows),
-        "numerical_error": {
-            family.model: error for family in families if again and (error := sample_again(family)) is not None
-        },
+        "numerical_error": by_model(sample_again) if again else {},
         "endings": rows(partial(ending_rows, parameter=parameter, config=config)),
         "attractors": rows(lambda family: [attractor_summary(family)] if family.attractors.found else []),
         "curves": rows(curve_rows),

@@ -33,7 +33,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content
-from walkerlab.scene.families import model_reads, unused_key_error
+from walkerlab.scene.families import refuse_unread
 from walkerlab.scene.parameter import Parameter, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
@@ -77,10 +77,8 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
             return DesignSearch(x, point, float(gradient_norm[0]))
         result = minimise(question, start)
         if result.point is not None:
-            z = gaits.sections[result.x.tobytes()]
-            checkpoint.keep(
-                name, [*(gaits.counts - before).tolist(), result.gradient_norm, *result.x.tolist(), *z.tolist()]
-            )
+            counts, z = gaits.counts - before, gaits.sections[result.x.tobytes()]
+            checkpoint.keep(name, [*counts.tolist(), result.gradient_norm, *result.x.tolist(), *z.tolist()])
         return result
 
     searches = search_from_starts(question, own, design.starts, config.seed, search)
@@ -90,9 +88,8 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     assert best.point is not None
     ends = count_optima(question, searches)
     start = {} if own_gait is None else {"start_value": own_gait.numbers[quantity], "start": dict(own_gait.numbers)}
-    optimum = {
-        key: float(f"{value:.12g}") for key, value in zip(design.over, best.x, strict=True)
-    }  # 12 digits, so that a bound appears as typed
+    # 12 digits, so that a bound appears as typed
+    optimum = {key: float(f"{value:.12g}") for key, value in zip(design.over, best.x, strict=True)}
     answer = {
         "quantity": quantity,
         "sense": "least" if design.minimise else "largest",
@@ -135,8 +132,7 @@ def refuse(config: DesignConfig) -> None:
         raise contact_required_error("design.model: contact", config.walker, "Add one.")
     parameters = [parameter_of(key, config, ("design", "over")) for key in design.over]
     for key in design.over:
-        if not model_reads(design.model, config, key):
-            raise unused_key_error("design.over", key, (design.model,))
+        refuse_unread("design.over", key, config, (design.model,))
     own, bounds = [parameter.value_in(config) for parameter in parameters], list(design.over.values())
     corners = np.column_stack((own, bounds)).T
     for place, parameter in enumerate(parameters):
@@ -205,9 +201,8 @@ class Gaits:
             by_key.append({name: of_key[name].value or 0.0 for name in self.wanted})
         moduli = np.sort(np.abs([value for value in multipliers_of(standpoint.A) if value.imag >= 0.0]))
         apart = float(moduli[-1] - moduli[-2]) if moduli.size > 1 else 1.0
-        return Point(
-            numbers, {name: np.array([gradients[name] for gradients in by_key]) for name in self.wanted}, apart
-        )
+        gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in self.wanted}
+        return Point(numbers, gradients, apart)
 
     def near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
         """Find the gait near z (d,) and its quantities; None if there is no gait or a quantity is undefined."""

@@ -9,7 +9,7 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
-from walkerlab.scene.families import model_reads, unused_key_error
+from walkerlab.scene.families import refuse_unread
 from walkerlab.scene.identification import SCALE_OF_ZERO, Question
 from walkerlab.scene.parameter import parameter_of
 
@@ -56,8 +56,7 @@ def refuse_values(
     asker = ("identify", where)
     for key, own in values.items():
         parameter = parameter_of(key, config, asker)
-        if not any(model_reads(model, config, key) for model in models):
-            raise unused_key_error(".".join(asker), key, models)
+        refuse_unread(".".join(asker), key, config, models)
         for value in own or ():
             if parameter.config_at(config, value) is None:
                 raise parameter.refusal(config, value, asker)

@@ -25,7 +25,7 @@ from walkerlab.pipeline.stages.numerical_error import evenly_spread
 from walkerlab.pipeline.stages.rigid_groups import trajectory_group
 from walkerlab.pipeline.stages.walk import only_at
 from walkerlab.pipeline.store.columns import columns, labelled, real_and_imaginary
-from walkerlab.pipeline.store.content import Attribute, Group, Variable
+from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 
@@ -161,12 +161,8 @@ def branch_group(
     if marks:
         labels = MARKS | {"value": Label(value["value"].unit, "value at the bifurcation", name="mark_value")}
         variables |= columns(marks, labels, "mark")
-    attrs: dict[str, Attribute] = {
-        "period": branch.period,
-        "begins": branch.ends[0].reason,
-        "ends": branch.ends[1].reason,
-    }
-    return Group(variables, attrs)
+    begin, end = branch.ends
+    return Group(variables, {"period": branch.period, "begins": begin.reason, "ends": end.reason})
 
 
 def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Parameter) -> dict[str, Group]:

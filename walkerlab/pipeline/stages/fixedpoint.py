@@ -129,9 +129,6 @@ def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
         "found_by": Variable(found_by, (GAIT,), "", "searches that found this gait"),
         "objections": Variable(objections, (GAIT,), "", "why the gait is not physical"),
     }
-    attrs: dict[str, Any] = {
-        "slope_rad": config.slope_rad,
-        "reason": search.reason,
-        "random_starts": search.random_starts,
-    }
-    return Group(variables, attrs if search.chosen is None else {**attrs, "chosen": search.chosen})
+    chosen: dict[str, Any] = {} if search.chosen is None else {"chosen": search.chosen}
+    sought: dict[str, Any] = {"reason": search.reason, "random_starts": search.random_starts}
+    return Group(variables, {"slope_rad": config.slope_rad, **sought, **chosen})

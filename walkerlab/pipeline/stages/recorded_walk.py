@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,6 +20,7 @@ from walkerlab.pipeline.stages.walk import OVER_TIME, legs, over_time, step_colu
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
@@ -33,10 +33,7 @@ NO_FILE = "there is no such file"
 def digests(config: Config) -> Mapping[str, str]:
     """Return the digest of the recording's content, so that a changed file makes results outdated."""
     assert config.recording is not None, "the stage requires the block"
-    try:
-        return {"recording.file": hashlib.sha256(Path(config.recording.file).read_bytes()).hexdigest()}
-    except OSError:
-        return {"recording.file": NO_FILE}
+    return {"recording.file": file_digest(Path(config.recording.file)) or NO_FILE}
 
 
 def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:

@@ -40,7 +40,7 @@ from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.pipeline.workers import in_order
-from walkerlab.scene.families import model_reads, unused_key_error
+from walkerlab.scene.families import model_reads, refuse_unread
 from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, parameter_of, why_no_parameter
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
@@ -160,8 +160,7 @@ def refuse(config: RobustnessConfig) -> None:
         raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or choose rigid.")
     for place, key in enumerate(block.to):
         parameter_of(key, config, ("robustness", "to", place))
-        if not any(model_reads(model, config, key) for model in models_of(config)):
-            raise unused_key_error("robustness.to", key, models_of(config))
+        refuse_unread("robustness.to", key, config, models_of(config))
     half = 0.5 * config.walker.leg_length_m
     for roughness in block.roughness_m:
         if roughness > half:
@@ -287,15 +286,12 @@ def sensitivities(
         for name, gradient in (gradients or dict.fromkeys(numbers, NONE_BESIDE)).items():
             if name in numbers:
                 share = None if gradient.value is None else relative_gradient(gradient.value, value, numbers[name])
-                details = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
+                details: dict[str, Any] = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}
                 details |= {} if share is None else {"relative": share}
-                unit = (
-                    GAIT_QUANTITIES[name] if parameter.unit == "1" else f"{GAIT_QUANTITIES[name]} per {parameter.unit}"
-                )
-                rows.append(
-                    {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit, **details}
-                    | ({"why": gradient.why} if gradient.why else {})
-                )
+                details |= {"why": gradient.why} if gradient.why else {}
+                unit = GAIT_QUANTITIES[name] + ("" if parameter.unit == "1" else f" per {parameter.unit}")
+                row = {"model": subject.model, "of": name, "to": key, "value": gradient.value, "unit": unit}
+                rows.append(row | details)
     return sorted(rows, key=lambda row: (row["value"] is None, "relative" not in row, -abs(row.get("relative", 0.0))))
 
 
