@@ -66,12 +66,9 @@ def config_text(folder: RunFolder) -> str | None:
     record = folder.record()
     if record is not None:
         return record.config
-    stored_results = read_all(folder, stored_in(folder))[0].values()
-    return (
-        max(stored_results, key=lambda stored: stored.provenance.ended_utc).provenance.config
-        if stored_results
-        else None
-    )
+    origins = [stored.provenance for stored in read_all(folder, stored_in(folder))[0].values()]
+    latest = max(origins, key=lambda origin: origin.ended_utc, default=None)
+    return None if latest is None else latest.config
 
 
 def stored_in(folder: RunFolder) -> list[str]:
@@ -211,15 +208,8 @@ def refuse_another_config(folder: RunFolder, config: Config) -> None:
         return
     changes = ["its config is no longer valid"]
     if recorded is not None:
-        changes = list(
-            differences(
-                "",
-                *(
-                    config_of_folder.model_dump(mode="json", exclude={"name", "sweep"})
-                    for config_of_folder in (recorded, config)
-                ),
-            )
-        )
+        compared = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (recorded, config))
+        changes = list(differences("", *compared))
     if changes:
         origin = f", made from {record.source}" if record is not None and record.source else ""
         more = ", …" if len(changes) > SHOWN_CHANGES else ""
@@ -263,15 +253,9 @@ def difference(
 ) -> RunDifference:
     """Compare the results and configs of two runs; an unknown config counts as empty."""
     both = [name for name in first if name in second]
-    first_keys, second_keys = (
-        {} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs
-    )
+    keys = pairs(*({} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs))
     return RunDifference(
-        tuple(
-            (key, first_keys.get(key), second_keys.get(key))
-            for key in {**first_keys, **second_keys}
-            if first_keys.get(key) != second_keys.get(key)
-        ),
+        tuple((pair.name, pair.first, pair.second) for pair in keys if pair.first != pair.second),
         {name: pairs(*(dict(flatten(run[name].summary, lists=True)) for run in (first, second))) for name in both},
         {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
         tuple(name for name in first if name not in second),

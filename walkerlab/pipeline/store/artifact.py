@@ -67,7 +67,7 @@ def write(path: Path, content: Content, identity: Identity, provenance: Provenan
 
     Raises StorageError if that fails; the old file is then intact.
     """
-    root = root_attributes(content, identity, provenance, content.complete, content.digest())
+    root = root_attributes(content, identity, provenance, content.digest())
     own = content.groups[""].attrs if "" in content.groups else {}
     if not own.keys().isdisjoint(ROOT_ATTRIBUTES):
         raise ValueError(f"some of these root attributes have reserved names: {sorted(own)}")
@@ -96,7 +96,7 @@ def write_in_turn(
 
     Raises StorageError if that fails; the old file is then intact.
     """
-    labelled = Content({}, content.summary)
+    labelled = Content({}, content.summary, complete=complete)
     digest = Digest(labelled.summary, labelled.timed)
     digest.enter("", content.attrs)
 
@@ -113,7 +113,7 @@ def write_in_turn(
         hdf5.write_in_turn(
             temporary,
             remaining(),
-            lambda: {**root_attributes(labelled, identity, provenance, complete, digest.hex()), **content.attrs},
+            lambda: {**root_attributes(labelled, identity, provenance, digest.hex()), **content.attrs},
         )
         seal = file_digest(temporary)
         with temporary.open("ab") as file:
@@ -161,9 +161,7 @@ def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdi
     return Verdict(True, "", artifact)
 
 
-def root_attributes(
-    content: Content, identity: Identity, provenance: Provenance, complete: bool, digest: str
-) -> dict[str, Attribute]:
+def root_attributes(content: Content, identity: Identity, provenance: Provenance, digest: str) -> dict[str, Attribute]:
     facts = {name: value for name, value in {**vars(identity), **vars(provenance)}.items() if value is not None}
     return {
         "title": f"walkerlab {identity.stage}",
@@ -173,7 +171,7 @@ def root_attributes(
         "summary_json": json.dumps(content.summary, ensure_ascii=False, allow_nan=False),
         "summary_timed": canonical_json(content.timed),
         "content_digest": digest,
-        "complete": complete,
+        "complete": content.complete,
     }
 
 

@@ -88,10 +88,8 @@ class SweptStage:
         return [axis.setting(place) for axis, place in zip(self.axes, self.places(index), strict=True)]
 
     def describe_point(self, index: int) -> str:
-        settings = self.settings(index)
-        return ", ".join(
-            f"{axis.key}={plain(setting.value)}" for axis, setting in zip(self.axes, settings, strict=True)
-        )
+        places = zip(self.axes, self.places(index), strict=True)
+        return ", ".join(f"{axis.key}={axis.values[place]}" for axis, place in places)
 
 
 def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
@@ -100,23 +98,13 @@ def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
     for key in keys:
         parts = key.split(".")
         ends = (".".join(parts[start:]) for start in range(len(parts) - 1, -1, -1))
-        rest_of_keys = [key_of_another for key_of_another in keys if key_of_another != key]
-        shortest.append(
-            next(
-                end
-                for end in ends
-                if not any(f".{key_of_another}".endswith(f".{end}") for key_of_another in rest_of_keys)
-            )
-        )
+        others = [f".{other}" for other in keys if other != key]
+        shortest.append(next(end for end in ends if not any(other.endswith(f".{end}") for other in others)))
     return tuple(shortest)
 
 
 def build_sweep(
-    stage: str,
-    over: Sequence[tuple[str, Any, str]],
-    zip: bool = False,
-    sample: str = "",
-    seed: int = 1,
+    stage: str, over: Sequence[tuple[str, Any, str]], zip: bool = False, sample: str = "", seed: int = 1
 ) -> SweptStage:
     """Build a sweep from command-line options or a `sweep` block.
 
@@ -130,11 +118,8 @@ def build_sweep(
         axes = (*axes, axis(key, values, source))
         if not (zip or sample):  # checked before the next parameter's values are created
             refuse_too_many("sweep", math.prod(max(1, len(parameter.values)) for parameter in axes))
-    repeated = {
-        parameter.key
-        for parameter in axes
-        if sum(second_parameter.key == parameter.key for second_parameter in axes) > 1
-    }
+    keys = [parameter.key for parameter in axes]
+    repeated = {key for key in keys if keys.count(key) > 1}
     if not axes or repeated:
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
         raise problem_error(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
@@ -282,10 +267,7 @@ def refuse_unrecorded(question: SweptStage, names: Mapping[str, str]) -> None:
         if name not in question.names and not has_quantity(question.stage, name):
             quantities = QUANTITIES[question.stage]
             near = nearest(name, (*quantities, *question.names))
-            listed = ", ".join(
-                quantity + "…" if quantity.endswith(".") else quantity
-                for quantity in quantities
-                if quantity != "outcome"
-            )
+            shown = (quantity for quantity in quantities if quantity != "outcome")
+            listed = ", ".join(quantity + "…" if quantity.endswith(".") else quantity for quantity in shown)
             hint = f" Did you mean {near}?" if near else ""
             raise ConfigError(f"{option}: {question.stage} has no such quantity.{hint}", f"Choose from {listed}.")

@@ -175,13 +175,8 @@ class Merge:
         if otherwise + measured == 0:
             return {}
         largest = {key: float(np.nanmax(values)) for key, values in errors.items() if values is not None}
-        summary = {
-            "walked_again": measured + otherwise,
-            "of": len(self.inverse),
-            "ended_otherwise": otherwise,
-            **largest,
-        }
-        return {"numerical_error": summary}
+        counts = {"walked_again": measured + otherwise, "of": len(self.inverse), "ended_otherwise": otherwise}
+        return {"numerical_error": counts | largest}
 
     def variable(self, name: str) -> Variable:
         """Remove and return a variable over the points; without the removal two copies would exist."""
@@ -236,10 +231,9 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
         columns[name] = [axis.values[question.places(index)[place]] for index in range(len(question))]
     variables = dict(group.variables)
     if not every:
-        shown_names = headlines(
-            question.stage, (name for name, variable in variables.items() if len(variable.dims) == dimensions)
-        )
-        variables = {name: variables[name] for name in dict.fromkeys(("outcome", *shown_names, "reason"))}
+        scalars = (name for name, variable in variables.items() if len(variable.dims) == dimensions)
+        shown_names = ("outcome", *headlines(question.stage, scalars), "reason")
+        variables = {name: variables[name] for name in dict.fromkeys(shown_names)}
     for name, variable in variables.items():
         if name not in columns:
             columns.update(flat_columns(name, variable, dimensions))
