@@ -5,28 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal
 
 from markupsafe import Markup
 
-from walkerlab.views.report.tables import Tone
+from walkerlab.views.report.tables import Table, Tone
 from walkerlab.views.report.tracks import Track
 
 MAIN, PAPER_PAGE, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
 """The report and the pages linked from it."""
 
 
-class PageBlock(Protocol):
-    """A part of a section; `template` is its file in templates/blocks."""
-
-    template: ClassVar[str]
-
-
 @dataclass(frozen=True)
 class Paragraph:
     """Running text; its tone marks a statement or a placeholder for a pending result."""
 
-    template: ClassVar[str] = "paragraph"
     text: str
     tone: Tone | Literal["waiting"] = "plain"
 
@@ -38,7 +31,6 @@ class Paragraph:
 class Statements:
     """Statements shown together, in one of four layouts."""
 
-    template: ClassVar[str] = "statements"
     items: tuple[Statement, ...]
     layout: Literal["list", "cards", "lines", "columns"] = "list"
 
@@ -57,7 +49,6 @@ class Statement:
 class Shares:
     """Counts that make up a whole, shown as a bar with a legend."""
 
-    template: ClassVar[str] = "shares"
     title: str
     parts: tuple[tuple[str, int, Tone], ...]
 
@@ -82,7 +73,6 @@ class Picture:
 class Gallery:
     """Figures in columns; a click enlarges one."""
 
-    template: ClassVar[str] = "gallery"
     pictures: tuple[Picture, ...]
 
 
@@ -90,7 +80,6 @@ class Gallery:
 class Cards:
     """Links to other pages: file, title, and a one-sentence summary."""
 
-    template: ClassVar[str] = "cards"
     items: tuple[tuple[str, str, str], ...]
 
 
@@ -98,7 +87,6 @@ class Cards:
 class Terms:
     """Terms and their meanings."""
 
-    template: ClassVar[str] = "terms"
     meanings: Mapping[str, str]
 
 
@@ -106,7 +94,6 @@ class Terms:
 class Code:
     """Text for copying."""
 
-    template: ClassVar[str] = "code"
     title: str
     text: str
 
@@ -145,7 +132,6 @@ class Walker:
 class Player:
     """The animated walk; shown as stills in print and without scripts."""
 
-    template: ClassVar[str] = "player"
     title: str
     caption: str
     alt: str
@@ -191,7 +177,6 @@ class GaitMark:
 class Diagram:
     """Branches of gaits over a parameter; selecting a mark loads its gait into the page's player."""
 
-    template: ClassVar[str] = "diagram"
     WIDTH: ClassVar[int] = 720
     HEIGHT: ClassVar[int] = 340
     LEFT: ClassVar[int] = 62
@@ -206,6 +191,10 @@ class Diagram:
     # position and text of the ticks of both axes
     ticks: tuple[tuple[tuple[float, str], ...], tuple[tuple[float, str], ...]]
     gaits: tuple[GaitMark, ...]
+
+
+PageBlock = Paragraph | Statements | Shares | Gallery | Cards | Terms | Code | Player | Diagram | Table
+"""A part of a section; its file in templates/blocks has the name of the class."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, Final, Literal
 
 from walkerlab.labels import labels_of, unit_by_name, with_unit
 from walkerlab.pipeline.store.csv_text import csv_text
@@ -88,7 +88,6 @@ def measured(
 class Table:
     """A table; the first cell of each row is its header."""
 
-    template: ClassVar[str] = "table"
     caption: str
     columns: tuple[Column, ...]
     groups: Mapping[str, Sequence[Sequence[Cell]]]  # rows by group title; the title may be empty
@@ -150,10 +149,9 @@ def side_by_side(
 def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
     """Build a table of all keys of the records; cells of missing keys are empty."""
     names = list(dict.fromkeys(name for row in rows for name in row))
-    present = [[row.get(name) is not None for name in names] for row in rows]
     cells = [
-        [Cell(written(row[key]) if exists else "", value=row.get(key)) for key, exists in zip(names, has, strict=True)]
-        for row, has in zip(rows, present, strict=True)
+        [Cell("" if (value := row.get(name)) is None else written(value), value=value) for name in names]
+        for row in rows
     ]
     lengths = [max(len(row[place].text) for row in cells) for place in range(len(names))]
     room = any(length <= LONGEST_CELL for length in lengths)
