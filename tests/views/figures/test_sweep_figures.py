@@ -65,7 +65,7 @@ def test_the_caption_tells_how_gaps_look():
         (8, "Grey: no answer."),
     ):
         group = swept(9, masses, answered=False)
-        made = illustration(group, "fixedpoint", PARAMETERS, PARAMETERS, ["spectral_radius"]).render({})
+        made = illustration(group, "fixedpoint", PARAMETERS, ["spectral_radius"]).render({})
         assert said in made.caption
         assert made.svg.startswith(b"<?xml")
 
@@ -77,9 +77,9 @@ def test_a_logarithmic_range_has_a_logarithmic_axis_however_narrow():
 
 
 def test_pictures_of_walks_begin_with_the_last_steps_period_and_length():
-    names = ("slip_per_step_m", "max_penetration_m", "last_step_length_m", "last_step_period_s")
+    names = ("slip_per_step_m", "max_penetration_m", "last_step_length_m", "last_step_period_s", "outcome")
     group = Group({name: Variable(np.arange(3.0), ("x",), "1", name) for name in names})
-    assert choose(group, ("x",), ["x"])[:2] == ["last_step_period_s", "last_step_length_m"]
+    assert choose(group, ["x"])[:2] == ["last_step_period_s", "last_step_length_m"]
 
 
 def test_a_name_that_no_first_result_has_is_refused_and_headlines_and_nested_ones_are_not():
@@ -98,9 +98,9 @@ def test_one_quantity_is_drawn_over_another():
         "speed_m_s": Variable(speed, ("x",), "m/s", "speed"), "cost_of_transport": Variable(cost, ("x",), "1", "cost"),
     })  # fmt: skip
     with styled():
-        axes = one_over_another(group, ("x",), ["cost_of_transport"], "speed_m_s").axes[0]
+        axes = one_over_another(group, ["cost_of_transport"], "speed_m_s").axes[0]
     (curve,) = axes.lines
     np.testing.assert_array_equal((curve.get_xdata(), curve.get_ydata()), (speed, cost))
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("speed (m/s)", "cost of transport")
-    made = illustration(group, "fixedpoint", ["x"], ("x",), ["cost_of_transport"], "speed_m_s").render({})
+    made = illustration(group, "fixedpoint", ["x"], ["cost_of_transport"], "speed_m_s").render({})
     assert made.caption.startswith("Cost over speed, for values of x: 3 answered.")

@@ -160,16 +160,16 @@ def show_result(request: SweepRequest, swept: "Swept") -> None:
     from walkerlab.pipeline.sweeps.result import as_csv as table_of
     from walkerlab.views.report.sweep_page import draw
 
-    drawing = draw(swept, request.folder, tuple(request.show or ()), request.against or "")
+    page, figures = draw(swept, request.folder, tuple(request.show or ()), request.against or "")
     summary = swept.summary
     value = {
         **common(request, swept.path, swept.wall_s),
         "reused": swept.reused,
         **{name: summary[name] for name in SUMMARY_KEYS if name in summary},
-        "figures": [str(path) for path in drawing.figures],
-        "html": str(drawing.page),
+        "figures": [str(path) for path in figures],
+        "html": str(page),
     }
-    lines = result_lines(swept, drawing.page)
+    lines = result_lines(swept, page)
     if request.as_csv:
         table = table_of(swept.content, swept.question, request.every)
         csv_path = swept.path.with_suffix(".csv")

@@ -35,7 +35,7 @@ def run(
             drawn.append(draw(figure, inputs, folder))
             progress.advance()
         else:
-            for path in paths_of(figure).values():  # drawn by an earlier run from results that no longer exist
+            for path in paths_of(figure.name).values():  # drawn by an earlier run from results that no longer exist
                 with storing(folder / path):
                     (folder / path).unlink(missing_ok=True)
             # figures of stages that run only on request are not reported as missing
@@ -43,15 +43,16 @@ def run(
                 missing.append({"what": figure.called, "why": why})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
     # some captions quote run times, which differ from run to run
-    return Content(
-        {index.GROUP: index.index(folder, files)}, {"figures": drawn, "left_out": missing}, timed=("figures",)
-    )
+    summary = {"figures": drawn, "left_out": missing}
+    return Content({index.GROUP: index.index(folder, files)}, summary, timed=("figures",))
 
 
-def draw(figure: Illustration, results: Mapping[str, Stored], folder: Path) -> dict[str, str | int | list[str]]:
-    """Draw a figure and store its files; return its texts and paths relative to the run's folder."""
+def draw(
+    figure: Illustration, results: Mapping[str, Stored], folder: Path, name: str = ""
+) -> dict[str, str | int | list[str]]:
+    """Draw a figure and store its files, called `name` or as the figure; return texts and paths in the run's folder."""
     drawing = figure.render(results)
-    paths = paths_of(figure)
+    paths = paths_of(name or figure.name)
     write_atomically(folder / paths["svg"], drawing.svg)
     write_atomically(folder / paths["png"], drawing.png)
     number = {} if figure.number is None else {"number": figure.number}
@@ -65,11 +66,11 @@ def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
     figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]
     make_folder(folder / FOLDER)
     for figure in figures:
-        if anew or not all((folder / path).is_file() for path in paths_of(figure).values()):
+        if anew or not all((folder / path).is_file() for path in paths_of(figure.name).values()):
             draw(figure, results, folder)
-    return [folder / paths_of(figure)["svg"] for figure in figures]
+    return [folder / paths_of(figure.name)["svg"] for figure in figures]
 
 
-def paths_of(figure: Illustration) -> dict[str, str]:
+def paths_of(name: str) -> dict[str, str]:
     """Return the paths of a figure's files by kind, relative to the run's folder."""
-    return {kind: f"{FOLDER}/{figure.name}.{kind}" for kind in ("svg", "png")}
+    return {kind: f"{FOLDER}/{name}.{kind}" for kind in ("svg", "png")}

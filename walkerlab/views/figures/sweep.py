@@ -37,11 +37,11 @@ MISSING: Final[dict[str, Any]] = {"color": VERMILLION, "marker": "|", "linestyle
 LABELS: Final = {RADIUS: "largest multiplier"}
 
 
-def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> list[str]:
+def choose(group: Group, parameters: Sequence[str]) -> list[str]:
     """Return the quantities to plot by default: preferred ones that vary, otherwise any that vary."""
     varying = []
     for name in group.variables:
-        if is_number(group, name, dims) and name not in parameters:
+        if is_number(group, name) and name not in parameters:
             values = group[name].astype(float)
             if np.unique(values[np.isfinite(values)]).size > 1:
                 varying.append(name)
@@ -49,54 +49,48 @@ def choose(group: Group, dims: tuple[str, ...], parameters: Sequence[str]) -> li
     return (known or [name for name in varying if "." not in name] or varying)[:MAX_PANELS]
 
 
-def is_number(group: Group, name: str, dims: tuple[str, ...]) -> bool:
+def is_number(group: Group, name: str) -> bool:
     """Whether a variable has one number for each point of the sweep."""
-    return name in group.variables and group.variables[name].dims == dims and group[name].dtype.kind in "fib"
+    return name in group.variables and by_point(group, name) and group[name].dtype.kind in "fib"
+
+
+def by_point(group: Group, name: str) -> bool:
+    """Whether a variable has a value for each point of the sweep, as the outcome has."""
+    return group.variables[name].dims == group.variables["outcome"].dims
 
 
 def illustration(
-    group: Group,
-    stage: str,
-    parameters: Sequence[str],
-    dims: tuple[str, ...],
-    names: Sequence[str],
-    against: str = "",
+    group: Group, stage: str, parameters: Sequence[str], names: Sequence[str], against: str = ""
 ) -> Illustration:
     """Return the illustration of a sweep's quantities `names` over its parameters, or over the quantity `against`."""
-    drawing = partial(draw, group, parameters, dims, names, against)
+    drawing = partial(draw, group, parameters, names, against)
     return Illustration(f"sweep-{stage}", (), drawing, words="sweep", scene=f"{stage} over {', '.join(parameters)}")
 
 
-def draw(
-    group: Group,
-    parameters: Sequence[str],
-    dims: tuple[str, ...],
-    names: Sequence[str],
-    against: str,
-    _results: Results,
-) -> Drawn:
+def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against: str, _results: Results) -> Drawn:
     """Plot a sweep; the caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
-    a_map = len(dims) == 2 and not against and not in_lines(group, dims)
+    dimensions = group["outcome"].ndim
+    # with few values of one parameter, a line is drawn for each
+    a_map = dimensions == 2 and not against and min(group["outcome"].shape) > MAX_LINES
     if against:
-        figure = one_over_another(group, dims, names, against)
-    elif len(dims) != 2:
-        figure = scattered(group, parameters, dims, names)
+        figure = one_over_another(group, names, against)
+    elif dimensions != 2:
+        figure = scattered(group, parameters, names)
     else:
         figure = (maps if a_map else lines)(group, parameters, names)
     outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
-    marked_gaps = "" if against or len(dims) > 2 else "marks"
+    marked_gaps = "" if against or dimensions > 2 else "marks"
     gaps = "" if np.all(group["status"] == "answered") else "map" if a_map else marked_gaps
     what, other = ([name_in_text(group, name) for name in each] for each in (names, [against] if against else []))
     return figure, (what, parameters, list(outcomes), gaps, a_map, RADIUS in names, *other)
 
 
-def one_over_another(group: Group, dims: tuple[str, ...], names: Sequence[str], against: str) -> Figure:
+def one_over_another(group: Group, names: Sequence[str], against: str) -> Figure:
     """Plot each quantity over the quantity `against`, a row each; join the points in order if one parameter varies."""
-    x = spread(group, against, dims)
-    few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
+    x, few = spread(group, against)
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=True):
-        line = "-" if len(dims) == 1 else "none"
+        line = "-" if group["outcome"].ndim == 1 else "none"
         y = group[name].astype(float).ravel()
         panel.plot(x[few], y[few], color=BLUE, linestyle=line, linewidth=1.2, marker="o", markersize=2.6)
         if name == RADIUS:
@@ -116,15 +110,15 @@ def label(group: Group, name: str) -> str:
     return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
 
 
-def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], names: Sequence[str]) -> Figure:
+def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
     """Plot a row per quantity and a column per parameter; join the points if one parameter varies monotonically."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
     figure, axes = panels(0.5 + SWEEP_PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
     for column, parameter in enumerate(shown):
-        x = spread(group, parameter, dims)
-        few = np.unique(np.linspace(0, x.size - 1, min(x.size, MAX_SCATTERED)).astype(int))
-        ordered = len(dims) == 1 and column == 0 and bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
+        x, few = spread(group, parameter)
+        monotonic = bool(np.all(np.diff(x) > 0.0) or np.all(np.diff(x) < 0.0))
+        ordered = group["outcome"].ndim == 1 and column == 0 and monotonic
         for panel, name in zip(axes[:, column], names, strict=True):
             y = group[name].astype(float).ravel()
             if ordered:
@@ -141,14 +135,14 @@ def scattered(group: Group, parameters: Sequence[str], dims: tuple[str, ...], na
     return figure
 
 
-def spread(group: Group, parameter: str, dims: tuple[str, ...]) -> NDArray[Any]:
-    """Return a parameter's value at every point of the sweep, as a flat array."""
+def spread(group: Group, parameter: str) -> tuple[NDArray[Any], NDArray[np.int_]]:
+    """Return a parameter's value at every point of the sweep, as a flat array, and the indices of those to plot."""
     values = numbers(group, parameter)
-    if group.variables[parameter].dims == dims:
-        return values.ravel()
-    along = [1] * len(dims)
-    along[dims.index(parameter)] = -1
-    return np.broadcast_to(values.reshape(along), group["outcome"].shape).ravel()
+    if not by_point(group, parameter):
+        dims = group.variables["outcome"].dims
+        along = [-1 if name == parameter else 1 for name in dims]
+        values = np.broadcast_to(values.reshape(along), group["outcome"].shape)
+    return values.ravel(), np.unique(np.linspace(0, values.size - 1, min(values.size, MAX_SCATTERED)).astype(int))
 
 
 def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: NDArray[Any]) -> None:
@@ -157,9 +151,7 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
         axes.axhline(1.0, color=GREY, linewidth=0.8)
     if missing.size:
         axes.plot(missing, np.full(missing.size, 0.02), **MISSING, transform=axes.get_xaxis_transform())
-    if is_logarithmic(np.unique(numbers(group, parameter)), span=1.0):
-        axes.set_xscale("log")
-    name_ticks(axes, group, parameter, "x")
+    set_scale(axes, group, parameter, "x")
 
 
 def marked(group: Group, names: Sequence[str]) -> list[Artist]:
@@ -167,11 +159,6 @@ def marked(group: Group, names: Sequence[str]) -> list[Artist]:
     gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
     stability = [entry(STABILITY_BOUND, color=GREY, linewidth=0.8)] if RADIUS in names else []
     return [*stability, *([entry("no answer", **MISSING)] if gaps else [])]
-
-
-def in_lines(group: Group, dims: tuple[str, ...]) -> bool:
-    """Whether there are two parameters, one of them with few enough values to draw a line for each."""
-    return min(group["outcome"].shape) <= MAX_LINES and len(dims) == 2
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
@@ -198,9 +185,11 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     return figure
 
 
-def name_ticks(axes: Axes, group: Group, parameter: str, which: str) -> None:
-    """Label the ticks of a non-numeric parameter on the axis `which` (x or y)."""
+def set_scale(axes: Axes, group: Group, parameter: str, which: str) -> None:
+    """Make the axis `which` (x or y) logarithmic if the values are, and label the ticks of a non-numeric parameter."""
     values = group[parameter]
+    if is_logarithmic(np.unique(numbers(group, parameter)), span=1.0):
+        getattr(axes, f"set_{which}scale")("log")
     if values.dtype.kind == "O" and group.variables[parameter].dims == (parameter,):
         getattr(axes, f"set_{which}ticks")(np.arange(values.size), [str(value) for value in values])
 
@@ -211,8 +200,7 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
     rows = -(-len(names) // columns)
     figure, axes = panels(0.4 + MAP_HEIGHT * rows, rows, columns, squeeze=False)
     across, up = (numbers(group, parameter) for parameter in parameters)
-    for place, name in enumerate(names):
-        panel = axes[place // columns][place % columns]
+    for panel, name in zip(axes.flat, names, strict=False):
         values = np.ma.masked_invalid(group[name].astype(float)).T
         panel.set_facecolor("#D9D9D9")
         mesh = panel.pcolormesh(edges(across), edges(up), values, cmap="viridis", rasterized=True)
@@ -223,14 +211,12 @@ def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figur
             add_legend(figure, [entry(STABILITY_BOUND, color=WHITE, linewidth=1.4, path_effects=outlined)])
         for axis, parameter, scale in (("x", parameters[0], across), ("y", parameters[1], up)):
             getattr(panel, f"set_{axis}label")(label(group, parameter))
-            if is_logarithmic(scale, span=1.0):
-                getattr(panel, f"set_{axis}scale")("log")
+            set_scale(panel, group, parameter, axis)
             if scale.size > 1 and group[parameter].dtype.kind != "O":
                 getattr(panel, f"set_{axis}ticks")(scale, minor=True)
                 getattr(panel, f"set_{axis}lim")(scale.min(), scale.max())
-            name_ticks(panel, group, parameter, axis)
-    for place in range(len(names), rows * columns):
-        axes[place // columns][place % columns].set_axis_off()
+    for panel in axes.flat[len(names) :]:
+        panel.set_axis_off()
     return figure
 
 

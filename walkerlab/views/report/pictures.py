@@ -14,7 +14,6 @@ from walkerlab.views.report.blocks import CASES, COSTS, MAIN, Picture
 
 PAGES = {"accuracy": COSTS, "stability": CASES}
 """Page of each figure by the first part of its name; all other figures are on the main page."""
-TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
@@ -25,7 +24,7 @@ def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = Tr
     return tuple(picture(figure, folder, file.suffix, numbered) for figure, file in zip(figures, files, strict=True))
 
 
-def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = False) -> Picture:
+def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = True) -> Picture:
     """Embed a figure's file of this kind: SVG inline, PNG as an image; FileNotFoundError if it does not exist."""
     svg = folder / figure["svg"]
     with svg.open("rb") as file:
@@ -44,7 +43,7 @@ def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbere
         caption=str(figure["caption"]),
         alt=alt,
         svg=inline(svg, alt) if vector else None,
-        uri="" if vector else f"data:{TYPES[kind]};base64,{base64.b64encode(embedded.read_bytes()).decode()}",
+        uri="" if vector else f"data:image/png;base64,{base64.b64encode(embedded.read_bytes()).decode()}",
         width=width,
         height=height,
         name=svg.stem,

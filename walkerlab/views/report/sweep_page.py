@@ -1,7 +1,6 @@
 """Plots a sweep and writes its page."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,8 @@ from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.pipeline.sweeps.question import SweptStage
 from walkerlab.pipeline.sweeps.sweep import Swept
 from walkerlab.views.figures import robustness
+from walkerlab.views.figures.stage import draw as draw_figure
+from walkerlab.views.figures.stage import paths_of
 from walkerlab.views.figures.sweep import choose, illustration, is_number
 from walkerlab.views.report.blocks import Gallery, Picture, Section
 from walkerlab.views.report.numbers import number
@@ -26,48 +27,33 @@ MAX_ROWS = 200
 """Maximum number of points that the page lists."""
 
 
-@dataclass(frozen=True)
-class Files:
-    """Files written for a plotted sweep."""
-
-    page: Path
-    figures: tuple[Path, ...]
-
-
-def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> Files:
-    """Plot a sweep's quantities over its parameters, or over `against`, and write its page.
+def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> tuple[Path, list[Path]]:
+    """Plot a sweep's quantities over its parameters, or over `against`; return its page, and the files of its figure.
 
     Raises ConfigError for an unknown quantity, StorageError if writing fails.
     """
     group, question = swept.group, swept.question
-    check_quantities(group, question.dims, names)
+    check_quantities(group, names)
     if against and against not in question.names:
-        check_quantities(group, question.dims, [against], "--against")
-    quantities = [*names] or [name for name in choose(group, question.dims, question.names) if name != against]
+        check_quantities(group, [against], "--against")
+    quantities = [*names] or [name for name in choose(group, question.names) if name != against]
     own = None if names or against else robustness.sweep_illustration(group, question.names)
     if own is None and quantities:
-        own = illustration(group, question.stage, question.names, question.dims, quantities, against)
-    paths: list[Path] = []
-    pictures: list[Picture] = []
+        own = illustration(group, question.stage, question.names, quantities, against)
+    page, paths, pictures = folder.path / PAGE, [], []
     if own is not None:
-        figure = own.render({})
         make_folder(folder.figures)
-        paths = [folder.figures / f"{swept.path.stem}.{kind}" for kind in ("svg", "png")]
-        for path, data in zip(paths, (figure.svg, figure.png), strict=True):
-            write_atomically(path, data)
-        about = {"title": own.heading, "caption": figure.caption, "alt": own.alt_text}
-        files = {path.suffix.removeprefix("."): path.relative_to(folder.path) for path in paths}
-        pictures.append(picture({**about, **files}, folder.path))
-    page = folder.path / PAGE
+        pictures = [picture(draw_figure(own, {}, folder.path, swept.path.stem), folder.path)]
+        paths = [folder.path / path for path in paths_of(swept.path.stem).values()]
     write_atomically(page, render(page_of(swept, pictures, quantities)).encode())
-    return Files(page, tuple(paths))
+    return page, paths
 
 
-def check_quantities(group: Group, dims: tuple[str, ...], names: Sequence[str], option: str = "--show") -> None:
+def check_quantities(group: Group, names: Sequence[str], option: str = "--show") -> None:
     """Raise ConfigError if a name is not a quantity of the result."""
     for name in names:
-        if not is_number(group, name, dims):
-            listed = ", ".join(key for key in group.variables if is_number(group, key, dims) and "." not in key)
+        if not is_number(group, name):
+            listed = ", ".join(key for key in group.variables if is_number(group, key) and "." not in key)
             raise ConfigError(f"{option} {name} is not a quantity of the result.", f"Choose from {listed}.")
 
 
@@ -77,9 +63,8 @@ def check_options(stage: str, names: Mapping[str, str], variables: Collection[st
     for option, name in names.items():
         if name not in available and "." not in name:
             listed = ", ".join(quantity for quantity in available if "." not in quantity)
-            raise ConfigError(
-                f"{option} is not among the quantities of the points computed so far.", f"Choose from {listed}."
-            )
+            unknown = f"{option} is not among the quantities of the points computed so far."
+            raise ConfigError(unknown, f"Choose from {listed}.")
 
 
 PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("values"), Column("meaning", wide=True))
@@ -94,17 +79,13 @@ def page_of(swept: Swept, pictures: Sequence[Picture], quantities: Sequence[str]
         for name, axis in zip(question.names, question.axes, strict=True)
         for variable in [group.variables[name]]
     ]
-    columns = [
-        *(Column(name, written=format_value, numeric=True) for name in (*question.names, *quantities)),
-        *(Column("outcome"), Column("reason", wide=True)),
-    ]
+    columns = [Column(name, written=format_value, numeric=True) for name in (*question.names, *quantities)]
+    columns += [Column("outcome"), Column("reason", wide=True)]
     listed = f"The first {MAX_ROWS} of {len(question)} points are listed. " if len(question) > MAX_ROWS else ""
     where = f"All values of every point are in `{swept.path.name}`, which xarray opens as one Dataset."
-    tables = (
-        table("Parameters", PARAMETER_COLUMNS, parameters),
-        table("Points", columns, rows(group, question, quantities), note=f"{listed}{where}"),
-    )
-    section = Section("points", "Results", (*([Gallery(tuple(pictures))] if pictures else []), *tables))
+    drawing = [Gallery(tuple(pictures))] if pictures else []
+    points = table("Points", columns, rows(group, question, quantities), note=f"{listed}{where}")
+    section = Section("points", "Results", (*drawing, table("Parameters", PARAMETER_COLUMNS, parameters), points))
     lead = (f"{summary['points']} points: {outcomes}.", *summary_lines(summary))
     return Page(f"{question.stage} over {', '.join(question.names)}", (section,), lead, PAGE)
 
