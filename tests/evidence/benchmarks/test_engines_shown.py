@@ -79,8 +79,8 @@ def test_a_panel_without_a_finished_walk_says_so():
 
 
 def test_captions_say_what_was_concluded_and_what_did_not_walk(results):
-    assert "Run time for an error of" in ERRORS.caption(results)
-    assert "Incomplete walks: mujoco soft at 0.0005 s" in PERIODS.caption(results)
+    assert "Run time for an error of" in ERRORS.render(results).caption
+    assert "Incomplete walks: mujoco soft at 0.0005 s" in PERIODS.render(results).caption
 
 
 def test_a_run_without_the_stage_has_neither_figure_nor_section():

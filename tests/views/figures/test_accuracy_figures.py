@@ -53,20 +53,20 @@ def test_the_legend_has_a_cross_only_where_a_run_did_not_reach_the_end():
 
 
 def test_the_caption_tells_the_conclusion_the_reference_and_the_failures():
-    caption = RIGID.caption(measured_methods())
+    caption = RIGID.render(measured_methods()).caption
     for said in ("at 1e-06, dop853 is fastest", "heyoka-taylor", "scipy-rk45 at 1e-09 (budget-exhausted)", "(slid)"):
         assert said in caption
 
 
 def test_the_caption_says_what_a_method_is_measured_by_that_is_the_reference_too():
     results = measured_methods()
-    assert "itself is measured against" not in RIGID.caption(results)
+    assert "itself is measured against" not in RIGID.render(results).caption
     results["accuracy"].summary["reference"]["rigid"] = {
         "method": "radau5",
         "second_method": "dop853",
         "agreement": 1e-12,
     }
-    assert "radau5 itself is measured against dop853." in RIGID.caption(results)
+    assert "radau5 itself is measured against dop853." in RIGID.render(results).caption
 
 
 def test_every_method_of_the_registry_has_a_look_of_its_own():

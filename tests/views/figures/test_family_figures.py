@@ -64,7 +64,7 @@ def test_gaits_that_are_born_in_a_fold_have_their_steps_above_the_axes_and_in_th
     close = figure.axes[1]
     [above] = close.child_axes
     assert [label.get_text() for label in above.get_xticklabels()] == ["5"]
-    assert "5 steps at 4.3 deg." in " ".join(FIGURE_13.caption(results).split())
+    assert "5 steps at 4.3 deg." in " ".join(FIGURE_13.render(results).caption.split())
 
 
 def test_in_one_column_the_parts_stand_under_one_another():
@@ -97,26 +97,26 @@ def test_a_doubled_branch_begins_at_its_parents_flip_with_equal_steps():
 
 def test_the_captions_say_where_gaits_change():
     results = families()
-    assert "first doubles its period at 4 deg" in FIGURE_13.caption(results)
-    assert "a flip at 4." in FIGURE_14.caption(results)
-    assert FIGURE_16.caption(results).startswith("Curves of flips of the rigid model's gaits")
+    assert "first doubles its period at 4 deg" in FIGURE_13.render(results).caption
+    assert "a flip at 4." in FIGURE_14.render(results).caption
+    assert FIGURE_16.render(results).caption.startswith("Curves of flips of the rigid model's gaits")
 
 
 def test_the_plane_is_shaded_by_what_walks_settle_on():
     regions = families()["continuation"]["rigid/regions"]
     kinds = {name: where.sum() for _, name, where in region_kinds(regions)}
     assert kinds == {"1 step": 3, "2 steps": 1, "aperiodic": 1, "no walking": 1}
-    assert "1 step in 50 %" in FIGURE_16.caption(families())
+    assert "1 step in 50 %" in FIGURE_16.render(families()).caption
     assert len(plotted(FIGURE_16).axes[0].collections) == 1
 
 
 def test_multipliers_beyond_the_axes_are_told():
     results = families()
     branch = next(group for path, group in results["continuation"].groups.items() if path.endswith("branch_0"))
-    assert "outside the axes" not in FIGURE_14.caption(results)
+    assert "outside the axes" not in FIGURE_14.render(results).caption
     branch["multiplier_real"].flags.writeable = True
     branch["multiplier_real"][-1] = -7.25
-    assert "Some multipliers lie outside the axes; the largest magnitude is 7.25." in FIGURE_14.caption(results)
+    assert "Some multipliers lie outside the axes; the largest magnitude is 7.25." in FIGURE_14.render(results).caption
 
 
 def test_gaits_part_from_a_flip_as_the_root_of_the_distance():

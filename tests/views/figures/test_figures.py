@@ -82,7 +82,7 @@ def test_a_walk_without_a_step_has_no_gait_cycle_but_can_be_drawn_in_time():
     results = rigid_alone(simulate=rigid(1, outcome="no-heel-strike", completed=0))
     assert drawable(results) == [7, 9, 10]
     assert why_left_out(results, {})[2] == "simulate: no step was completed"
-    assert NUMBERED[7].caption(results).endswith("The rigid model took 0 steps (no-heel-strike).")
+    assert NUMBERED[7].render(results).caption.endswith("The rigid model took 0 steps (no-heel-strike).")
 
 
 @pytest.mark.filterwarnings("error")
@@ -217,14 +217,14 @@ def test_a_long_walk_shows_five_strides_and_says_so():
     figure = plotted(NUMBERED[7], results)
     (line,) = lines_of(figure.axes[0], RIGID)
     assert line.get_xdata()[-1] == pytest.approx(10 * 0.7)
-    caption = NUMBERED[7].caption(results)
+    caption = NUMBERED[7].render(results).caption
     assert "(the first 5 strides)" in caption
     assert caption.endswith("The rigid model walked 24 steps.")
 
 
 def test_a_fall_is_told():
     results = both_models(**{"contact-sim": contact(3, outcome="fell")})
-    assert "the contact model took 3 steps (fell)" in NUMBERED[7].caption(results)
+    assert "the contact model took 3 steps (fell)" in NUMBERED[7].render(results).caption
 
 
 def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():

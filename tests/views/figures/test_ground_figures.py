@@ -26,7 +26,7 @@ def test_friction_stands_within_the_cone_of_its_coefficients():
     dots = [line for line in cone.lines if line.get_marker() == "."]
     assert {float(x) for line in dots for x in line.get_xdata()} == {WEIGHT}
     assert {float(y) for line in dots for y in line.get_ydata()} == {0.2 * WEIGHT}
-    assert "at most 0.2 of the normal force" in FORCES.caption(both_models())
+    assert "at most 0.2 of the normal force" in FORCES.render(both_models()).caption
 
 
 def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples():
@@ -35,7 +35,7 @@ def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples(
     (damping, friction) = lost.values()
     np.testing.assert_allclose(damping, [0.0, *[1.0] * 9], atol=1e-12)
     np.testing.assert_allclose(friction, 0.1 * damping, atol=1e-12)
-    said = LOST.caption(both_models())
+    said = LOST.render(both_models()).caption
     assert "1.1 J on average: 90.9 % to damping of the ground, 9.09 % to friction" in said
 
 

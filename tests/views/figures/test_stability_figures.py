@@ -53,10 +53,10 @@ def test_a_fixed_step_that_diverges_has_no_error():
 
 
 def test_captions_count_the_cells():
-    said = STICTION.caption(stability_maps())
+    said = STICTION.render(stability_maps()).caption
     assert "walked 3, off-pad 3, budget-exhausted 3 cells" in said
     assert "3 cells have another outcome" in said
-    assert "fine 3, wrong silently 3, diverges 3 cells" in STEP.caption(stability_maps())
+    assert "fine 3, wrong silently 3, diverges 3 cells" in STEP.render(stability_maps()).caption
 
 
 def test_without_maps_they_are_left_out_and_say_so():

@@ -162,7 +162,7 @@ def plotted(folder):
         files = {kind: f"{figure.name}.{kind}" for kind in ("svg", "png")}
         (folder / files["svg"]).write_bytes(drawing.svg)
         (folder / files["png"]).write_bytes(drawing.png)
-        figures.append({"title": drawing.title, "caption": drawing.caption, "alt": figure.alt_text, **files})
+        figures.append({"title": figure.title, "caption": drawing.caption, "alt": figure.alt_text, **files})
     return stored("plot", {}, {"figures": figures})
 
 

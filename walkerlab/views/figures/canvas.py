@@ -155,11 +155,10 @@ def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure's files as bytes, with its title and caption."""
+    """A figure's files as bytes, with its caption."""
 
     svg: bytes
     png: bytes
-    title: str
     caption: str
 
 

@@ -66,10 +66,6 @@ class Illustration:
         """Text alternative of one or two sentences; may be empty."""
         return self.say("seen")
 
-    def caption(self, results: Results) -> str:
-        with styled():
-            return self.say("caption", *self.draw(results)[1])
-
     @property
     def stages(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(need.stage for need in self.needs))
@@ -89,11 +85,11 @@ class Illustration:
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
     def render(self, results: Results) -> Drawing:
-        """Draw the figure and return its files and texts; equal results give equal bytes."""
+        """Draw the figure and return its files and caption; equal results give equal bytes."""
         with styled():
             figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)
-        return Drawing(svg, png, self.title, self.say("caption", *caption_values))
+        return Drawing(svg, png, self.say("caption", *caption_values))
 
     def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
         """Return the figure as a file of the given kind and width (pt); raster parts use `dpi`."""
