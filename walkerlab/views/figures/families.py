@@ -47,10 +47,13 @@ class DrawnBranch:
         return int(self.group.attrs["period"])
 
     @property
+    def is_other(self) -> bool:
+        """Whether the branch is outside the cascade: its period is not a power of two."""
+        return self.period & (self.period - 1) != 0
+
+    @property
     def colour(self) -> str:
-        """Colour of the model, or `OTHER_GAITS` if the period is not a power of two."""
-        period = self.period
-        return MODELS[self.model] if period & (period - 1) == 0 else OTHER_GAITS
+        return OTHER_GAITS if self.is_other else MODELS[self.model]
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
@@ -171,7 +174,7 @@ def draw_branches(results: Results) -> Drawn:
         axes.set_title(title if close else "")
     models = {branch.model: MODELS[branch.model] for branch in branches}
     key: list[Artist] = [entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in models.items()]
-    if any(branch.colour == OTHER_GAITS for branch in branches):
+    if any(branch.is_other for branch in branches):
         key.append(entry("other gaits", color=OTHER_GAITS, linewidth=1.0))
     key.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
     if settled:
@@ -186,13 +189,9 @@ def draw_branches(results: Results) -> Drawn:
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
     """List (parameter value, steps) of gaits born in folds; of gaits whose labels would overlap, only the shortest."""
+    others = [(branch.period, curve_of(branch.group, "step_period")) for branch in branches if branch.is_other]
     folds = [
-        (branch.period, float(curve.value[place]))
-        for branch in branches
-        if branch.colour == OTHER_GAITS
-        for curve in (curve_of(branch.group, "step_period"),)
-        for place, kind in curve.marks
-        if kind == "fold"
+        (period, float(curve.value[place])) for period, curve in others for place, kind in curve.marks if kind == "fold"
     ]
     births: list[tuple[float, int]] = []
     for period, value in sorted(folds):
@@ -260,16 +259,9 @@ def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
     return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
 
 
-GAITS: Final[dict[str, tuple[dict[str, Any], ...]]] = {
-    "rigid": (
-        {"color": BLUE},
-        {"color": GREEN, "linestyle": "--"},
-        {"color": PURPLE, "linestyle": "-."},
-        {"color": BLACK, "linestyle": ":"},
-    ),
-    "contact": ({"color": ORANGE}, {"color": VERMILLION, "linestyle": "--"}, {"color": GREY, "linestyle": "-."}),
-}
-"""Line styles of each model's one-step gaits, in the order in which they were found."""
+GAITS: Final = {"rigid": (BLUE, GREEN, PURPLE, BLACK), "contact": (ORANGE, VERMILLION, GREY)}
+"""Colours of each model's one-step gaits, in the order in which they were found; line styles are those of `DASHES`."""
+DASHES: Final = ("-", "--", "-.", ":")
 DOTS: Final[dict[str, Any]] = {"linestyle": "none", "marker": "o", "markersize": 1.2, "markeredgewidth": 0.0}
 FARTHEST: Final = 1.6
 """Half-width of the visible part of the complex plane; multipliers of unstable gaits may lie far outside."""
@@ -279,24 +271,25 @@ def draw_multipliers(results: Results) -> Drawn:
     """Plot multipliers in the complex plane (left) and their magnitudes over the parameter (right)."""
     (figure, (left, right)), largest = panels(3.6, 1, 2), 0.0
     drawn = [branch for branch in branches_of(results) if branch.period == 1]
-    looks = {model: cycle(looks) for model, looks in GAITS.items()}
+    looks = {model: cycle(zip(colours, DASHES, strict=False)) for model, colours in GAITS.items()}
     key = []
     for branch in drawn:
-        value, multipliers, look = finely(branch.group["value"]), multipliers_of(branch), next(looks[branch.model])
-        left.plot(multipliers.real.ravel(), multipliers.imag.ravel(), color=look["color"], **DOTS)
+        value, multipliers = finely(branch.group["value"]), multipliers_of(branch)
+        colour, dash = next(looks[branch.model])
+        left.plot(multipliers.real.ravel(), multipliers.imag.ravel(), color=colour, **DOTS)
         last = multipliers[int(np.argmax(value))]
-        left.plot(last.real, last.imag, linestyle="none", marker=">", markersize=4, color=look["color"])
-        right.plot(value, np.abs(multipliers), linewidth=1.2, **look)
+        left.plot(last.real, last.imag, linestyle="none", marker=">", markersize=4, color=colour)
+        look: dict[str, Any] = {"color": colour, "linestyle": dash, "linewidth": 1.2}
+        right.plot(value, np.abs(multipliers), **look)
         least, most = np.quantile(branch.group["step_period"], (0.0, 1.0))
-        key.append(entry(f"{branch.model} model, steps of {least:.3g} to {most:.3g} s", linewidth=1.2, **look))
+        key.append(entry(f"{branch.model} model, steps of {least:.3g} to {most:.3g} s", **look))
         largest = max(largest, float(np.abs(multipliers).max()))
     left.add_patch(Circle((0.0, 0.0), 1.0, fill=False, edgecolor=GREY, linewidth=0.8))
     left.set(xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST), aspect="equal")
     left.set(xlabel="real part", ylabel="imaginary part", title="(a) in the complex plane")
     right.axhline(1.0, color=GREY, linewidth=0.8)
-    right.set(
-        xlabel=parameter_of(results), ylabel="magnitude", ylim=(0.0, 2.0 * FARTHEST), title="(b) over the parameter"
-    )
+    right.set(xlabel=parameter_of(results), ylabel="magnitude", title="(b) over the parameter")
+    right.set_ylim(0.0, 2.0 * FARTHEST)
     end = entry("largest parameter value", color=BLACK, linestyle="none", marker=">", markersize=4)
     add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}

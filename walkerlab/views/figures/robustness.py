@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from walkerlab.labels import axis_label
 from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, blank, entry, label_of, panels
-from walkerlab.views.figures.families import MODELS
+from walkerlab.views.figures.families import DASHES, MODELS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.views.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, sticks_of, surrounding
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
@@ -44,7 +44,6 @@ ACTUATIONS: Final = {
 UP: Final = "largest_step.{}.up_m"
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
-DASHES: Final = ("-", "--", "-.", ":")
 BELOW, BESIDE = 1.7, 0.4
 """Mean height of the panels below the walker, and width of the axis labels beside it (in)."""
 
@@ -136,10 +135,8 @@ def on_rough_ground(results: Results) -> Drawn:
     roughest = float(steps["roughness_m"].max())
     models = [str(model) for model in steps["model"]]
     key = [entry(f"{model} model", color=MODELS[model]) for model in models]
-    key += [
-        entry(f"{1e3 * r:g} mm", color=BLACK, linestyle=dash)
-        for r, dash in zip(steps["roughness_m"], cycle(DASHES), strict=False)
-    ]
+    dashed = zip(1e3 * steps["roughness_m"], cycle(DASHES), strict=False)
+    key += [entry(f"{roughness:g} mm", color=BLACK, linestyle=dash) for roughness, dash in dashed]
     add_legend(figure, key)
     return figure, (models, roughest, int(sticks.strikes.size), int(steps["steps"].shape[2]))
 

@@ -33,7 +33,6 @@ EXPORT_DPI: Final = 300
 RC: Final = {
     "axes.formatter.limits": (-4, 5),
     "axes.formatter.useoffset": False,
-    "axes.labelsize": 9.0,
     "axes.linewidth": 0.7,
     "axes.spines.right": False,
     "axes.spines.top": False,
@@ -47,7 +46,6 @@ RC: Final = {
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9.0,
     "legend.borderaxespad": 0.2,
-    "legend.fontsize": 9.0,
     "legend.frameon": False,
     "legend.handlelength": 2.6,
     "lines.dash_capstyle": "butt",
@@ -55,23 +53,21 @@ RC: Final = {
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
     "svg.fonttype": "none",
-    "xtick.labelsize": 9.0,
     "xtick.major.width": 0.7,
-    "ytick.labelsize": 9.0,
     "ytick.major.width": 0.7,
 }
-"""Settings on top of matplotlib's defaults, independent of the user's matplotlibrc; TrueType fonts for journals."""
+"""Settings on top of matplotlib's defaults, independent of the user's matplotlibrc; TrueType fonts for journals.
+
+Labels, ticks and legends have `font.size`, matplotlib's default.
+"""
 NARROW_BELOW: Final = 5.0
 """Figure width (in) below which fonts and legends are smaller."""
 NARROW: Final = {
-    "axes.labelsize": 7.2,
     "axes.titlesize": 7.2,
     "font.size": 7.2,
     "legend.fontsize": 6.5,
     "legend.handlelength": 1.6,
     "legend.columnspacing": 1.0,
-    "xtick.labelsize": 7.2,
-    "ytick.labelsize": 7.2,
 }
 """Further settings for one-column figures; superscripts of 7.2 pt labels are 5 pt high."""
 
