@@ -60,7 +60,7 @@ def test_a_cycle_that_was_not_completed_is_shown_to_its_end():
     at_strikes, between = sticks.postures()
     assert sticks.time[at_strikes].tolist() == pytest.approx([0.0, 0.7])
     assert sticks.time[between].max() == sticks.time[-1]
-    assert "not completed" in FIGURE_2.caption(results)
+    assert "not completed" in FIGURE_2.render(results).caption
 
 
 def test_the_slope_is_told_above_the_torso_which_has_a_name():
@@ -114,8 +114,8 @@ def of(patch, look):
 def test_without_pads_the_ground_is_a_plane_and_the_caption_says_when_it_carries():
     results = both_models(**{"contact-sim": contact(pads=False)})
     assert not [patch for patch in drawn(FIGURE_6, results).patches if patch.get_hatch()]
-    assert "after it has passed the stance foot" in FIGURE_6.caption(results)
-    assert "lane of pads" in FIGURE_6.caption(both_models())
+    assert "after it has passed the stance foot" in FIGURE_6.render(results).caption
+    assert "lane of pads" in FIGURE_6.render(both_models()).caption
 
 
 def coloured(picture, look):
@@ -172,7 +172,7 @@ def test_a_walk_that_falls_in_its_first_step_has_a_film():
 
 def test_a_film_draws_rough_ground_once_more_so_high_that_it_is_seen():
     begins, rough = np.array([-1.0, 0.2, 0.6]), np.array([0.0, 0.002, -0.001])
-    even, uneven = (film_frame(rigid(), ground=(begins, heights)) for heights in (0.0 * rough, rough))
+    even, uneven = (film_frame(rigid(), ground=np.column_stack((begins, heights))) for heights in (0.0 * rough, rough))
     red = np.round(255.0 * np.array(to_rgb(VERMILLION))).astype(np.uint8)
     rows = [np.flatnonzero((picture == red).all(axis=2).any(axis=1)) for picture in (even, uneven)]
     assert rows[0].size == 0

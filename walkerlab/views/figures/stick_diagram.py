@@ -72,7 +72,7 @@ class Sticks:
     knees: Array | None = None  # (samples, leg, 2); None for straight legs
     radius: float = 0.0  # radius of the soles' arcs, m; the feet are their lowest points
     head: Array | None = None  # (samples, 2) centre of mass of the torso; None if there is no torso
-    ground: tuple[Array, Array] | None = None  # ground levels as returned by `ground_levels`; None on even ground
+    ground: Array | None = None  # (points, 2) outline of the ground; None on even ground
     pushes: bool = False  # whether the trailing foot pushes off as the other one lands
     ending: str = ""  # outcome of a walk that failed, such as fell; otherwise empty
 
@@ -125,10 +125,8 @@ class Sticks:
         between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         if strikes.size <= CYCLE:
             between.append(np.linspace(strikes[-1], self.time[-1], BETWEEN + 2)[1:])
-        at_strikes, others = (
-            np.abs(self.time[:, None] - times).argmin(axis=0) for times in (strikes, np.concatenate(between))
-        )
-        return at_strikes, others
+        at_strikes = np.abs(self.time[:, None] - strikes).argmin(axis=0)
+        return at_strikes, np.abs(self.time[:, None] - np.concatenate(between)).argmin(axis=0)
 
 
 def sticks_of(result: Stored, under: str = "") -> Sticks:
@@ -148,14 +146,18 @@ def sticks_of(result: Stored, under: str = "") -> Sticks:
     radius = float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
         radius = 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
-    ground = ground_levels(steps)
+    levels = ground_levels(steps)
     pushes = asked["push_off"]["impulse_N_s"] != 0.0
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
     ending = outcome.label if outcome is not None and outcome.stumbled else ""
     landings = np.append(0.0, steps["touch_along_m"])
-    landings = np.column_stack((landings, np.zeros(landings.size) if ground is None else ground[1]))
+    heights, outline = np.zeros(landings.size), None
+    if levels is not None:
+        begins, heights = levels
+        outline = np.column_stack((np.append(begins, begins[-1] + FAR).repeat(2)[1:-1], heights.repeat(2)))
+    landings = np.column_stack((landings, heights))
     return Sticks(
-        trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radius, head, ground,
+        trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radius, head, outline,
         pushes, ending,
     )  # fmt: skip
 
@@ -201,9 +203,8 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
         if sticks.has_soles:
             axes.plot(*sticks.in_plane(sticks.sole(leg)[rows]).T, **{**style, "linestyle": "-"})
     if sticks.head is not None:
-        axes.plot(
-            *np.stack((hip, sticks.in_plane(sticks.head[rows])), axis=1).T, color=BLACK, linewidth=width, zorder=7
-        )
+        torso = np.stack((hip, sticks.in_plane(sticks.head[rows])), axis=1)
+        axes.plot(*torso.T, color=BLACK, linewidth=width, zorder=7)
     axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
 
 
@@ -233,9 +234,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
     ends = np.array([left, right])
     top = -math.tan(sticks.slope) * ends
     if sticks.ground is not None:
-        begins, heights = sticks.ground
-        edges = np.repeat(np.append(begins, begins[-1] + FAR), 2)[1:-1]
-        ends, top = sticks.in_plane(np.column_stack((edges, np.repeat(heights, 2)))).T
+        ends, top = sticks.in_plane(sticks.ground).T
     axes.plot(ends, top, color=BLACK, linewidth=0.9, zorder=2.5)
     axes.fill_between(ends, top - depth, top, facecolor="white", edgecolor=GREY, hatch="////", linewidth=0.0, zorder=1)
 
@@ -324,28 +323,23 @@ def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> A
 
 def draw_relief(axes: Axes, sticks: Sticks) -> None:
     """Draw the ground profile again below the ground, magnified until visible, and print the factor."""
-    if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[1]).max())):
+    if sticks.ground is None or not (roughest := float(np.abs(sticks.ground[:, 1]).max())):
         return
     room = RELIEF * sticks.leg_length / roughest
     ten = 10.0 ** math.floor(math.log10(room))
     times = ten * next(digit for digit in (5.0, 2.0, 1.0) if digit * ten <= room)
     if times <= 1.0:
         return
-    begins, heights = sticks.ground
-    edges = np.repeat(np.append(begins, begins[-1] + FAR), 2)[1:-1]
-    under = times * np.repeat(heights, 2) - RELIEF_UNDER * sticks.leg_length
-    axes.plot(*sticks.in_plane(np.column_stack((edges, under))).T, color=VERMILLION, linewidth=0.9)
-    axes.text(
-        0.99, 0.97, f"below: ground heights × {times:g}", transform=axes.transAxes, va="top", ha="right",
-        color=VERMILLION,
-    )  # fmt: skip
+    relief = sticks.ground * [1.0, times] - [0.0, RELIEF_UNDER * sticks.leg_length]
+    axes.plot(*sticks.in_plane(relief).T, color=VERMILLION, linewidth=0.9)
+    corner: dict[str, Any] = {"transform": axes.transAxes, "va": "top", "ha": "right"}
+    axes.text(0.99, 0.97, f"below: ground heights × {times:g}", color=VERMILLION, **corner)
 
 
 def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
     """Yield an RGB frame (height, width, 3) for each time `at` (s)."""
-    lines: list[tuple[Array, dict[str, Any]]] = [
-        (sticks.leg(leg), {"color": look.colour, "linestyle": look.style}) for leg, look in enumerate(LEGS)
-    ]
+    looks: list[dict[str, Any]] = [{"color": look.colour, "linestyle": look.style} for look in LEGS]
+    lines = [(sticks.leg(leg), look) for leg, look in enumerate(looks)]
     if sticks.has_soles:
         lines += [(sticks.sole(leg), {"color": look.colour}) for leg, look in enumerate(LEGS)]
     if sticks.head is not None:
@@ -374,9 +368,8 @@ def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[N
             hip.set_data(*places[:1].T)
             leg = sticks.pushing(float(time))
             own = np.split(places, ends)[leg or 0]
-            push.set_data(
-                *np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1]))).T if leg is not None else ([], [])
-            )
+            mark = np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1])))
+            push.set_data(*(([], []) if leg is None else mark.T))
             over = sticks.ending and time >= sticks.time[-1]
             clock.set_text(f"{time:.2f} s: {sticks.ending}" if over else f"{time:.2f} s")
             canvas.draw()  # type: ignore[no-untyped-call]
