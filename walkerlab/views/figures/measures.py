@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
 from walkerlab.views.figures.canvas import blank, files_of, styled
@@ -44,6 +45,10 @@ class Length:
     value: float
     start: Point
     end: Point
+
+    @property
+    def label(self) -> str:
+        return entry(self.key, self.value)
 
 
 @dataclass(frozen=True)
@@ -129,13 +134,12 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     labels, lanes = arrange_labels(leg)
     # text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length
     behind = letters([words for words, *_ in labels])
-    ahead = [letters([entry(dimension.key, dimension.value) for dimension in lane]) for lane in lanes]
+    ahead = [letters([dimension.label for dimension in lane]) for lane in lanes]
     width = (BESIDE + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
     width = max(width, (leg.top + 0.3 * length) * WIDTH / HEIGHT)
     left = -BESIDE * length - LETTER * behind * width
-    heights = spread(
-        [spot[1] for *_, spot in labels], [LINE * width * len(words.split("\n")) for words, *_ in labels], 0.0
-    )
+    sizes = [LINE * width * len(words.split("\n")) for words, *_ in labels]
+    heights = spread([spot[1] for *_, spot in labels], sizes, 0.0)
     bottom, top, ends = -0.16 * length, max(leg.top, *heights) + 0.1 * length, (left, left + width)
     figure = blank(WIDTH * (top - bottom) / width)
     axes = figure.add_subplot()
@@ -177,7 +181,7 @@ def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[
     for dimension in (dimension for dimension in leg.lengths if dimension.value):
         level = dimension.start[1] == dimension.end[1]
         if level or dimension.value <= SMALL_ARC * length:
-            labels.append((entry(dimension.key, dimension.value), VERMILLION if level else BLUE, dimension.end))
+            labels.append((dimension.label, VERMILLION if level else BLUE, dimension.end))
         elif free := [lane for lane in lanes if all(clear(dimension, second, length) for second in lane)]:
             free[0].append(dimension)
         else:
@@ -210,10 +214,14 @@ def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, co
     axes.plot(*np.transpose(line), color=colour, linewidth=2.0, zorder=2)
     axes.plot(*np.transpose(line[:-1]), linestyle="none", marker="o", markersize=6, color=colour, mfc="white", zorder=4)
     across, up = np.subtract(line[-1], line[-2])
-    around = np.arctan2(across, -up) + SOLE_ANGLES
-    axes.plot(centre[0] + radius * np.sin(around), centre[1] - radius * np.cos(around), color=colour, linewidth=2.0)
+    draw_sole(axes, centre, radius, np.arctan2(across, -up) + SOLE_ANGLES, colour)
     if radius == 0.0:  # a point foot, perhaps ahead of the leg's line
         axes.plot(*np.transpose([line[-1], centre]), color=colour, linewidth=2.0, zorder=2)
+
+
+def draw_sole(axes: Axes, centre: Point, radius: float, angles: NDArray[np.float64], colour: str) -> None:
+    x, y = centre
+    axes.plot(x + radius * np.sin(angles), y - radius * np.cos(angles), color=colour, linewidth=2.0)
 
 
 def rotate(angle: float, origin: Point, point: Point, moved_to: Point) -> Point:
@@ -228,8 +236,7 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
         axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
     high, low = measure.start[1], measure.end[1]
     axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
-    words = entry(measure.key, measure.value)
-    axes.text(x + letter, 0.5 * (high + low), words, color=BLUE, fontsize=SMALL, va="center")
+    axes.text(x + letter, 0.5 * (high + low), measure.label, color=BLUE, fontsize=SMALL, va="center")
 
 
 def draw_parts(walker: PartsWalker) -> Figure:
@@ -244,14 +251,8 @@ def draw_parts(walker: PartsWalker) -> Figure:
         bones = [spot for words, _, marker, spot in marks if marker == "o" and not words.startswith("centre_m")]
         for foot in walker.feet:
             if foot.body == body.name:
-                x, y = foot.centre_m
-                bones.append((x, y - foot.radius_m))
-                axes.plot(
-                    x + foot.radius_m * np.sin(SOLE_ANGLES),
-                    y - foot.radius_m * np.cos(SOLE_ANGLES),
-                    color=BLACK,
-                    linewidth=2.0,
-                )
+                bones.append((foot.centre_m[0], foot.centre_m[1] - foot.radius_m))
+                draw_sole(axes, foot.centre_m, foot.radius_m, SOLE_ANGLES, BLACK)
         axes.plot(*np.transpose(bones), color=BLACK, linewidth=2.0, zorder=1)
         points = np.array([*bones, *(spot for *_, spot in marks)])
         (left, low), (_, high) = points.min(axis=0), points.max(axis=0)
@@ -289,9 +290,5 @@ def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[st
             yield words, VERMILLION, "D", particle.at_m
     for foot in walker.feet:
         if foot.body == body:
-            yield (
-                f"foot\ncentre_m: {spot(foot.centre_m)}\n{entry('radius_m', foot.radius_m)}",
-                ORANGE,
-                "s",
-                foot.centre_m,
-            )
+            words = f"foot\ncentre_m: {spot(foot.centre_m)}\n{entry('radius_m', foot.radius_m)}"
+            yield words, ORANGE, "s", foot.centre_m
