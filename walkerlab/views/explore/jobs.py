@@ -32,7 +32,7 @@ class Job:
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
         self._runs = Path()
-        self._lock, self._thread = threading.Lock(), None
+        self._lock = threading.Lock()
         self._told: dict[str, Any] = {"running": False}
 
     def begin(self, kind: object, question: ExploredConfig) -> Answered:

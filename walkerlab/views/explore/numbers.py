@@ -59,9 +59,8 @@ def rank(key: str, first: Any) -> int | None:
     """Return a key's position among those shown initially, or None if it appears in searches only."""
     if (key.startswith(DRIVES) and not first) or key.startswith("walker.knee."):
         return None
-    return next(
-        (place for place, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name))), None
-    )
+    places = (place for place, name in enumerate(FIRST) if key == name or (name[-1] == "." and key.startswith(name)))
+    return next(places, None)
 
 
 def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:

@@ -192,10 +192,8 @@ class Handler(BaseHTTPRequestHandler):
                 html, policy = render_page(self.server.base)
                 return self.send(200, html.encode(), "text/html; charset=utf-8", policy)
             if address.path == "/api/job":
-                desk = self.server.desk
-                return self.answer(
-                    200, {**self.server.job.progress(), "compiling": desk.compiling, "compiled": desk.compiled}
-                )
+                desk, progress = self.server.desk, self.server.job.progress()
+                return self.answer(200, {**progress, "compiling": desk.compiling, "compiled": desk.compiled})
             runs = self.server.base.runs.resolve()
             file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
             if address.path.startswith("/runs/") and file.is_relative_to(runs) and file.is_file():

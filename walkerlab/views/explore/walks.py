@@ -189,6 +189,5 @@ def config_text(question: ExploredConfig, name: str) -> str:
     """
     start, named = config_to_extend(question.config), replace(question, changes={**question.changes, "name": name})
     base, changed = load(Path(start)).config, named.loaded.config
-    return (
-        to_extending_yaml(start, base, changed, name) if base.walker.type == changed.walker.type else to_yaml(changed)
-    )
+    alike = base.walker.type == changed.walker.type
+    return to_extending_yaml(start, base, changed, name) if alike else to_yaml(changed)

@@ -32,10 +32,8 @@ Kind = tuple[str, str, NDArray[np.bool_]]
 
 def discrete(colours: Sequence[str]) -> dict[str, Any]:
     """Return a colour map and norm that assign the colours to the integers 0, 1, ... in order."""
-    return {
-        "cmap": ListedColormap(list(colours)),
-        "norm": BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours)),
-    }
+    number = len(colours)
+    return {"cmap": ListedColormap(list(colours)), "norm": BoundaryNorm(np.arange(number + 1) - 0.5, number)}
 
 
 def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
@@ -131,18 +129,18 @@ def draw_basins(results: Results) -> Drawn:
     plane = [str(name) for name in summary["plane"][:2]]
     xlim, ylim = (sides_of(cells[name]) for name in plane)
     # show the middle plane of a grid over three coordinates
-    shown = {name: cells[name] if cells[name].ndim == 2 else cells[name][:, :, cells[name].shape[2] // 2]
-             for name in ("outcome", "attractor", "steps_to_settle")}  # fmt: skip
+    middle = tuple(size // 2 for size in cells["outcome"].shape[2:])
+    outcome, attractor, to_settle = (cells[name][..., *middle] for name in ("outcome", "attractor", "steps_to_settle"))
 
     def draw(axes: Axes, values: NDArray[Any], **how: Any) -> Any:
         extent = (*xlim, *ylim)
         return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
 
     figure, (left, right) = panels(3.9, 1, 2, sharex=True, sharey=True)
-    key = draw_kinds(partial(draw, left), fates(shown["outcome"], shown["attractor"], summary))
+    key = draw_kinds(partial(draw, left), fates(outcome, attractor, summary))
     left.set_title("(a) outcome")
     # a logarithmic scale has no zero, so walks that are settled from the start get the colour of one step
-    settled = np.ma.masked_where(shown["attractor"] == NO_ATTRACTOR, shown["steps_to_settle"].clip(min=1))
+    settled = np.ma.masked_where(attractor == NO_ATTRACTOR, to_settle.clip(min=1))
     right.set_title("(b) steps to the attractor")
     if settled.count():
         least = float(settled.min())
@@ -178,9 +176,8 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
         for number in range(len(attractors))
     ]
     said = "aperiodic" if summary["aperiodic"] else "walks, not settled"
-    kinds.append(
-        (OUTCOME_TEXTS[Outcome.WALKED].colour, said, (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR))
-    )
+    unsettled = (outcome == Outcome.WALKED) & (attractor == NO_ATTRACTOR)
+    kinds.append((OUTCOME_TEXTS[Outcome.WALKED].colour, said, unsettled))
     failures = [item for item in Outcome if item is not Outcome.WALKED]
     kinds += [(OUTCOME_TEXTS[item].colour, item.label, outcome == item) for item in failures]
     return [kind for kind in kinds if kind[2].any()]

@@ -87,15 +87,11 @@ def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
     return [walk_of(results[stage], look) for stage, look in there]
 
 
-def recorded_look(result: Content) -> Look:
-    """Return the style of a recorded walk, labelled with its name."""
-    return replace(RECORDED, label=str(result.summary["name"]))
-
-
 def walk_of(result: Content, look: Look) -> DrawnWalk:
+    """Return a stored walk in the style of its model; a recorded walk is labelled with its own name."""
     times = touch_times(result.groups.get(STEPS, Group({})))
     recorded = look is RECORDED
-    look = recorded_look(result) if recorded else look
+    look = replace(RECORDED, label=str(result.summary["name"])) if recorded else look
     return DrawnWalk(look, str(result.summary["outcome"]), times.size, times, result[TRAJECTORY], recorded=recorded)
 
 

@@ -77,9 +77,8 @@ def walk_row(title: str, key: str, digits: int = 4) -> Column:
 
 def energy_lost(dissipated: Mapping[str, float]) -> str:
     """List a walk's energy losses by cause; empty if nothing was lost."""
-    return join_words(
-        f"{quantity(lost, 'J', 3)} {CHANNELS.get(name, name)}" for name, lost in dissipated.items() if lost
-    )
+    losses = {name: quantity(lost, "J", 3) for name, lost in dissipated.items() if lost}
+    return join_words(f"{lost} {CHANNELS.get(name, name)}" for name, lost in losses.items())
 
 
 STEP_HEADS = {"step_periods_s": "period (s)", "step_lengths_m": "length (m)", "slips_m": "slip (mm)"}
@@ -144,11 +143,8 @@ def tune(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections import adjustment
 
     gait = summary["gait"]
-    own = (
-        side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
-        if gait["found"]
-        else f"No own gait: {gait['reason']}."
-    )
+    missing = "" if gait["found"] else f"No own gait: {gait['reason']}."
+    own = missing or side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
     sentences = (*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]))
     return [*sentences, own, adjustment.margins_table(summary)]
 

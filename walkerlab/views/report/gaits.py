@@ -20,14 +20,12 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
     """Tabulate fixed points (coordinates `names`) and multipliers, with a column for each set of equations."""
     six = partial(fixed, decimals=6)
     multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
+    titles = [in_signs(f"{'' if place else 'multipliers '}lambda_{place + 1}") for place in multipliers]
     lines = [
         *(Column(coordinate(name), partial(state_at, place), six) for place, name in enumerate(names)),
         measured("step period T", "period_s", six),
         measured("step length S", "step_length_m", six),
-        *(
-            Column(in_signs(f"{'' if place else 'multipliers '}lambda_{place + 1}"), partial(multiplier, place))
-            for place in multipliers
-        ),
+        *(Column(title, partial(multiplier, place)) for place, title in enumerate(titles)),
         Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
         Column("stable", "stable"),
         *works(partial(number, digits=4)),

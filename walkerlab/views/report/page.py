@@ -67,12 +67,9 @@ def environment(run: str = "") -> Environment:
 
 def to_markup(text: str) -> Markup:
     """Convert a text to markup, with backticks as code elements and powers of ten in a single notation."""
-    parts = CODE_SPAN.split(text)
-    markup_parts = [
-        Markup("<code>%s</code>") % part if index % 2 else escape(CARET.sub(to_superscript, POWER.sub(power, part)))
-        for index, part in enumerate(parts)
-    ]
-    return Markup("").join(markup_parts)
+    parts = [escape(CARET.sub(to_superscript, POWER.sub(power, part))) for part in CODE_SPAN.split(text)]
+    parts[1::2] = [Markup("<code>%s</code>") % code for code in CODE_SPAN.findall(text)]
+    return Markup("").join(parts)
 
 
 def source(name: str) -> str:

@@ -21,16 +21,12 @@ def section(results: Results, summary: Row) -> Section | None:
     concluded = tuple(Statement(scene, text[:1].upper() + text[1:]) for scene, text in conclusions.items())
     references = [{"scene": scene, **entry} for scene, entry in summary["reference"].items()]
     nearest = {scene: run for scene in summary["reference"] if (run := nearest_library(summary, scene))}
+    origins = words("accuracy.references", list(summary["reference"].items()), nearest)
     blocks: tuple[PageBlock, ...] = (
         Paragraph(words("accuracy.introduction", summary)),
         Statements(concluded),
         costs(summary),
-        table(
-            "References",
-            REFERENCE_COLUMNS,
-            references,
-            note=words("accuracy.references", list(summary["reference"].items()), nearest),
-        ),
+        table("References", REFERENCE_COLUMNS, references, note=origins),
         *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("accuracy")),
         not_run(summary),
     )
@@ -62,18 +58,14 @@ def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[R
         ended = [run for run in runs if run["error"] is not None]
         exact: Row = min(ended, key=lambda run: float(run["error"]), default={})
         error = exact.get("error")
+        within = {level: [run for run in ended if run["error"] <= level] for level in levels}
         failed = [f"{failure_text(run)} at {power_of_ten(run['tolerance'], 1)}" for run in runs if run["error"] is None]
         yield {
             "method": Cell(method, "good" if method in best else None),
             "smallest_error": number(error, 2) if error is None or error > bound else f"≤ {number(bound, 2)}",
             "rhs_evaluations": exact.get("rhs_evaluations"),
             "failures": join_words(failed),
-            **{
-                f"{level}": min(
-                    (run for run in ended if run["error"] <= level), key=lambda run: run["wall_s"], default=None
-                )
-                for level in levels
-            },
+            **{f"{level}": min(fine, key=lambda run: run["wall_s"], default=None) for level, fine in within.items()},
         }
 
 

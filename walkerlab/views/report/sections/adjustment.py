@@ -59,10 +59,9 @@ def starts_table(results: Results, summary: Summary) -> Table:
         note = "The paper's percentages are relative to the ADAMS value, which it does not state."
     named = in_signs if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
-    value_columns = (
-        Column(title, key, partial(number, digits=3 if "percent" in key else 6), numeric=True)
-        for key, title in words.terms("adjustment.starts", results.claims).items()
-    )
+    titles = words.terms("adjustment.starts", results.claims).items()
+    digits = {key: 3 if "percent" in key else 6 for key, _ in titles}
+    value_columns = (Column(title, key, partial(number, digits=digits[key]), numeric=True) for key, title in titles)
     return table(caption, (first, *value_columns), rows, note=note)
 
 
@@ -83,9 +82,8 @@ def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
 
 def factors(multipliers: Sequence[tuple[float, float]]) -> str:
     """Format multipliers, with ± for a conjugate pair."""
-    return join_words(
-        fixed(real, 4) + (f" ± {fixed(imag, 4)}i" if imag > 1e-9 else "") for real, imag in multipliers if imag >= 0.0
-    )
+    pairs = ((fixed(real, 4), imag) for real, imag in multipliers if imag >= 0.0)
+    return join_words(f"{real} ± {fixed(imag, 4)}i" if imag > 1e-9 else real for real, imag in pairs)
 
 
 GAIT_LINES = (
@@ -106,9 +104,7 @@ GAIT_LINES = (
 def gait_table(summary: Summary, rigid: Summary) -> Table:
     gait = summary["gait"]
     note = f"Section of the contact gait: {gait['section']}."
-    losses = {
-        channel: Cell(label) for channel, (_, label) in LOSS_HEADS.items() if lost_energy(channel, gait) is not None
-    }
+    losses = {key: Cell(label) for key, (_, label) in LOSS_HEADS.items() if lost_energy(key, gait) is not None}
     rigid_column = {**rigid, "slip_m": Cell("none"), "lost_J": losses}
     gaits = {"contact model": gait, "rigid model": rigid_column}
     return side_by_side("The contact model's own gait", GAIT_LINES, gaits, note=note)

@@ -40,10 +40,7 @@ def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[
         Column("stable", "stable"),
         Column("remark", lambda gait: "chosen" if gait["chosen"] else gait["objection"]),
     )
-    gaits = {
-        "" if list(sets) == ["corrected"] else SETS[name]: [
-            {**gait, "gait": place} for place, gait in enumerate(selected, 1)
-        ]
-        for name, selected in sets.items()
-    }
+    alone = list(sets) == ["corrected"]
+    numbered = {name: [{**gait, "gait": place} for place, gait in enumerate(found, 1)] for name, found in sets.items()}
+    gaits = {"" if alone else SETS[name]: found for name, found in numbered.items()}
     return table("All one-step gaits found", columns, gaits)

@@ -138,9 +138,8 @@ def ground(results: Results) -> tuple[tuple[float, float], ...]:
         steps = results.group(stage, "steps")
         levels = None if steps is None else ground_levels(steps)
         if levels is not None:
-            return tuple(
-                (round(float(begin), 4), round(float(height), 6)) for begin, height in zip(*levels, strict=True)
-            )
+            begins, heights = (values.tolist() for values in levels)
+            return tuple((round(x, 4), round(height, 6)) for x, height in zip(begins, heights, strict=True))
     return ()
 
 

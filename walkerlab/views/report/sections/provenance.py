@@ -24,11 +24,13 @@ def section(results: Results) -> Section | None:
     return Section.of("provenance", "Provenance", blocks, finding)
 
 
+def to_the_second(time_utc: str) -> str:
+    return time_utc.partition(".")[0].replace("T", " ")
+
+
 RESULT_COLUMNS = (
     Column("result", lambda result: result.identity.stage),
-    Column(
-        "started (UTC)", lambda result: result.provenance.started_utc.partition(".")[0].replace("T", " "), numeric=True
-    ),
+    Column("started (UTC)", lambda result: to_the_second(result.provenance.started_utc), numeric=True),
     Column("run time (s)", lambda result: f"{result.provenance.took_s:.2f}", numeric=True),
     Column("seed", lambda result: result.provenance.seed, numeric=True),
     Column("complete", lambda result: result.complete),

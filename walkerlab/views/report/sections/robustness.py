@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.views.report.blocks import Paragraph, Section
 from walkerlab.views.report.numbers import length, number, whole
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
@@ -67,8 +67,7 @@ def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
 @stage_section("robustness", "gaits")
 def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *rest = findings(summary) or [""]
-    blocks: tuple[PageBlock, ...] = (Paragraph(" ".join(rest)), *tables(summary))
-    return Section.of("robustness", "Robustness of the gait", blocks, first)
+    return Section.of("robustness", "Robustness of the gait", (Paragraph(" ".join(rest)), *tables(summary)), first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:

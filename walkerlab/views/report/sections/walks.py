@@ -57,9 +57,8 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
         "solver work": whole(get("rhs_evaluations")),
     }
     meanings = words.terms("walks.meanings", summary)
-    return [
-        (name, value, meanings.get(name, meanings["energy lost"])) for name, value in values.items() if value != NONE
-    ]
+    known = {name: value for name, value in values.items() if value != NONE}
+    return [(name, value, meanings.get(name, meanings["energy lost"])) for name, value in known.items()]
 
 
 def joules(value: float, digits: int = 4) -> str:
@@ -124,9 +123,8 @@ def steps(results: Results) -> Section | None:
     series = {(stage, key): values for stage, key in SERIES if (values := results.summary(stage).get(key))}
     if not series:
         return None
-    written = [
-        [format_step(value, key, results.summary(stage)) for value in values] for (stage, key), values in series.items()
-    ]
+    every = ((results.summary(stage), key, values) for (stage, key), values in series.items())
+    written = [[format_step(value, key, summary) for value in values] for summary, key, values in every]
     taken = [(place, *step) for place, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
     hidden = len(taken) - HEAD_STEPS - TAIL_STEPS
     rows = taken if hidden <= 0 else [*taken[:HEAD_STEPS], *taken[-TAIL_STEPS:]]
@@ -134,10 +132,8 @@ def steps(results: Results) -> Section | None:
     note = words("walks.steps", HEAD_STEPS, hidden)
     models = {stage: model.lower() for stage, model in MODEL_NAMES.items()}
     errors = {models[stage]: error for stage in models if (error := results.summary(stage).get("numerical_error"))}
-    blocks = (
-        table("Periods and lengths of the steps", columns, rows, note=note),
-        Paragraph(words("error.of_models", errors) if errors else ""),
-    )
+    listed = table("Periods and lengths of the steps", columns, rows, note=note)
+    blocks = (listed, Paragraph(words("error.of_models", errors) if errors else ""))
     periods = {models[stage]: values for (stage, key), values in series.items() if key == "step_periods_s"}
     return Section.of("steps", "Step by step", blocks, words("walks.periods", periods))
 
