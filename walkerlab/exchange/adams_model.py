@@ -7,13 +7,16 @@ Expressions name markers and variables in braces, as in DX({leg_1.foot}); each f
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.exported import Exported, finite
 from walkerlab.physics.ground.friction import Coulomb, Frictionless
 from walkerlab.physics.ground.normal_force import NormalLaw
 from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.walkers import TORSO
 
 MM = 1000.0
@@ -23,6 +26,12 @@ FREE_LENGTH_MM = 100.0
 PAD_MM = 50.0
 """Thickness of the pads."""
 LEGS = ("leg_1", "leg_2")
+FRICTION_NAMES = ("mu_static", "mu_dynamic", "stiction_transition_velocity", "friction_transition_velocity")
+"""ADAMS's names for the parameters of `Coulomb`, in its order."""
+REFERENCE = re.compile(r"\{([\w.]+)\}")
+"""Name of a marker or variable in an expression."""
+OUTPUT_S = 1e-3
+"""Time between the outputs of a simulation."""
 Place = tuple[float, float, float]
 
 
@@ -72,8 +81,8 @@ class AdamsContact:
 
     foot: str
     pads: tuple[str, ...]
-    normal: NormalLaw  # stiffness in N/mm^e, damping in N s/mm, penetration in mm
-    friction: Coulomb | None  # velocities in mm/s; None if there is no friction
+    normal: dict[str, float]  # parameters of the normal force by ADAMS's names, in N, mm, s
+    friction: dict[str, float]  # parameters of the friction, in mm/s; empty if there is no friction
 
 
 @dataclass(frozen=True)
@@ -105,7 +114,7 @@ class AdamsModel:
     parts: dict[str, Part] = field(default_factory=dict)
     markers: dict[str, Marker] = field(default_factory=dict)
     joints: dict[str, Joint] = field(default_factory=dict)
-    couplers: dict[str, tuple[tuple[str, float], ...]] = field(default_factory=dict)
+    couplers: dict[str, dict[str, float]] = field(default_factory=dict)  # weight of each joint
     shapes: dict[str, Shape] = field(default_factory=dict)
     outlines: dict[str, tuple[str, ...]] = field(default_factory=dict)
     contacts: dict[str, AdamsContact] = field(default_factory=dict)
@@ -140,69 +149,73 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
     return model
 
 
+def values(*numbers: float) -> str:
+    return ", ".join(finite(number) for number in numbers)
+
+
+class Frame(NamedTuple):
+    """Motion of a frame that is fixed to a body, in SI units or in mm."""
+
+    place: Position
+    angle: float
+    velocity: Position
+    spin: float
+
+    def moved_to(self, point: Position) -> Frame:
+        """Return the parallel frame at a point of this one."""
+        s, c = math.sin(self.angle), math.cos(self.angle)
+        x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]
+        velocity = self.velocity[0] - self.spin * y, self.velocity[1] + self.spin * x
+        return Frame((self.place[0] + x, self.place[1] + y), self.angle, velocity, self.spin)
+
+
+def marker_at(part: str, point_m: Position, across_m: float = 0.0) -> Marker:
+    """Return a marker at a point of a part, `across_m` beside the plane of the walk."""
+    return Marker(part, (MM * point_m[0], MM * point_m[1], MM * across_m))
+
+
 def add_bodies(model: AdamsModel, export: Exported) -> None:
     """Add parts, markers, hinges, feet and couplers; a planar joint keeps the base in the plane of the walk."""
     planar, names = export.model, export.names
-    q, v = export.start
-    places: list[tuple[float, float]] = []  # origins of the links' frames (m)
-    angles: list[float] = []
-    spins: list[float] = []
-    motions: list[tuple[float, float]] = []
+    q, v = ([float(value) for value in values] for values in export.start)
+    frames: list[Frame] = []
     for k, (name, link) in enumerate(zip(names, planar.links, strict=True)):
-        spin = float(v[2 + k])
-        if link.parent < 0:
-            angle, hinge, motion = float(q[2]), (float(q[0]), float(q[1])), (float(v[0]), float(v[1]))
-        else:
-            up = link.parent
-            angle, spin = angles[up] + float(q[2 + k]), spins[up] + spin
-            hinge, motion = carried(places[up], angles[up], motions[up], spins[up], link.parent_point_m)
-        back = (-link.point_m[0], -link.point_m[1])
-        place, motion = carried(hinge, angle, motion, spin, back)
-        places.append(place)
-        angles.append(angle)
-        spins.append(spin)
-        motions.append(motion)
-        _, centre_motion = carried(place, angle, motion, spin, link.centre_m)
-        markers = {"cm": link.centre_m, "hinge": link.point_m}
-        model.markers |= {f"{name}.{point}": Marker(name, (MM * x, MM * y, 0.0)) for point, (x, y) in markers.items()}
-        centre, inertia = f"{name}.cm", link.inertia_kg_m2 * MM**2
-        velocity = MM * centre_motion[0], MM * centre_motion[1]
-        model.parts[name] = Part((MM * place[0], MM * place[1]), angle, velocity, spin, link.mass_kg, centre, inertia)
+        hinge = Frame((q[0], q[1]), q[2], (v[0], v[1]), v[2])
+        if link.parent >= 0:
+            held = frames[link.parent].moved_to(link.parent_point_m)
+            hinge = held._replace(angle=held.angle + q[2 + k], spin=held.spin + v[2 + k])
+        frame = hinge.moved_to((-link.point_m[0], -link.point_m[1]))
+        frames.append(frame)
+        x, y = frame.place
+        vx, vy = frame.moved_to(link.centre_m).velocity
+        model.markers |= {f"{name}.cm": marker_at(name, link.centre_m), f"{name}.hinge": marker_at(name, link.point_m)}
+        model.parts[name] = Part(
+            (MM * x, MM * y), frame.angle, (MM * vx, MM * vy), frame.spin, link.mass_kg, f"{name}.cm",
+            link.inertia_kg_m2 * MM**2,
+        )  # fmt: skip
         if link.parent < 0:
             model.joints["plane_of_walk"] = Joint("PLANAR", f"{name}.hinge", ORIGIN)
         else:
             on_parent = f"{names[link.parent]}.hinge_of_{name}"
-            x, y = link.parent_point_m
-            model.markers[on_parent] = Marker(names[link.parent], (MM * x, MM * y, 0.0))
+            model.markers[on_parent] = marker_at(names[link.parent], link.parent_point_m)
             model.joints[f"hinge_of_{name}"] = Joint("REVOLUTE", f"{name}.hinge", on_parent)
     for number, coupling in enumerate(export.couplings):
-        weights = zip((f"hinge_of_{names[link]}" for link in coupling.links), coupling.weights, strict=True)
-        model.couplers[f"coupler_{number + 1}"] = tuple(weights)
+        weights = {f"hinge_of_{names[link]}": weight for link, weight in coupling.items()}
+        model.couplers[f"coupler_{number + 1}"] = weights
     for foot, ball in enumerate(planar.balls):
         # parts turn only about the normal of the plane, so a ball stays at its distance from the plane, in its lane
-        x, y = ball.centre_m
         name = names[ball.link]
-        model.markers[f"{name}.foot"] = Marker(name, (MM * x, MM * y, 0.0))
-        lane = f"{name}.ball"
-        model.markers[lane] = Marker(name, (MM * x, MM * y, MM * export.lane_across_m(foot)))
+        model.markers[f"{name}.foot"] = marker_at(name, ball.centre_m)
+        model.markers[f"{name}.ball"] = marker_at(name, ball.centre_m, export.lane_across_m(foot))
         diameter = 2.0 * MM * ball.radius_m
-        model.shapes[f"ball_{foot + 1}"] = Shape("ELLIPSOID", lane, (diameter, diameter, diameter))
+        model.shapes[f"ball_{foot + 1}"] = Shape("ELLIPSOID", f"{name}.ball", (diameter, diameter, diameter))
         model.outlines[f"line_{foot + 1}"] = (f"{name}.hinge", f"{name}.foot")
     if export.pinned:
-        held = foot_marker(export, STANCE_FOOT)
-        part, (x, y, _) = model.parts[part_of_foot(export, STANCE_FOOT)], model.markers[held].place
-        place, _ = carried(part.place, part.angle, (0.0, 0.0), 0.0, (x, y))
+        foot_on_ground = FootTerms(export, STANCE_FOOT)
+        part, (x, y, _) = model.parts[foot_on_ground.part], model.markers[foot_on_ground.marker].place
+        place = Frame(part.place, part.angle, part.velocity, part.spin).moved_to((x, y)).place
         model.markers[f"{GROUND}.pin"] = Marker(GROUND, (*place, 0.0))
-        model.joints["pin"] = Joint("INLINE", held, f"{GROUND}.pin")
-
-
-def carried(
-    place: tuple[float, float], angle: float, motion: tuple[float, float], spin: float, point: tuple[float, float]
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return position and velocity of a point of a body; `place` and `motion` are those of the body's origin."""
-    s, c = math.sin(angle), math.cos(angle)
-    x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]
-    return (place[0] + x, place[1] + y), (motion[0] - spin * y, motion[1] + spin * x)
+        model.joints["pin"] = Joint("INLINE", foot_on_ground.marker, f"{GROUND}.pin")
 
 
 @dataclass(frozen=True)
@@ -213,27 +226,26 @@ class FootTerms:
     foot: int
 
     @property
+    def part(self) -> str:
+        return self.export.names[self.export.model.balls[self.foot].link]
+
+    @property
     def marker(self) -> str:
-        return foot_marker(self.export, self.foot)
+        return f"{self.part}.foot"
 
     @property
     def radius(self) -> float:
         """Radius of the foot (mm)."""
         return MM * float(self.export.scene.ours.whole.radius[self.foot])
 
-    def place_over(self, base: str) -> str:
+    def place(self, base: str = ORIGIN) -> str:
         """Arguments for functions that measure the foot's position relative to the marker `base`."""
         return f"{{{self.marker}}},{{{base}}},{{{ORIGIN}}}"
 
     @property
-    def place(self) -> str:
-        """Arguments for functions that measure the foot's position relative to the ground's origin."""
-        return self.place_over(ORIGIN)
-
-    @property
     def motion(self) -> str:
         """Arguments for functions that measure the foot's velocity relative to the ground."""
-        return f"{self.place},{{{ORIGIN}}}"
+        return f"{self.place()},{{{ORIGIN}}}"
 
     @property
     def slip(self) -> str:
@@ -243,7 +255,7 @@ class FootTerms:
 
     @property
     def height(self) -> str:
-        return f"DY({self.place})-{finite(self.radius)}" if self.radius else f"DY({self.place})"
+        return f"DY({self.place()})-{finite(self.radius)}" if self.radius else f"DY({self.place()})"
 
     def where_carried(self, expression: str) -> str:
         """Restrict an expression to the pads of the foot's lane; it is zero over the gaps between them."""
@@ -251,15 +263,7 @@ class FootTerms:
         if not terrain.has_pads:
             return expression
         pitch, lane = MM * terrain.pitch, round(terrain.lanes[self.foot] / terrain.pitch)
-        return f"IF({'-' if lane % 2 else ''}COS(PI*DX({self.place})/{finite(pitch)}):0,0,{expression})"
-
-
-def part_of_foot(export: Exported, foot: int) -> str:
-    return export.names[export.model.balls[foot].link]
-
-
-def foot_marker(export: Exported, foot: int) -> str:
-    return f"{part_of_foot(export, foot)}.foot"
+        return f"IF({'-' if lane % 2 else ''}COS(PI*DX({self.place()})/{finite(pitch)}):0,0,{expression})"
 
 
 def add_ground(model: AdamsModel, export: Exported) -> None:
@@ -305,9 +309,12 @@ def add_contacts(model: AdamsModel, export: Exported) -> None:
             "ADAMS's contact needs static friction above dynamic friction, and both above 0.",
             instead.format(f"contact.dynamic_friction={finite(0.9 * friction.static)}"),
         )
+    full = normal.full_damping_penetration
+    law = {"stiffness": normal.stiffness, "damping": normal.damping, "dmax": full, "exponent": normal.exponent}
+    sliding = {} if friction is None else dict(zip(FRICTION_NAMES, friction, strict=True))
     for foot in range(2):
         pads = tuple(f"pad_{number + 1}" for number, pad in enumerate(export.pads) if pad.foot == foot)
-        model.contacts[f"contact_{foot + 1}"] = AdamsContact(f"ball_{foot + 1}", pads, normal, friction)
+        model.contacts[f"contact_{foot + 1}"] = AdamsContact(f"ball_{foot + 1}", pads, law, sliding)
 
 
 def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
@@ -320,19 +327,17 @@ def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
     model.markers[BELOW] = Marker(GROUND, (0.0, -FREE_LENGTH_MM, 0.0))
     for number, leg in enumerate(LEGS):
         foot = FootTerms(export, number)
-        place = (foot.place, foot.radius) if foot.radius else (foot.place_over(BELOW), FREE_LENGTH_MM)
-        numbers = ",".join(finite(value) for value in (place[1], *normal))
+        place, length = (foot.place(), foot.radius) if foot.radius else (foot.place(BELOW), FREE_LENGTH_MM)
+        numbers = ",".join(finite(value) for value in (length, *normal))
         model.variables[f"{leg}_slip"] = foot.slip
-        model.variables[f"{leg}_normal"] = foot.where_carried(f"IMPACT(DY({place[0]}),VY({foot.motion}),{numbers})")
+        model.variables[f"{leg}_normal"] = foot.where_carried(f"IMPACT(DY({place}),VY({foot.motion}),{numbers})")
         model.variables[f"{leg}_friction"] = "0" if friction is None else friction_function(leg, friction)
 
 
 def friction_function(leg: str, law: Coulomb) -> str:
     """Return the expression for the friction force on a leg's foot, a function of the foot's slip and normal force."""
     slip, normal = f"VARVAL({{{leg}_slip}})", f"VARVAL({{{leg}_normal}})"
-    mu, less, v, w = (
-        finite(value) for value in (law.static, law.dynamic, law.stiction_velocity, law.friction_velocity)
-    )
+    mu, less, v, w = map(finite, law)
     rise = f"STEP({slip},-{v},-{mu},{v},{mu})"
     return f"-{normal}*({rise}+SIGN(1,{slip})*(STEP(ABS({slip}),{v},{mu},{w},{less})-{mu}))"
 
@@ -342,48 +347,39 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
     impulse, duration = export.config.push_off.impulse_N_s, export.config.push_off.duration_s
     if impulse == 0.0:
         return
-    hip = f"{part_of_base(export)}.hinge"
-    for foot, leg in enumerate(LEGS):
+    for number, leg in enumerate(LEGS):
+        foot = FootTerms(export, number)
         # leg_1 touches down first, so leg_2 is the first to trail
-        times = export.touches_s[1 - foot :: 2]
-        pulses = []
-        for number, time in enumerate(times):
+        pulses = [f"{leg}_pulse_{pulse + 1}" for pulse in range(len(export.touches_s[1 - number :: 2]))]
+        for pulse, time in zip(pulses, export.touches_s[1 - number :: 2], strict=True):
             begin, end = finite(time), finite(time + duration)
             share = f"(TIME-{begin})*({end}-TIME)/{finite(duration**2)}"
-            pulse = f"{leg}_pulse_{number + 1}"
             force = finite(30.0 * impulse / duration)
             model.variables[pulse] = f"IF(TIME-{begin}:0,0,IF({end}-TIME:0,0,{force}*({share})**2))"
-            pulses.append(f"VARVAL({{{pulse}}})")
-        marker = f"{{{hip}}},{{{foot_marker(export, foot)}}},{{{ORIGIN}}}"
-        radius = float(export.scene.ours.whole.radius[foot])
-        up = f"DY({marker})+{finite(MM * radius)}" if radius else f"DY({marker})"
-        model.variables[f"{leg}_pulses"] = "+".join(pulses) or "0"
+        marker = f"{{{export.names[0]}.hinge}},{{{foot.marker}}},{{{ORIGIN}}}"
+        up = f"DY({marker})+{finite(foot.radius)}" if foot.radius else f"DY({marker})"
+        model.variables[f"{leg}_pulses"] = "+".join(f"VARVAL({{{pulse}}})" for pulse in pulses) or "0"
         model.variables[f"{leg}_line"] = f"SQRT(DX({marker})**2+({up})**2)"
         line = f"VARVAL({{{leg}_pulses}})/VARVAL({{{leg}_line}})"
         model.variables[f"{leg}_push_x"] = f"{line}*DX({marker})"
         model.variables[f"{leg}_push_y"] = f"{line}*({up})"
 
 
-def part_of_base(export: Exported) -> str:
-    """Return the part at the root of the tree: the first stance leg, whose hinge is at the hip."""
-    return export.names[0]
-
-
 def add_forces(model: AdamsModel, export: Exported) -> None:
     """Add the ground and push-off forces on each foot."""
-    for foot, leg in enumerate(LEGS):
+    for number, leg in enumerate(LEGS):
+        foot = FootTerms(export, number)
         x, y = (
             [f"VARVAL({{{leg}_{kind}}})" for kind in kinds if f"{leg}_{kind}" in model.variables]
             for kinds in (("friction", "push_x"), ("normal", "push_y"))
         )
         if not x:
             continue
-        radius = MM * float(export.scene.ours.whole.radius[foot])
-        reaction = f"{GROUND}.reaction_{foot + 1}"
+        reaction = f"{GROUND}.reaction_{number + 1}"
         model.markers[reaction] = Marker(GROUND, floating=True)
         along = "+".join(x)
-        torque = f"{finite(radius)}*({along})" if radius else "0"
-        model.forces[f"force_{foot + 1}"] = Force(foot_marker(export, foot), reaction, along, "+".join(y), torque)
+        torque = f"{finite(foot.radius)}*({along})" if foot.radius else "0"
+        model.forces[f"force_{number + 1}"] = Force(foot.marker, reaction, along, "+".join(y), torque)
 
 
 def add_hip(model: AdamsModel, export: Exported) -> None:
@@ -420,14 +416,14 @@ def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
         model.requests[leg] = {
             "angle": f"AZ({{{part}.hinge}},{{{ORIGIN}}}){tilt}",
             "velocity": f"WZ({{{part}.hinge}},{{{ORIGIN}}})",
-            "foot_along": f"DX({terms.place})",
+            "foot_along": f"DX({terms.place()})",
             "foot_height": terms.height,
             "normal_force": normal,
             "friction_force": friction,
             "penetration": terms.where_carried(f"MAX(0,-({terms.height}))"),
             "slip_velocity": terms.slip,
         }
-    hip = f"{{{part_of_base(export)}.hinge}}"
+    hip = f"{{{export.names[0]}.hinge}}"
     walker = {"hip_along": f"DX({hip})", "hip_height": f"DY({hip})"}
     if TORSO in model.parts:
         walker["torso_angle"] = f"AZ({{{TORSO}.hinge}},{{{ORIGIN}}}){tilt}"

@@ -6,14 +6,11 @@ all functions, because a function may refer to any object.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator
 
-from walkerlab.exchange.adams_model import GROUND, AdamsModel
+from walkerlab.exchange.adams_model import GROUND, ORIGIN, OUTPUT_S, REFERENCE, AdamsModel, values
 from walkerlab.exchange.exported import finite
 
-REFERENCE = re.compile(r"\{([\w.]+)\}")
-OUTPUT_S = 1e-3
 Naming = Callable[[str], str]
 
 
@@ -35,10 +32,6 @@ def command(words: str, **arguments: str) -> list[str]:
 
 def quoted(text: str) -> str:
     return f'"{text}"'
-
-
-def listed(*numbers: float) -> str:
-    return ", ".join(finite(number) for number in numbers)
 
 
 def building(model: AdamsModel) -> Iterator[list[str]]:
@@ -63,15 +56,15 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
     for name, weights in model.couplers.items():
         yield command(
             "constraint create complex_joint coupler", coupler_name=full(name),
-            joint_name=", ".join(full(joint) for joint, _ in weights), type_of_freedom="_".join("rot" for _ in weights),
-            motion_multipliers=listed(*(weight for _, weight in weights)),
+            joint_name=", ".join(map(full, weights)), type_of_freedom="_".join("rot" for _ in weights),
+            motion_multipliers=values(*weights.values()),
         )  # fmt: skip
     yield from contacts(model, full)
     for name, force in model.forces.items():
         empty = {f"{axis}_{kind}_function": quoted("") for kind in ("force", "torque") for axis in "xyz"}
         yield command(
             "force create direct general_force", general_force_name=full(name), i_marker_name=full(force.i),
-            j_floating_marker_name=full(force.reaction), ref_marker_name=full("ground.origin"), **empty,
+            j_floating_marker_name=full(force.reaction), ref_marker_name=full(ORIGIN), **empty,
         )  # fmt: skip
     for name, torque in model.torques.items():
         yield command(
@@ -109,14 +102,14 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
         if part is not None:
             yield command(
                 "part create rigid_body name_and_position", part_name=full(name), adams_id=str(number),
-                location=listed(*part.place, 0.0), orientation=turned(part.angle),
+                location=values(*part.place, 0.0), orientation=turned(part.angle),
             )  # fmt: skip
         yield command("defaults coordinate_system", default_coordinate_system=full(name))
         for marker_name, marker in model.markers.items():
             if marker.part == name and marker.floating:
                 yield command("floating_marker create", floating_marker_name=full(marker_name))
             elif marker.part == name:
-                place = {"location": listed(*marker.place), "orientation": turned(0.0)}
+                place = {"location": values(*marker.place), "orientation": turned(0.0)}
                 yield command("marker create", marker_name=full(marker_name), **place)
         if part is not None:
             moments = dict.fromkeys(("ixx", "iyy", "izz"), finite(part.inertia))
@@ -150,20 +143,12 @@ def turned(angle: float) -> str:
 def contacts(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
     for name, contact in model.contacts.items():
         shapes = [full(model.shape_name(shape)) for shape in (contact.foot, *contact.pads)]
-        normal, friction = contact.normal, contact.friction
-        slides = {"coulomb_friction": "off"}
-        if friction is not None:
-            slides = {
-                "coulomb_friction": "on",
-                "mu_static": finite(friction.static),
-                "mu_dynamic": finite(friction.dynamic),
-                "stiction_transition_velocity": finite(friction.stiction_velocity),
-                "friction_transition_velocity": finite(friction.friction_velocity),
-            }
+        normal, friction = (
+            {name: finite(value) for name, value in law.items()} for law in (contact.normal, contact.friction)
+        )
         yield command(
             "contact create", contact_name=full(name), type="solid_to_solid", i_geometry_name=shapes[0],
-            j_geometry_name=", ".join(shapes[1:]), stiffness=finite(normal.stiffness), damping=finite(normal.damping),
-            dmax=finite(normal.full_damping_penetration), exponent=finite(normal.exponent), **slides,
+            j_geometry_name=", ".join(shapes[1:]), **normal, coulomb_friction="on" if friction else "off", **friction,
         )  # fmt: skip
 
 

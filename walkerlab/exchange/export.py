@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 Kind = Literal["adm", "cmd", "mjcf"]
 Law = Literal["contact", "functions"]
-FORMATS: Final[tuple[Kind, ...]] = get_args(Kind)
 CONTACT_LAWS: Final[tuple[Law, ...]] = get_args(Law)
 ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "mjcf": "mjcf"}
 """Format by file extension."""

@@ -17,10 +17,10 @@ from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineScene, scene_for_engines
 from walkerlab.exchange.planar import PlanarModel, coupling_rows
-from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, foothold_height
+from walkerlab.physics.ground.terrain import STANCE_FOOT, foothold_height
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.contact import require_contact, scene_on_pads, tolerances_of
+from walkerlab.scene.contact import scene_on_pads, tolerances_of
 from walkerlab.scene.footholds import foothold_heights
 
 if TYPE_CHECKING:
@@ -42,14 +42,6 @@ class Pad:
 
 
 @dataclass(frozen=True)
-class HingeCoupling:
-    """Constraint that the weighted sum of the links' hinge angles is zero."""
-
-    links: tuple[int, ...]
-    weights: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Exported:
     """Walker on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
@@ -66,7 +58,7 @@ class Exported:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Unique link names that other programs accept."""
+        """Unique link names that other programs accept; the first link is the first stance leg, hinged at the hip."""
         names: list[str] = []
         for link in self.model.links:
             name = identifier(link.name)
@@ -90,18 +82,17 @@ class Exported:
         return [link.name for link in self.model.links].index(upper)
 
     @cached_property
-    def couplings(self) -> tuple[HingeCoupling, ...]:
-        """Couplings of the hinges of bodies that follow other bodies."""
-        found = []
+    def couplings(self) -> list[dict[int, float]]:
+        """Weights, by link, of the hinge angles of bodies that follow other bodies; each weighted sum is zero."""
+        weights = []
         for row in coupling_rows(self.scene.assembly, self.model):
             if abs(row[0]) > COUPLED:
                 raise ConfigError(
                     "A body whose coupling weights do not add up to 1 cannot be exported.",
                     "Choose weights that add up to 1 in walker.couplings.",
                 )
-            links = [int(place) for place in np.flatnonzero(np.abs(row) > COUPLED)]
-            found.append(HingeCoupling(tuple(links), tuple(float(row[place]) for place in links)))
-        return tuple(found)
+            weights.append({int(link): float(row[link]) for link in np.flatnonzero(np.abs(row) > COUPLED)})
+        return weights
 
     @cached_property
     def pads(self) -> tuple[Pad, ...]:
@@ -111,16 +102,12 @@ class Exported:
         if not terrain.has_pads:
             span = (PADS_BEHIND + last) * pitch
             return tuple(Pad(foot, 0.5 * span - PADS_BEHIND * pitch, span, 0.0) for foot in range(2))
-        pads = []
+        pads, uneven = [], terrain._replace(heights=self.heights)
         for number in range(-PADS_BEHIND, last + 1):
-            height = 0.0 if self.heights is None else float(foothold_height(self._uneven, number))
+            height = 0.0 if self.heights is None else float(foothold_height(uneven, number))
             foot = STANCE_FOOT if number % 2 == 0 else 1 - STANCE_FOOT
             pads.append(Pad(foot, number * pitch, pitch, height))
         return tuple(pads)
-
-    @property
-    def _uneven(self) -> Terrain:
-        return self.scene.ground.terrain._replace(heights=self.heights)
 
     def lane_across_m(self, foot: int) -> float:
         """Signed distance (m) of a foot's lane from the plane of the walk; no ball reaches the other foot's lane."""
@@ -186,13 +173,12 @@ def refuse(config: Config) -> None:
     """Raise ConfigError for a ground or a walker that no format can express."""
     if config.contact is None:
         raise contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")
-    contact = require_contact(config)
-    if contact.terrain == "after-mid-swing":
+    if config.contact.terrain == "after-mid-swing":
         raise ConfigError(
             "Ground that carries a foot only after mid-swing cannot be exported: other programs have no such ground.",
             "Set contact.terrain=checkerboard.",
         )
-    if contact.terrain == "plane" and not config.ground.even:
+    if config.contact.terrain == "plane" and not config.ground.even:
         raise ConfigError(
             "Uneven ground can be exported only as pads of different heights.",
             "Set contact.terrain=checkerboard, or leave out the block ground.",

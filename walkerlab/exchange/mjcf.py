@@ -10,11 +10,12 @@ Source: MuJoCo documentation, Computation: constraint model, and Modeling: solve
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+from walkerlab.config.drives import Hip
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineContact, contact_target
 from walkerlab.exchange.exported import Exported, Pad
@@ -33,23 +34,15 @@ CLOSE = 'iterations="100" tolerance="1e-12"'
 
 @dataclass(frozen=True)
 class Foot:
-    """Ball of a foot: name, collision group, and position across the walk (m)."""
+    """Ball of a foot: name, collision group, position across the walk (m), and whether its leg is drawn."""
 
     name: str
     group: int = 1
     across_m: float = 0.0
+    drawn: bool = False
 
 
 FEET = (Foot("foot 0"), Foot("foot 1"))
-
-
-@dataclass(frozen=True)
-class HipJoint:
-    """Hip hinge of a link, with its spring and damper."""
-
-    link: int
-    stiffness: float  # N m/rad
-    damping: float  # N m s/rad
 
 
 def contact_settings(target: EngineContact) -> dict[str, float]:
@@ -77,40 +70,37 @@ def body_text(
     link_number: int,
     contact: Mapping[str, float] | None,
     feet: tuple[Foot, ...] = FEET,
-    hip: HipJoint | None = None,
-    drawing: Callable[[int], str] = lambda _: "",
+    hip: tuple[int, Hip] | None = None,
 ) -> str:
     """Write a link with its hinge, its feet and its child links.
 
     contact  settings of the foot contacts; None for a walker without feet
-    feet     name, collision group and lateral position of each ball
-    drawing  function that returns the visible shape of a link, which collides with nothing
+    hip      link that hangs from the hip, and the hip's spring and damper
     """
     link = model.links[link_number]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
     inside = "".join(joint_texts(model, link_number, hip))
     i = max(link.inertia_kg_m2, MIN_INERTIA)
     inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
-    if contact is not None:
-        for number, ball in enumerate(model.balls):
-            if ball.link == link_number:
-                inside += foot_text(ball, feet[number], contact)
-    inside += drawing(link_number)
+    for ball, foot in zip(model.balls, feet, strict=False):
+        if contact is not None and ball.link == link_number:
+            inside += foot_text(ball, foot, contact) + (leg_text(link.point_m, ball, foot) if foot.drawn else "")
     for child, hung in enumerate(model.links):
         if hung.parent == link_number:
-            inside += body_text(model, child, contact, feet, hip, drawing)
+            inside += body_text(model, child, contact, feet, hip)
     return f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{inside}</body>'
 
 
-def joint_texts(model: PlanarModel, link_number: int, hip: HipJoint | None) -> Iterator[str]:
+def joint_texts(model: PlanarModel, link_number: int, hip: tuple[int, Hip] | None) -> Iterator[str]:
     """Yield the joints of a link: one for each freedom of the base, or the hinge between a link and its parent."""
     link = model.links[link_number]
     x, z = link.point_m
     for freedom in model.freedoms if link.parent < 0 else ("turn",):
         kind, axis = JOINT_AXES[freedom]
         name, acts = freedom if link.parent < 0 else f"hinge of {link.name}", ""
-        if hip is not None and hip.link == link_number:
-            name, acts = HIP, f' stiffness="{hip.stiffness!r}" damping="{hip.damping!r}"'
+        if hip is not None and hip[0] == link_number:
+            spring, damper = hip[1].spring_N_m_per_rad, hip[1].damping_N_m_s_per_rad
+            name, acts = HIP, f' stiffness="{spring!r}" damping="{damper!r}"'
         yield f'<joint name="{name}" type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"{acts}/>'
 
 
@@ -140,14 +130,7 @@ def walker_text(export: Exported, head: Iterable[str]) -> str:
     contact = contact_settings(target)
     links = tuple(replace(link, name=name) for link, name in zip(export.model.links, export.names, strict=True))
     model = replace(export.model, links=links)
-    feet = tuple(Foot(f"foot_{foot + 1}", 1 << foot, export.lane_across_m(foot)) for foot in range(2))
-    hip = HipJoint(export.hip_link, export.hip.spring_N_m_per_rad, export.hip.damping_N_m_s_per_rad)
-
-    def drawing(link_number: int) -> str:
-        balls = zip(model.balls, feet, strict=True)
-        own = [(ball, foot) for ball, foot in balls if ball.link == link_number]
-        return "".join(leg_text(links[link_number].point_m, ball, foot) for ball, foot in own)
-
+    feet = tuple(Foot(f"foot_{foot + 1}", 1 << foot, export.lane_across_m(foot), drawn=True) for foot in range(2))
     q, v = (" ".join(repr(float(value)) for value in values) for values in export.start)
     distance = -4.0 * export.config.walker.leg_length_m
     elements = [
@@ -157,7 +140,7 @@ def walker_text(export: Exported, head: Iterable[str]) -> str:
         f"<custom>{''.join(custom_texts(export))}</custom>",
         f'<worldbody><camera name="side" mode="trackcom" pos="0 {distance!r} 0" xyaxes="1 0 0 0 0 1"/>',
         *(pad_text(export, number, pad) for number, pad in enumerate(export.pads)),
-        body_text(model, 0, contact, feet, hip, drawing),
+        body_text(model, 0, contact, feet, (export.hip_link, export.hip)),
         "</worldbody>",
         f"<equality>{''.join(coupling_texts(export))}</equality>" if export.couplings else "",
         f'<keyframe><key name="gait" qpos="{q}" qvel="{v}"/></keyframe>',
@@ -195,16 +178,15 @@ def custom_texts(export: Exported) -> Iterator[str]:
 def coupling_texts(export: Exported) -> Iterator[str]:
     """Yield the constraints of coupled hinges; raises ConfigError for a coupling of more than two hinges."""
     for coupling in export.couplings:
-        if len(coupling.links) > 2:
+        if len(coupling) > 2:
             raise ConfigError(
                 "MJCF can couple no more than two hinges.",
                 "Export to ADAMS, or couple fewer bodies in walker.couplings.",
             )
-        *before, last = (
-            HIP if link == export.hip_link else f"hinge of {export.names[link]}" for link in coupling.links
-        )
+        *before, last = (HIP if link == export.hip_link else f"hinge of {export.names[link]}" for link in coupling)
+        weights = list(coupling.values())
         follows = f'joint2="{before[0]}" ' if before else ""
-        weight = -coupling.weights[0] / coupling.weights[-1] if before else 0.0
+        weight = -weights[0] / weights[-1] if before else 0.0
         yield f'<joint joint1="{last}" {follows}polycoef="0 {weight!r} 0 0 0" {COUPLING_SETTINGS}/>'
 
 

@@ -201,14 +201,18 @@ def numbers_in(path: Path, lines: Sequence[str], first: int, delimiter: str, cou
             return values
     except ValueError:
         pass  # a cell is empty or not a number, so read cell by cell
-    return np.array(
-        [cells_as_numbers(path, number, line, delimiter, count) for number, line in numbered_rows(lines, first)]
-    )
+    return table_of(path, numbered_rows(lines, first), delimiter, count)
 
 
 def numbered_rows(lines: Sequence[str], first: int) -> Iterator[tuple[int, str]]:
     """Return the non-blank lines from index `first` on, with line numbers as an editor shows them."""
     return ((number + 1, line) for number, line in enumerate(lines) if number >= first and line.strip())
+
+
+def table_of(path: Path, rows: Iterable[tuple[int, str]], delimiter: str, count: int) -> Array:
+    """Parse numbered lines cell by cell into an array (rows, count); empty cells become nan."""
+    cells = [cells_as_numbers(path, number, line, delimiter, count) for number, line in rows]
+    return np.array(cells).reshape(len(cells), count)
 
 
 def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: int) -> list[float]:
@@ -263,10 +267,8 @@ def read_adams_results(path: Path) -> Recording:
         raise ConfigError(
             f"{path} holds no simulation steps.", "Run a dynamic simulation before exporting its results."
         )
-    table = [numbers_of_step(path, place, step, len(names)) for place, step in enumerate(steps)]
-    values = np.array(table)
-    order = sorted(range(len(names)), key=lambda place: names[place][0])
-    columns = {names[place][1]: values[:, column] for column, place in enumerate(order)}
+    values = np.array([numbers_of_step(path, place, step, len(names)) for place, step in enumerate(steps)])
+    columns = {name: values[:, place] for place, (_, name, _) in enumerate(names)}
     units = {name: unit for _, name, unit in names if unit not in ("", "no_units")}
     time = next((name for name in columns if name.lower() in ("time", "time.time")), "")
     recording = Recording(
@@ -281,7 +283,7 @@ def elements(node: ElementTree.Element, tag: str) -> Iterator[ElementTree.Elemen
 
 
 def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, str, str]]:
-    """Return id, name and unit of each component, in the order of the file."""
+    """Return id, name and unit of each component, in ascending order of the ids."""
     try:
         names = [
             (
@@ -298,7 +300,7 @@ def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, st
         raise ConfigError(
             f"{path}: component ids are missing or not unique.", "Export the results again with RESULTS/XRF."
         )
-    return names
+    return sorted(names)
 
 
 def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: int) -> list[float]:
@@ -345,17 +347,11 @@ def read_opensim(path: Path) -> Recording:
         )
     start = next((number for number in range(end + 1, len(lines)) if lines[number].strip()), len(lines) - 1)
     names = unique(path, lines[start].split())
-    values = blank_separated(path, lines, start + 1, len(names))
+    # the rows are counted, because their number in the header is often wrong
+    rows = [(number, "\t".join(line.split())) for number, line in numbered_rows(lines, start + 1)]
+    values = table_of(path, rows, "\t", len(names))
     units = {"angle": "deg" if settings.get("indegrees", "no") == "yes" else "rad", "length": "m", "time": "s"}
     return as_time_column(Recording(path, {name: values[:, place] for place, name in enumerate(names)}, {}, units))
-
-
-def blank_separated(path: Path, lines: Sequence[str], first: int, count: int) -> Array:
-    """Parse the lines from index `first` on, separated by blanks or tabs, into an array (rows, count)."""
-    rows = []  # counted, because the number of rows in the header is often wrong
-    for number, line in numbered_rows(lines, first):
-        rows.append(cells_as_numbers(path, number, "\t".join(line.split()), "\t", count))
-    return np.array(rows).reshape(len(rows), count)
 
 
 # Markers --------------------------------------------------------------------------------------------------------------
@@ -371,17 +367,13 @@ def read_markers(path: Path) -> Recording:
     settings = dict(zip(lines[1].split(), lines[2].split(), strict=False))
     labels = [label.strip() for label in lines[3].split("\t")]
     names = [label for label in labels[2:] if label]
-    rows = [(number, line.rstrip("\r\n").split("\t")) for number, line in numbered_rows(lines, 5)]
+    rows = list(numbered_rows(lines, 5))
     if not rows or not names:
         raise ConfigError(f"{path} holds no markers.", "Export it again as .trc.")
     columns = [f"{name}.{axis}" for name in unique(path, names) for axis in "xyz"]
     width = 2 + len(columns)
-    values = np.array(
-        [
-            cells_as_numbers(path, number, "\t".join((cells + [""] * width)[:width]), "\t", width)
-            for number, cells in rows
-        ]
-    )
+    cells = [(number, [*line.rstrip("\r\n").split("\t"), *[""] * width][:width]) for number, line in rows]
+    values = table_of(path, [(number, "\t".join(row)) for number, row in cells], "\t", width)
     units = {"time": "s", **({"length": settings["Units"]} if "Units" in settings else {})}
     markers = {name: values[:, 2 + place] for place, name in enumerate(columns)}
     return Recording(path, {TIME: values[:, 1], **markers}, {}, units)
