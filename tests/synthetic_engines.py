@@ -75,5 +75,5 @@ def truth():
 
 
 def content(rows=ROWS):
-    found = EngineFindings(list(rows), list(SWINGS), list(TUNING), {"compass": truth()}, [])
-    return engines.make_content(found, {"period_s": 0.7036, "step_length_m": 0.3714})
+    found = EngineFindings(list(rows), list(SWINGS), list(TUNING), [])
+    return engines.make_content(found, "compass", truth(), {"period_s": 0.7036, "step_length_m": 0.3714})

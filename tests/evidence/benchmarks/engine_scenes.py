@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 
 from walkerlab.config.loader import load
-from walkerlab.evidence.benchmarks.engines.scenes import scenes
+from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
 
 GAIT = (-0.2042004, 0.1694004, -0.605819, -0.861041)
 STEP_LENGTH = 0.3714
@@ -14,11 +14,9 @@ KNEED_STEP_LENGTH = 0.4726567858
 
 @cache
 def compass(*sets):
-    (scene,) = scenes(load(None, sets).config, STEP_LENGTH, GAIT)
-    return scene
+    return supported_scene(load(None, sets).config, STEP_LENGTH, GAIT)
 
 
 @cache
 def kneed(*sets):
-    (scene,) = scenes(load(Path("kneed"), sets).config, KNEED_STEP_LENGTH, KNEED_GAIT)
-    return scene
+    return supported_scene(load(Path("kneed"), sets).config, KNEED_STEP_LENGTH, KNEED_GAIT)

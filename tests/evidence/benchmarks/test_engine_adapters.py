@@ -10,7 +10,7 @@ from engine_scenes import compass, kneed
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, simulate, swing_truth
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
-from walkerlab.evidence.benchmarks.engines.runs import Bench, SwingTask, TuningTask, WalkTask, pinned_model
+from walkerlab.evidence.benchmarks.engines.runs import SwingTask, TuningTask, WalkTask, pinned_model
 from walkerlab.exchange.engine_scene import contact_target
 
 SWING_S, COARSE_S = 0.24, 4e-3
@@ -59,16 +59,14 @@ def test_a_ball_rests_where_the_law_has_it(engine):
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
-        depth = Bench(task, engine.adapter().tuned(contact, target)).at_rest()
-        assert depth == pytest.approx(target.penetration, rel=2e-3), contact
+        assert task.at_rest() == pytest.approx(target.penetration, rel=2e-3), contact
 
 
 def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
     """By the closed forms of its friction; a convex one, which lifts a block that slides, has another."""
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
-        task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
-        bench = Bench(task, engine.adapter().tuned(contact, target))
+        bench = TuningTask(engine.name, contact, target, 1e-4, 1.5)
         if contact == "sap":
             assert bench.creep(target.penetration) < 1e-3 * target.creep_velocity
             continue

@@ -12,20 +12,20 @@ from walkerlab.evidence.benchmarks.engines import stage as engines
 from walkerlab.evidence.benchmarks.engines.experiments import ADAPTIVE_TOLERANCES, EngineOnScene
 from walkerlab.evidence.benchmarks.engines.process import TaskLost
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES, Engine
-from walkerlab.evidence.benchmarks.engines.scenes import scenes
+from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
 from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, three_digits
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.key import differences
 
-ABSENT = Engine("absent", "no_such_engine_module", "absent-engine")
+ABSENT = Engine("absent", "no_such_engine_module")
 
 
 def test_an_engine_that_is_absent_is_told_with_its_install_line(monkeypatch):
     monkeypatch.setattr(engines, "PHYSICS_ENGINES", {"absent": ABSENT})
     assert engines.missing_engines() == [
-        {"what": "engine absent", "why": "not installed: pip install absent-engine"},
+        {"what": "engine absent", "why": "not installed: pip install absent"},
     ]
 
 
@@ -65,7 +65,7 @@ class LosesEverything:
     ids=["crash", "time-out"],
 )
 def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost, outcome, rungs):
-    (scene,) = scenes(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
+    scene = supported_scene(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
     engine = replace(ABSENT, name="exudyn")
     runs = EngineOnScene(engine, scene, truth(), LosesEverything(lost)).same_law()
     rows = [one for one in runs if one.integrator == "DOPRI5 adaptive"]
@@ -81,7 +81,7 @@ def test_every_engine_has_an_adapter_with_one_signature():
 
 
 def test_ratios_are_of_the_quickest_runs_that_are_exact_enough():
-    found = ratios(ROWS, "compass")
+    found = ratios(ROWS)
     # ours 5 ms at 1e-3; mujoco 0.4 s, and its run of 0.1 s is not exact enough
     assert found["1e-3"]["mujoco"] == pytest.approx(0.4 / 0.005)
     assert "mujoco" not in found["1e-5"]
@@ -89,18 +89,18 @@ def test_ratios_are_of_the_quickest_runs_that_are_exact_enough():
 
 
 def test_the_closest_contact_is_judged_at_its_smallest_step():
-    best = closest(ROWS, "compass")
+    best = closest(ROWS)
     assert (best["engine"], best["contact"]) == ("drake", "lagged")
     assert best["period_error_s"] == pytest.approx(6e-4)
 
 
 def test_a_contact_that_does_not_walk_to_the_end_is_not_the_closest():
     fallen = [replace(one, error=None, outcome="fell") if one.engine == "drake" else one for one in ROWS]
-    assert closest(fallen, "compass")["engine"] == "mujoco"
+    assert closest(fallen)["engine"] == "mujoco"
 
 
 def test_three_digits_need_every_smaller_step_to_have_them_too():
-    steps = three_digits(ROWS, "compass", truth())
+    steps = three_digits(ROWS, truth())
     assert steps["same-law"] == {"mujoco RK4": 1e-4, "drake runge_kutta3": 2e-4}
     # mujoco's own period is 0.7125 and 0.7126 at the two smallest steps, and 0.675 at the largest
     assert steps["own-law"]["mujoco soft"] == pytest.approx(2.5e-4)
@@ -148,7 +148,7 @@ def test_tables_are_stored_whole():
 
 
 def test_a_start_of_another_speed_has_the_same_angles():
-    (scene,) = scenes(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
+    scene = supported_scene(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
     slower = scene.started(0.95)
     assert slower.start[:4] == scene.start[:4]
     assert slower.start[4:] == pytest.approx([0.95 * x for x in scene.start[4:]])
@@ -156,4 +156,4 @@ def test_a_start_of_another_speed_has_the_same_angles():
 
 def test_a_row_of_another_start_is_not_among_those_from_the_gait():
     other = row("drake", "lagged", "own-law", 2.5e-4, 1e-9, 1.0, 0.711, start=0.95)
-    assert closest([*ROWS, other], "compass")["period_error_s"] == pytest.approx(6e-4)
+    assert closest([*ROWS, other])["period_error_s"] == pytest.approx(6e-4)

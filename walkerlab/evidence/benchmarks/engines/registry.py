@@ -18,9 +18,8 @@ EXTRA = "pip install 'walkerlab[engines]'"
 class Engine:
     """A physics engine with which our walks are compared."""
 
-    name: str  # name in output and name of the adapter module
+    name: str  # name in output, of the adapter module and of the distribution
     module: str  # import name of its package
-    package: str  # distribution name
 
     @property
     def is_installed(self) -> bool:
@@ -29,13 +28,13 @@ class Engine:
 
     @property
     def install_line(self) -> str:
-        return f"pip install {self.package}"
+        return f"pip install {self.name}"
 
     @property
     def version(self) -> str:
         """Version of the installed package; "unknown" for a module without a distribution."""
         try:
-            return importlib.metadata.version(self.package)
+            return importlib.metadata.version(self.name)
         except importlib.metadata.PackageNotFoundError:
             return "unknown"
 
@@ -49,11 +48,7 @@ class Engine:
 
 PHYSICS_ENGINES = {
     engine.name: engine
-    for engine in (
-        Engine("mujoco", "mujoco", "mujoco"),
-        Engine("drake", "pydrake", "drake"),
-        Engine("exudyn", "exudyn", "exudyn"),
-    )
+    for engine in (Engine("mujoco", "mujoco"), Engine("drake", "pydrake"), Engine("exudyn", "exudyn"))
 }
 
 

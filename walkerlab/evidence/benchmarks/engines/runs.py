@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -196,7 +197,10 @@ class TuningAnswer:
 
 @dataclass(frozen=True)
 class TuningTask:
-    """Task that tunes an engine's own contact and measures it with a dropped ball and a sliding block."""
+    """Task that tunes an engine's own contact and measures it with a heavy ball that cannot turn.
+
+    The ball bounces on level ground, and serves as a sliding block on level or inclined ground.
+    """
 
     engine: str
     contact: str
@@ -204,48 +208,50 @@ class TuningTask:
     step_s: float  # step size of recorded motions
     sliding_velocity: float  # m/s, lowest velocity in the measurement of sliding friction
 
-    def run(self) -> TuningAnswer:
-        bench = Bench(self, PHYSICS_ENGINES[self.engine].adapter().tuned(self.contact, self.target))
-        depth = bench.at_rest()
-        ratio = bench.damping_ratio(depth)
-        return TuningAnswer(bench.own, depth, ratio, bench.friction(depth), bench.creep(depth))
+    @cached_property
+    def own(self) -> OwnContact:
+        return PHYSICS_ENGINES[self.engine].adapter().tuned(self.contact, self.target)
 
+    @property
+    def omega(self) -> float:
+        """Angular frequency (rad/s) of the undamped ball about rest, by the target."""
+        return math.sqrt(self.target.gravity / self.target.penetration)
 
-class Bench:
-    """A heavy ball that cannot turn, on level or inclined ground; it serves as bouncing ball and sliding block."""
-
-    def __init__(self, task: TuningTask, own: OwnContact) -> None:
-        """Derive `omega` (rad/s) and `settling_s`, eight times the slower time constant, from the target."""
-        self.task, self.own, self.target = task, own, task.target
-        self.omega, ratio = math.sqrt(self.target.gravity / self.target.penetration), self.target.damping_ratio
+    @property
+    def settling_s(self) -> float:
+        """Eight times the slower time constant of the ball, by the target."""
+        ratio = self.target.damping_ratio
         slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
-        self.settling_s = 8.0 / slow
+        return 8.0 / slow
+
+    def run(self) -> TuningAnswer:
+        depth = self.at_rest()
+        ratio = self.damping_ratio(depth)
+        return TuningAnswer(self.own, depth, ratio, self.friction(depth), self.creep(depth))
 
     def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
         """Simulate the ball from `depth` (m) inside the ground; `along` times its weight pulls it along the ground.
 
         h  step size (s)
         """
-        target, adapter = self.target, PHYSICS_ENGINES[self.task.engine].adapter()
+        target, engine = self.target, PHYSICS_ENGINES[self.engine]
         link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
         ball = planar.Ball(0, (0.0, 0.0), *planar.ball_and_ground(0.0))
         model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
-        name = adapter.CONTACTS[self.own.model]
-        stepping = Stepping(name, h, TIME_ROUNDING if adapter.INTEGRATORS[name].adapts else None)
-        engine = PHYSICS_ENGINES[self.task.engine].simulation(
-            model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own
-        )
-        engine.carry(0, True)
-        return record_motion(engine, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
+        name = engine.adapter().CONTACTS[self.contact]
+        stepping = Stepping(name, h, TIME_ROUNDING if engine.adapter().INTEGRATORS[name].adapts else None)
+        simulation = engine.simulation(model, stepping, np.array((0.0, -depth)), np.array(velocity), own=self.own)
+        simulation.carry(0, True)
+        return record_motion(simulation, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
 
     def at_rest(self) -> float:
         """Return the penetration (m) at rest of a ball dropped from the surface."""
-        return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.task.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
+        return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
 
     def damping_ratio(self, depth: float) -> float:
         """Fit an oscillator to the ball's accelerations; returns its damping ratio. depth: penetration at rest (m)."""
         omega = self.omega
-        motion = self.after(self.settling_s / 4.0, self.task.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
+        motion = self.after(self.settling_s / 4.0, self.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
         # the mean of a step's two ends stands for its middle, whatever the engine's integration rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
@@ -256,13 +262,13 @@ class Bench:
     def friction(self, depth: float) -> float:
         """Return the deceleration of a sliding block, divided by gravity; depth: penetration at rest (m)."""
         target, settled = self.target, self.settling_s
-        start = self.task.sliding_velocity + target.friction * target.gravity * 1.25 * settled
-        motion = self.after(1.25 * settled, self.task.step_s, 0.0, depth, (start, 0.0))
+        start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
+        motion = self.after(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
         watched = -1 - len(motion.v) // 5
         fall = motion.v[watched, 0] - motion.v[-1, 0]
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
         """Return the creep velocity (m/s) of a block standing on an incline; depth: penetration at rest (m)."""
-        target, h = self.target, STEADY_STEP_FACTOR * self.task.step_s
+        target, h = self.target, STEADY_STEP_FACTOR * self.step_s
         return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])

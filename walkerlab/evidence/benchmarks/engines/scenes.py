@@ -1,4 +1,4 @@
-"""Scenes for other engines, and checks for walkers that they do not support."""
+"""Scene for other engines, and checks for walkers that they do not support."""
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
@@ -11,8 +11,8 @@ from walkerlab.scene.contact import knee_rules
 from walkerlab.scene.parts import assembly_of
 
 
-def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> tuple[EngineScene, ...]:
-    """Return a config's scenes for engines; raises ConfigError for a walker that other engines do not support."""
+def supported_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
+    """Return a config's scene for engines; raises ConfigError for a walker that other engines do not support."""
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(
@@ -24,4 +24,4 @@ def scenes(config: ContactConfig, rigid_step_length_m: float, rigid_state: State
             "engines: the engine models do not support a knee's compliant stop.", "Choose walker.knee.lock: ideal."
         )
     scene = engine_scene(config, rigid_step_length_m, rigid_state)
-    return (scene.with_knees_locked(knees_at_start(scene.ours, STANCE_FOOT, scene.start)),)
+    return scene.with_knees_locked(knees_at_start(scene.ours, STANCE_FOOT, scene.start))

@@ -18,7 +18,7 @@ from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene
 from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
 from walkerlab.evidence.benchmarks.engines.registry import EXTRA, PHYSICS_ENGINES, installed
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
-from walkerlab.evidence.benchmarks.engines.scenes import scenes
+from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
 from walkerlab.evidence.benchmarks.words import words
 from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.labels import labels_of
@@ -38,7 +38,6 @@ class EngineFindings:
     rows: list[EngineRow] = field(default_factory=list)
     swings: list[SwingRow] = field(default_factory=list)
     tuning: list[TuningRow] = field(default_factory=list)
-    truths: dict[str, experiments.Truth] = field(default_factory=dict)
     left_out: list[dict[str, str]] = field(default_factory=list)
 
     def add(self, findings: EngineFindings) -> None:
@@ -47,32 +46,27 @@ class EngineFindings:
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Measure all installed engines on all scenes, `jobs` at a time; raises NoAnswer if no engine or walk exists."""
+    """Measure all installed engines, `jobs` at a time; raises NoAnswer if no engine or walk exists."""
     engines = installed()
     findings = EngineFindings(left_out=[*missing_engines(), *hinge_left_out(config, "engines")])
     if not engines:
         raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
-    for scene in scenes(config, *rigid_start(config, inputs)):
-        truth = experiments.make_truth(scene)
-        if truth is None:
-            why = "the walk under ADAMS's law ends too early to be compared"
-            findings.left_out.append({"what": f"engines on the scene {scene.name}", "why": why})
-            continue
-        findings.truths[scene.name] = truth
-        progress.start(f"engines: {scene.name}", len(engines) + 1)
-        findings.rows += experiments.our_rows(scene, truth, __version__)
-        progress.advance()
-        pairs = [EngineOnScene(engine, scene, truth, OwnProcess()) for engine in engines]
-        for measured in measure_all(pairs, jobs):
-            findings.add(measured)
-            progress.advance()
-    if not findings.truths:
+    scene = supported_scene(config, *rigid_start(config, inputs))
+    truth = experiments.make_truth(scene)
+    if truth is None:
         raise NoAnswer(
             "engines: under ADAMS's contact law, the walk ends too early in every scene",
             "Start closer to a gait (start: fixed-point).",
         )
-    return make_content(findings, rigid)
+    progress.start(f"engines: {scene.name}", len(engines) + 1)
+    findings.rows += experiments.our_rows(scene, truth, __version__)
+    progress.advance()
+    pairs = [EngineOnScene(engine, scene, truth, OwnProcess()) for engine in engines]
+    for measured in measure_all(pairs, jobs):
+        findings.add(measured)
+        progress.advance()
+    return make_content(findings, scene.name, truth, rigid)
 
 
 def measure_all(pairs: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
@@ -115,65 +109,66 @@ def measure(pair: EngineOnScene) -> EngineFindings:
     return findings
 
 
-def make_content(findings: EngineFindings, rigid: Mapping[str, Any] | None) -> Content:
+def make_content(
+    findings: EngineFindings, scene: str, truth: experiments.Truth, rigid: Mapping[str, Any] | None
+) -> Content:
     """Build groups and summary; `rigid`: summary of `fixedpoint`, or None if neither the start nor the pads need it."""
-    rows, truths = findings.rows, findings.truths
+    rows = findings.rows
     stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
     groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
     engines = [engine for engine in installed() if any(row.engine == engine.name for row in rows)]
-    of_rigid = {f"rigid_{key}": rigid[key] for key in ("period_s", "step_length_m")} if rigid is not None else {}
+    reference = {
+        "until_s": truth.until_s,
+        "agreement": truth.agreement,
+        "period_s": float(truth.walk.periods_s[-1]),
+        "step_length_m": float(truth.walk.lengths_m[-1]),
+        "steps": truth.walk.steps,
+        "outcome": truth.walk.outcome.label,
+    }
+    if rigid is not None:
+        reference |= {f"rigid_{key}": rigid[key] for key in ("period_s", "step_length_m")}
     summary = {
         "rows": [asdict(row) for row in rows],
         "swings": [asdict(row) for row in findings.swings],
         "tuning": [{**asdict(row), "residual": row.residual} for row in findings.tuning],
-        "reference": {
-            name: {
-                "until_s": truth.until_s,
-                "agreement": truth.agreement,
-                "period_s": float(truth.walk.periods_s[-1]),
-                "step_length_m": float(truth.walk.lengths_m[-1]),
-                "steps": truth.walk.steps,
-                "outcome": truth.walk.outcome.label,
-                **of_rigid,
-            }
-            for name, truth in truths.items()
-        },
+        "reference": {scene: reference},
         "versions": {engine.name: engine.version for engine in engines},
         "cannot_express": {engine.name: list(engine.adapter().CANNOT_EXPRESS) for engine in engines},
-        "closest": {name: closest(rows, name) for name in truths},
-        "three_digits_step_s": {name: three_digits(rows, name, truth) for name, truth in truths.items()},
-        "convergence": {name: convergence(rows, name) for name in truths},
+        "closest": {scene: closest(rows)},
+        "three_digits_step_s": {scene: three_digits(rows, truth)},
+        "convergence": {scene: convergence(rows)},
         "integrators": {
             engine.name: {name: asdict(integrator) for name, integrator in engine.adapter().INTEGRATORS.items()}
             for engine in engines
         },
         "contacts": {engine.name: dict(engine.adapter().CONTACTS) for engine in engines},
-        "ratios": {name: ratios(rows, name) for name in truths},
-        "conclusions": {name: conclusions(rows, name, truth) for name, truth in truths.items()},
+        "ratios": {scene: ratios(rows)},
+        "conclusions": {scene: conclusions(rows, truth)},
         "environment": environment(),
         "left_out": findings.left_out,
     }
     return Content(groups, summary, timed=("ratios", "conclusions", "environment"))
 
 
-def series_by_name(rows: Sequence[EngineRow], scene: str, experiment: str) -> dict[str, list[EngineRow]]:
+def series_by_name(rows: Sequence[EngineRow], experiment: str) -> dict[str, list[EngineRow]]:
     """Return an experiment's rows that start on the gait, by engine and integrator (or contact), coarse to fine."""
     series: dict[str, list[EngineRow]] = {}
     for row in rows:
-        if row.scene == scene and row.experiment == experiment and row.engine != OURS and row.start == 1.0:
+        if row.experiment == experiment and row.engine != OURS and row.start == 1.0:
             series.setdefault(f"{row.engine} {row.integrator}", []).append(row)
     return series
 
 
-def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
+def ratios(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
     """Return each engine's run time divided by ours under our law, for each error level that both reach."""
-    our_rows = [row for row in rows if row.scene == scene and row.experiment == SAME_LAW and row.engine == OURS]
     by_engine: dict[str, list[EngineRow]] = {}
-    for series in series_by_name(rows, scene, SAME_LAW).values():
-        by_engine.setdefault(series[0].engine, []).extend(series)
+    for row in rows:
+        if row.experiment == SAME_LAW and row.start == 1.0:
+            by_engine.setdefault(row.engine, []).append(row)
+    ours = by_engine.pop(OURS, [])
     factors: dict[str, dict[str, float]] = {}
     for level in RATIO_LEVELS:
-        ours_s = experiments.least_wall(our_rows, level)
+        ours_s = experiments.least_wall(ours, level)
         for engine, runs in by_engine.items():
             engine_s = experiments.least_wall(runs, level)
             if ours_s is not None and engine_s is not None:
@@ -181,9 +176,9 @@ def ratios(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]
     return factors
 
 
-def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
+def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
     """Return the contact whose finest walk comes closest to ADAMS's law; None if no walk reaches the end."""
-    finest = [series[-1] for series in series_by_name(rows, scene, OWN_LAW).values()]
+    finest = [series[-1] for series in series_by_name(rows, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:
         return None
@@ -191,13 +186,13 @@ def closest(rows: Sequence[EngineRow], scene: str) -> dict[str, Any] | None:
     return {"engine": best.engine, "contact": best.integrator, "step_s": best.step_s, "period_error_s": best.error}
 
 
-def three_digits(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, dict[str, float]]:
+def three_digits(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, dict[str, float]]:
     """Return the largest step (s) with three correct digits of the last period, by experiment and name."""
     # digits are checked against the reference under our law, and against the finest run on an engine's own contact
     steps: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     exact = float(np.diff(truth.touches_s)[-1])
     for experiment in steps:
-        for name, runs in series_by_name(rows, scene, experiment).items():
+        for name, runs in series_by_name(rows, experiment).items():
             target = exact if experiment == SAME_LAW else runs[-1].period_s
             step = largest_good_step(runs, experiment, target)
             if step is not None:
@@ -219,32 +214,28 @@ def largest_good_step(runs: Sequence[EngineRow], experiment: str, target: float 
     return None if finest_only else good
 
 
-def convergence(rows: Sequence[EngineRow], scene: str) -> dict[str, dict[str, float]]:
+def convergence(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
     """Return the effect of each series' last refinement, by experiment and name."""
     # same law: factor by which the error fell; own law: change of the period (s)
     effects: dict[str, dict[str, float]] = {SAME_LAW: {}, OWN_LAW: {}}
     for experiment, by_name in effects.items():
-        for name, runs in series_by_name(rows, scene, experiment).items():
+        for name, runs in series_by_name(rows, experiment).items():
             if len(runs) < 2 or not runs[-2].error or not runs[-1].error:
                 continue
-            fine, coarse = runs[-1], runs[-2]
-            factor = float(coarse.error or 0.0) / float(fine.error or 1.0)
-            change = abs(float(fine.period_s or 0.0) - float(coarse.period_s or 0.0))
-            by_name[name] = factor if experiment == SAME_LAW else change
+            change = abs(float(runs[-1].period_s or 0.0) - float(runs[-2].period_s or 0.0))
+            by_name[name] = runs[-2].error / runs[-1].error if experiment == SAME_LAW else change
     return effects
 
 
-def conclusions(rows: Sequence[EngineRow], scene: str, truth: experiments.Truth) -> dict[str, str]:
-    same, own = (series_by_name(rows, scene, experiment) for experiment in (SAME_LAW, OWN_LAW))
-    sizes, changes, shares = three_digits(rows, scene, truth), convergence(rows, scene), ratios(rows, scene)
+def conclusions(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, str]:
+    same, own = (series_by_name(rows, experiment) for experiment in (SAME_LAW, OWN_LAW))
+    sizes, changes, shares = three_digits(rows, truth), convergence(rows), ratios(rows)
     by_level = {label: shares.get(label, {}) for label in map(plain_power, RATIO_LEVELS)}
     engines = list(dict.fromkeys(runs[0].engine for runs in same.values()))
     falling = {name: by for name, by in changes[SAME_LAW].items() if same[name][-1].tolerance is None}
-    finest, settled = (
-        [runs[-1] for runs in own.values()],
-        [name for name in changes[OWN_LAW] if experiments.has_settled(*own[name][-2:])],
-    )
-    best, period = closest(rows, scene), float(truth.walk.periods_s[-1])
+    finest = [runs[-1] for runs in own.values()]
+    settled = [name for name in changes[OWN_LAW] if experiments.has_settled(*own[name][-2:])]
+    best, period = closest(rows), float(truth.walk.periods_s[-1])
     return {
         SAME_LAW: words(
             "engines.same_law", by_level, engines, sizes[SAME_LAW], falling, plain_power(experiments.ERROR_GOAL)
