@@ -10,12 +10,9 @@ from difflib import get_close_matches
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.recording import TIME, Recording
-
-Array = NDArray[np.float64]
+from walkerlab.exchange.recording import TIME, Array, Recording
 
 DEG_RAD: Final = math.pi / 180.0
 ANGLES: Final = {

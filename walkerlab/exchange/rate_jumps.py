@@ -6,7 +6,7 @@ or sensor offset makes the measured sum at these jumps non-zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -36,7 +36,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     """
     spread, sums = angle[:, 0] - angle[:, 1], total(angle)
     runs = apart_runs(np.abs(spread) > AHEAD * np.abs(spread).max(), spread > 0.0)
-    half = WINDOW * typical_distance(time, runs)
+    half = WINDOW * typical_interval([0.5 * (time[first] + time[last]) for first, last in runs], time)
     evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_RUNS], half) for tried in SUMS])
     padded = np.concatenate(([0.0], evidence, [0.0]))
     peaks = np.flatnonzero((evidence > padded[:-2]) & (evidence >= padded[2:]))
@@ -71,9 +71,9 @@ def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list
     return [(begin, end - 1) for begin, end in edges if kind[begin]]
 
 
-def typical_distance(time: Array, runs: Iterable[tuple[int, int]]) -> float:
-    middles = np.array([0.5 * (time[first] + time[last]) for first, last in runs])
-    return float(np.median(np.diff(middles))) if middles.size > 1 else float(time[-1] - time[0])
+def typical_interval(instants: Sequence[float], time: Array) -> float:
+    """Return the median interval (s) between instants of a recording; its duration if there are fewer than two."""
+    return float(np.median(np.diff(instants))) if len(instants) > 1 else float(time[-1] - time[0])
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from walkerlab.exchange.rate_jumps import AHEAD, WINDOW
+from walkerlab.exchange.rate_jumps import AHEAD, WINDOW, Array, typical_interval
 
-Array = NDArray[np.float64]
 Height = Callable[[Array], Array]
 
 TOUCH_DEGREE: Final = 3
@@ -42,8 +42,7 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     height  function from angles (samples, 2) to the height (samples,) of leg 0's foot over leg 1's (m, normal to slope)
     """
     crossings = merge_repeats(candidates(time, angle, height))
-    times = [crossing for crossing, _ in crossings]
-    period = float(np.median(np.diff(times))) if len(times) > 1 else float(time[-1] - time[0])
+    period = typical_interval([crossing for crossing, _ in crossings], time)
     return [locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in crossings]
 
 
@@ -65,15 +64,8 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
 
 def merge_repeats(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]:
     """Average the consecutive crossings of a leg, which belong to one heel strike."""
-    groups: list[list[float]] = []
-    legs: list[int] = []
-    for crossing, leg in crossings:
-        if legs and legs[-1] == leg:
-            groups[-1].append(crossing)
-        else:
-            groups.append([crossing])
-            legs.append(leg)
-    return [(float(np.mean(group)), leg) for group, leg in zip(groups, legs, strict=True)]
+    strikes = [(leg, [time for time, _ in repeats]) for leg, repeats in groupby(crossings, itemgetter(1))]
+    return [(float(np.mean(times)), leg) for leg, times in strikes]
 
 
 def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk
-from walkerlab.exchange.rate_jumps import AHEAD
+from walkerlab.exchange.rate_jumps import AHEAD, Array
 from walkerlab.exchange.touches import Touch, find_touches
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
@@ -27,10 +27,8 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-Array = NDArray[np.float64]
-TWO_FEET_TOLERANCE: Final = (
-    0.03  # rad, limit of the sum of the leg angles from the normal in a recording that starts on two feet
-)
+# rad, limit of the sum of the leg angles from the normal in a recording that starts on two feet
+TWO_FEET_TOLERANCE: Final = 0.03
 SHORTEST: Final = 0.25  # fraction of the mean step period; an earlier first heel strike counts as the start
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
