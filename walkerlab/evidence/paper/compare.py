@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.reads import CompareConfig
-from walkerlab.config.schema import Equations
 from walkerlab.evidence.paper.compared_releases import LOCK_OMISSION, compare_releases
 from walkerlab.evidence.paper.departures import departures
 from walkerlab.evidence.paper.differences import (
@@ -17,21 +16,19 @@ from walkerlab.evidence.paper.differences import (
     compare_motion,
     motion_of,
     stored_variable,
-    times_of_steps,
 )
 from walkerlab.evidence.paper.errata import Erratum, errata
 from walkerlab.evidence.paper.law import is_own_walker
 from walkerlab.evidence.paper.measured import (
+    EQUATION_SETS,
     PAPER_CYCLES,
     ContactMeasurements,
     Measured,
     RigidMeasurements,
-    characteristics,
     measure_rigid_model,
-    over_last_steps,
 )
 from walkerlab.evidence.paper.printed import fixed_point_as_printed
-from walkerlab.evidence.paper.recorded import compare_recorded
+from walkerlab.evidence.paper.recorded import characteristics_of, compare_recorded, stored_energy
 from walkerlab.evidence.paper.rows import NumberVerdict, count_verdicts, paper_rows, table_1, table_2, table_3
 from walkerlab.evidence.paper.study import study_the_paper
 from walkerlab.evidence.paper.walker import compass
@@ -44,7 +41,6 @@ from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
 
 START_TOLERANCE = 1e-6  # rad and rad/s; a start farther than this from the fixed point counts as moved
-EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 PAPER_OMISSION = {
     "what": "the paper's numbers, tables and errata",
     "why": "they apply only to the paper's walker on even ground",
@@ -133,14 +129,14 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
             "gait": {
                 "period_s": gait.get("period_s"),
                 "length_m": gait.get("step_length_m"),
-                **({"knee_strike_s": gait["knee_strike_s"]} if "knee_strike_s" in gait else {}),
+                **{key: gait[key] for key in ("knee_strike_s",) if key in gait},
             },
         },
         "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},
         "dissipated_J": contact["dissipated_J"],
         "departures": list(departures(config, start_moved=False).contact),
         **({} if releases is None else {"releases": releases}),
-        "left_out": [PAPER_OMISSION, *(() if releases is None else LOCK_OMISSION)],
+        "left_out": [PAPER_OMISSION, *([] if releases is None else [LOCK_OMISSION])],
     }
 
 
@@ -169,11 +165,9 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
 def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
     """Measure the contact model's counterparts of the paper's ADAMS numbers."""
     summary, pitch = walk.summary, float(walk.summary["pitch_m"])
-    periods, lengths = np.array(summary["step_periods_s"]), np.array(summary["step_lengths_m"])
+    lengths = np.array(summary["step_lengths_m"])
     stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)
-    angle, joules = (stored_variable(walk, "trajectory", name) for name in ("angle", "mechanical_J"))
-    touches = times_of_steps(walk, "touch_time_s")
-    energy = None if joules is None else over_last_steps(walk["trajectory"]["time"], joules, touches)
+    angle = stored_variable(walk, "trajectory", "angle")
     # walk from the printed x_p, with the swing angle that puts both feet on the config's slope
     _, theta_2, omega_1, omega_2 = fixed_point_as_printed()
     scene = contact_scene(config, pitch, pitch)
@@ -185,9 +179,9 @@ def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasur
         summary=summary,
         # leg 0 swings first, as in the rigid model's state
         start=None if angle is None else as_state([*angle[0], *walk["trajectory"]["velocity"][0]]),
-        table_3=characteristics(periods, lengths, None if energy is None else energy.mean),
+        table_3=characteristics_of(walk),
         step_length=float(lengths[stride - STEPS_PER_STRIDE : stride].mean()) if stride else None,
-        energy=energy,
+        energy=stored_energy(walk),
         from_x_p=(from_x_p.steps, from_x_p.outcome.label),
     )
 
@@ -227,13 +221,10 @@ def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapp
             variables[f"{name}_text"] = texts(["" if x is None else f"{x:.10g}" for x in values], f"{meaning}, as text")
             rows_with_value = [row for row, value in enumerate(values) if value is not None]
             if rows_with_value:
-                dim = f"{name}_{ROW}"
-                variables[dim] = Variable(
-                    np.array(rows_with_value), (dim,), "1", f"indices of the rows that have a value: {meaning}"
-                )
-                variables[name] = Variable(
-                    np.array([values[row] for row in rows_with_value], float), (dim,), unit, meaning
-                )
+                dim, text = f"{name}_{ROW}", f"indices of the rows that have a value: {meaning}"
+                variables[dim] = Variable(np.array(rows_with_value), (dim,), "1", text)
+                numbers = np.array([values[row] for row in rows_with_value], float)
+                variables[name] = Variable(numbers, (dim,), unit, meaning)
         elif isinstance(values[0], str):
             variables[name] = texts(values, meaning)
         else:

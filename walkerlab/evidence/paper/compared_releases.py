@@ -16,22 +16,19 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.stages.walk import last_step, numbers_of
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
+from walkerlab.scene.omissions import omission
 from walkerlab.scene.parts import assembly_of, drive_parameters
 
 RELEASES = {"compression": False, "touch": True}
 """Whether the knee is released at the leading foot's first touch, by the config's name for the release."""
 CONTACT_STEPS = 20  # enough to settle on another gait, or to fall
 RIGID_STEPS = 200
-RIGID_TOLERANCES, CONTACT_TOLERANCES = (
-    Tolerances("dop853", 1e-8, 1e-10, 2_000_000),
-    Tolerances("radau5", 1e-8, 1e-10, 2_000_000),
-)
-LOCK_OMISSION = (
-    {
-        "what": "ideal against compliant lock",
-        "why": "a walk has one lock; try the other by `walkerlab contact-sim --set walker.knee.lock=compliant`",
-        "saves": "compiling the contact walk a second time",
-    },
+RIGID_TOLERANCES = Tolerances("dop853", 1e-8, 1e-10, 2_000_000)
+CONTACT_TOLERANCES = Tolerances("radau5", 1e-8, 1e-10, 2_000_000)
+LOCK_OMISSION = omission(
+    "ideal against compliant lock",
+    "a walk has one lock; try the other by `walkerlab contact-sim --set walker.knee.lock=compliant`",
+    "compiling the contact walk a second time",
 )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.config.contact import Contact
+from walkerlab.config.schema import Equations
 from walkerlab.evidence.paper.appendix_a import RigidWalker, assembled, step_length
 from walkerlab.physics.hybrid.comparison import Array, WalkDifference
 from walkerlab.physics.hybrid.recorded_walk import take_walk
@@ -16,6 +17,7 @@ from walkerlab.physics.solvers.system import State
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
 """Tolerances at which errors are far below any printed digit."""
+EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 PAPER_CYCLES = 5  # gait cycles walked in the paper
 ENERGY_STEPS = 5  # steps over which the paper averages the energy
 

@@ -10,13 +10,12 @@ from typing import Any, Literal
 from walkerlab.config.contact import MM_PER_M
 from walkerlab.evidence.paper import printed
 from walkerlab.evidence.paper.contradictions import contradictions, percent_left_open
-from walkerlab.evidence.paper.measured import PAPER_CYCLES, Measured
+from walkerlab.evidence.paper.measured import EQUATION_SETS, PAPER_CYCLES, Measured
 from walkerlab.evidence.paper.printed import Printed, speed_difference
 from walkerlab.evidence.paper.prose import prose
 from walkerlab.evidence.paper.study import PaperStudy
 from walkerlab.physics.hybrid.comparison import Quantity
 
-EQUATION_NAMES = ("as-printed", "corrected")
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
@@ -111,10 +110,8 @@ class Judge:
             evidence += f" The verdict is about the paper's own numbers, not this scene ({differs})."
         elif differs and verdict not in (INPUT, REPRODUCED):
             verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
-        about, (as_printed, corrected) = (
-            (entry.where, entry.quantity, entry.unit, entry.text),
-            map(rigid.get, EQUATION_NAMES),
-        )
+        about = entry.where, entry.quantity, entry.unit, entry.text
+        as_printed, corrected = map(rigid.get, EQUATION_SETS)
         return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
 
     @property
@@ -128,7 +125,7 @@ class Judge:
 
     def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> JudgedNumber:
         """Judge a parameter of both models, or of the contact model alone."""
-        rigid = dict.fromkeys(EQUATION_NAMES, value) if scene == "rigid" else {}
+        rigid: dict[str, float] = dict.fromkeys(EQUATION_SETS, value) if scene == "rigid" else {}
         verdict = INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else EXPLAINED
         return self.row(entry, rigid, value, verdict, scene, evidence or prose("evidence.input", value, entry.unit))
 

@@ -1,7 +1,7 @@
 """Report sections on the paper: its values next to ours, its tables and its errata."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -33,7 +33,7 @@ MODEL_COLUMNS = {"as_printed": "as printed", "corrected": "corrected", "contact"
 
 
 def numbers(results: Results) -> Section | None:
-    rows = paper_numbers(results)
+    rows = compared(results, "paper_numbers")
     if not rows:
         return None
     meanings = words.terms("paper.verdicts").items()
@@ -42,8 +42,7 @@ def numbers(results: Results) -> Section | None:
     )
     departs = words("paper.departs", results.departures) if results.departures else ""
     blocks = (Paragraph(departs, "fair"), Statements(statements, "lines"), numbers_table(rows))
-    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
-    return Section.of("paper-numbers", "The paper’s numbers", blocks, finding, PAPER_PAGE)
+    return Section.of("paper-numbers", "The paper’s numbers", blocks, finding(rows), PAPER_PAGE)
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
@@ -60,9 +59,10 @@ def numbers_table(rows: Sequence[Row]) -> Table:
     return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
 
 
-def by_verdict(verdicts: Iterable[str]) -> dict[str, int]:
-    counts = Counter(verdicts)
-    return {name: counts[name] for name in TONES}
+def finding(rows: Sequence[Row]) -> str:
+    """State how many of the paper's values have each verdict."""
+    counts = Counter(row["verdict"] for row in rows)
+    return words("paper.finding", {name: counts[name] for name in TONES})
 
 
 def spell_verdict(verdict: str) -> str:
@@ -73,9 +73,9 @@ def name_with_unit(name: str, unit: str | None) -> str:
     return in_signs(with_unit(name, "unit not given" if unit == "not given" else unit or ""))
 
 
-def paper_numbers(results: Results) -> Sequence[Row]:
-    """Return the rows from `compare`; empty if it did not run."""
-    rows: Sequence[Row] = results.summary("compare").get("paper_numbers", ())
+def compared(results: Results, key: str) -> Sequence[Row]:
+    """Return rows of the summary of `compare`; empty if it did not run, or if the walker is not the paper's."""
+    rows: Sequence[Row] = results.summary("compare").get(key, ())
     return rows
 
 
@@ -114,28 +114,18 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
     )
 
 
-ERRATUM_HEADS = {
-    "where": "where",
-    "printed": "printed",
-    "right": "right",
-    "evidence": "evidence",
-    "measured": "measured here",
-}
-"""Headers of the errata table, by stored column."""
-ERRATUM_COLUMNS = [Column(head, name, in_signs, wide=name != "where") for name, head in ERRATUM_HEADS.items()]
+ERRATUM_COLUMNS = (
+    Column("where", "where", in_signs),
+    *(Column(name, name, in_signs, wide=True) for name in ("printed", "right", "evidence")),
+    Column("measured here", "measured", in_signs, wide=True),
+)
 
 
 def errors(results: Results) -> Section | None:
-    rows = errata(results)
+    rows = compared(results, "errata")
     block = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
-    finding = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
-    return Section.of("errata", "Errata of the paper", (block,), finding, PAPER_PAGE)
-
-
-def errata(results: Results) -> Sequence[Row]:
-    """Return the errata from `compare`; empty if it did not run."""
-    rows: Sequence[Row] = results.summary("compare").get("errata", ())
-    return rows
+    total = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
+    return Section.of("errata", "Errata of the paper", (block,), total, PAPER_PAGE)
 
 
 def paper_section(results: Results) -> Section | None:
@@ -143,13 +133,11 @@ def paper_section(results: Results) -> Section | None:
     rows = results.claims
     if not rows:
         return None
-    finding = words("paper.finding", by_verdict(row["verdict"] for row in rows))
-    return Section("printed", "What the paper prints", tuple(fates(results, rows)), finding)
+    return Section("printed", "What the paper prints", tuple(fates(results, rows)), finding(rows))
 
 
 def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
     """Yield the paper's values by verdict and location, and its gravest errors."""
-    all_errata = errata(results)
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
     yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)
@@ -164,7 +152,7 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
     gravest = [
         (headline, erratum)
         for place, headline in headlines
-        for erratum in all_errata
+        for erratum in compared(results, "errata")
         if erratum["where"].startswith(place)
     ]
     if gravest:
@@ -235,6 +223,5 @@ def answer(summary: Row) -> list[str | Table]:
     if "recorded" in summary:
         error_lines += ["", recorded_words(summary["recorded"]), *recorded_tables(summary["recorded"])]
     if "verdicts" in summary:
-        head = words("paper.finding", by_verdict(row["verdict"] for row in summary["paper_numbers"]))
-        return [head, numbers_table(summary["paper_numbers"]), *error_lines]
+        return [finding(summary["paper_numbers"]), numbers_table(summary["paper_numbers"]), *error_lines]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *error_lines]

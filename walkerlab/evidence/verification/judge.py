@@ -12,7 +12,14 @@ from walkerlab.config.stability import Case
 from walkerlab.evidence.verification.catalogue import config_of
 from walkerlab.evidence.verification.ordinary import Choice, choices
 from walkerlab.evidence.verification.scaling import scaled, to_twin
-from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, Start, case_tolerances, prepare_start
+from walkerlab.evidence.verification.starts import (
+    ContactStart,
+    JudgedWalk,
+    RigidStart,
+    Start,
+    case_tolerances,
+    prepare_start,
+)
 from walkerlab.evidence.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS, Method, method_named
@@ -73,7 +80,9 @@ def judge(case: Case, config: Config) -> CaseResult:
     remarks: list[str] = []
     second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
     if walk.outcome.answered:
-        short = start.again(case)
+        short = case
+        if isinstance(start, RigidStart):  # compares only the times of its steps, and no outcome
+            short = case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
         second = second_walk(
             methods.method,
             case.budget,
@@ -89,8 +98,8 @@ def judge(case: Case, config: Config) -> CaseResult:
     numbers = int(walk.touches.size), finite(walk.residual_J), walk.rhs_evaluations, wall_s
     measures = tuple(finding for finding in findings if isinstance(finding, Measure))
     missing = tuple(finding for finding in findings if isinstance(finding, NotMeasured))
-    texts = tuple(remarks)
-    return CaseResult(*about, walk.outcome.label, *numbers, measures, texts, second.method, second.tried, missing)
+    second_walked = second.method, second.tried
+    return CaseResult(*about, walk.outcome.label, *numbers, measures, tuple(remarks), *second_walked, missing)
 
 
 def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> list[tuple[str, JudgedWalk]]:

@@ -17,7 +17,6 @@ from walkerlab.config.contact import Contact
 from walkerlab.evidence.verification import references
 from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
-from walkerlab.physics.energy_channels import LOSS_ENTRIES
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import NormalLaw
@@ -47,12 +46,11 @@ PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 
 @dataclass(frozen=True)
 class ParticleRun:
-    """Result of a rig's run: samples, end state and dissipated energy."""
+    """Samples and end state of a rig's run."""
 
     times: Floats  # (samples,) s
     states: Floats  # (samples, 8) states of both bodies
     end: State
-    dissipated: Floats  # (5,) J, in the order of `energy_channels.LOSSES`
 
 
 def rig(
@@ -89,15 +87,13 @@ def run_until(
     walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
     walk_state.at_zero[:] = 0
     walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
-    observer = new_observer(
-        walker, walk_state, start, np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
-    )
+    times = np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
+    observer = new_observer(walker, walk_state, start, times)
     stopped = walk_on(walker, ground, Tolerances("radau5", rtol, atol, PROBLEM_BUDGET), walk_state, observer, start)
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     recorded = int(observer.tally.recorded)
-    times, states = observer.samples.time_s[:recorded].copy(), observer.samples.states[:recorded].copy()
-    return ParticleRun(times, states, stopped.state, observer.account[LOSS_ENTRIES].copy())
+    return ParticleRun(observer.samples.time_s[:recorded], observer.samples.states[:recorded], stopped.state)
 
 
 @dataclass(frozen=True)
@@ -154,11 +150,9 @@ def bouncing_ball_period() -> float:
     first = math.sqrt(2.0 * DROP / GRAVITY)
     period = references.linear_bounce_period(1.0, SPRING.stiffness, DROP, GRAVITY)
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), first + (BOUNCES - 0.5) * period)
-    y = run.states[-1]
-    time_to_landing = (
-        y[HEIGHT_RATE] + math.sqrt(y[HEIGHT_RATE] ** 2 + 2.0 * GRAVITY * y[BODY_HEIGHT])
-    ) / GRAVITY  # in free flight
-    return (float(run.times[-1] + time_to_landing) - first) / BOUNCES
+    height, rise = run.states[-1, [BODY_HEIGHT, HEIGHT_RATE]]
+    in_flight = (rise + math.sqrt(rise**2 + 2.0 * GRAVITY * height)) / GRAVITY  # until the next landing
+    return (float(run.times[-1] + in_flight) - first) / BOUNCES
 
 
 def restitution(law: NormalLaw, speed: float) -> float:

@@ -3,7 +3,7 @@
 A cell is the paper's walk at one stiffness and stiction velocity, or at one stiffness and step of semi-implicit Euler.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
@@ -24,6 +24,7 @@ from walkerlab.evidence.verification.ordinary import (
 from walkerlab.evidence.verification.starts import ContactStart, case_tolerances, prepare_start
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.pipeline.work import WorkUnit
 
 PAPER_STIFFNESS: Final = Contact().in_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
@@ -84,7 +85,7 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
     walk = start.walk(case, Tolerances(*REFERENCE_SETTINGS, case.budget))
     if not walk.outcome.answered:
         return [float(VERDICT_NAMES.index("no reference")), ERROR_MISSING] * len(steps_s)
-    arrival = arrival_of("map", walk.record, natural_units(config))
+    arrival = arrival_of("map", walk.record, config)
     numbers: Numbers = []
     for h in steps_s:
         choice = euler(arrival, start, h, MAX_FIXED_STEPS)
@@ -92,12 +93,12 @@ def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
     return numbers
 
 
-def units_of(cells: int) -> Iterator[tuple[str, int, Callable[[], Numbers]]]:
-    """Yield the work units of maps with `cells` cells along each axis: name, number of cells, function to call."""
+def units_of(cells: int) -> Iterator[WorkUnit]:
+    """Yield the work units of maps with `cells` cells along each axis."""
     stiffness = np.geomspace(*STIFFNESS_RANGE, cells)
     steps = tuple(float(h) for h in np.geomspace(*STEP_RANGE, cells))
     for i, k in enumerate(stiffness):
-        yield f"step {i}", cells, partial(step_column, float(k), steps)
+        yield WorkUnit(f"step {i}", cells, partial(step_column, float(k), steps))
     for i, v in enumerate(np.geomspace(*STICTION_RANGE, cells)):
         for j, k in enumerate(stiffness):
-            yield f"stiction {i} {j}", 1, partial(stiction_cell, float(k), float(v))
+            yield WorkUnit(f"stiction {i} {j}", 1, partial(stiction_cell, float(k), float(v)))

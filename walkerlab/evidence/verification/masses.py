@@ -118,15 +118,9 @@ class RigidMasses:
         """Return the largest relative change of the conserved momenta; before, after: (strikes, 2 n), push_off: N s."""
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
-            momenta_before, momenta_after = (
-                np.array(self.momenta(old, new=False)),
-                np.array(self.momenta(new, new=True)),
-            )
-            momenta_before[0] += self.moment_of(push_off, old)
-            change, size = (
-                max(change, *np.abs(momenta_after - momenta_before)),
-                max(size, *np.abs(momenta_before), *np.abs(momenta_after)),
-            )
+            at_start, at_end = np.array(self.momenta(old, new=False)), np.array(self.momenta(new, new=True))
+            at_start[0] += self.moment_of(push_off, old)
+            change, size = max(change, *np.abs(at_end - at_start)), max(size, *np.abs(at_start), *np.abs(at_end))
         return finite(change / size)
 
     def energy_won(self, before: Floats, after: Floats) -> float:

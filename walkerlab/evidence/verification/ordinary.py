@@ -81,7 +81,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     if not isinstance(start, ContactStart) or start.scene.pinned or start.scene.ground.terrain.order_matters:
         return ()
     walk = start.walk(short, Tolerances(*REFERENCE_SETTINGS, short.budget)).record
-    arrival = arrival_of(case.name, walk, natural_units(config))
+    arrival = arrival_of(case.name, walk, config)
     if arrival.time_s == 0.0:
         return ()
     by_library = [scipy_walk(arrival, start, name) for name in SCIPY_CHOICES]
@@ -105,13 +105,12 @@ class Arrival:
         scale = max(1.0, float(np.max(np.abs(self.state / self.units))))
         if error > DIVERGED_ERROR * scale or float(np.max(np.abs(y[: y.size // 2]))) >= DIVERGED:
             return Choice(self.case, method, "diverges", None, count, wall_s)
-        return Choice(
-            self.case, method, "fine" if error <= FINE_ERROR * scale else "wrong silently", error, count, wall_s
-        )
+        verdict = "fine" if error <= FINE_ERROR * scale else "wrong silently"
+        return Choice(self.case, method, verdict, error, count, wall_s)
 
 
-def arrival_of(case: str, walk: ContactWalkResult, units: Floats) -> Arrival:
-    return Arrival(case, walk.end_time_s, np.array(walk.end_state), units)
+def arrival_of(case: str, walk: ContactWalkResult, config: RigidConfig) -> Arrival:
+    return Arrival(case, walk.end_time_s, np.array(walk.end_state), natural_units(config))
 
 
 def natural_units(config: RigidConfig) -> Floats:

@@ -91,8 +91,5 @@ def summarise(
 def case_row(case: CaseResult) -> dict[str, Any]:
     row = {name: value for name, value in asdict(case).items() if name not in ("findings", "remarks")}
     row |= {name: list(row[name]) for name in ("expected", "not_measured")}
-    measures = [
-        {"measure": measure.measure, "value": measure.value, "limit": measure.limit, "ok": measure.ok}
-        for measure in case.findings
-    ]
+    measures = [asdict(measure) | {"ok": measure.ok} for measure in case.findings]
     return {**row, "ok": case.ok, "note": "; ".join(case.failures), "measures": measures}

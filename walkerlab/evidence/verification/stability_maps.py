@@ -13,7 +13,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.pipeline.work import WorkUnit, complete
+from walkerlab.pipeline.work import complete
 
 STICTION_COLUMNS = {
     "outcome": "how the walk ended, see attribute outcomes",
@@ -34,7 +34,7 @@ def run(
     jobs        number of processes
     """
     cells = config.stability.map_cells
-    complete([WorkUnit(*unit) for unit in maps.units_of(cells)], checkpoint, "stability maps", progress, jobs)
+    complete([*maps.units_of(cells)], checkpoint, "stability maps", progress, jobs)
     stiction, step = stiction_group(cells, checkpoint.kept), step_group(cells, checkpoint.kept)
     return Content({"stiction": stiction, "step": step}, summary_of(stiction, step))
 

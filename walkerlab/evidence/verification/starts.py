@@ -64,10 +64,6 @@ class RigidStart(CaseStart):
     residual_name: ClassVar[str] = "energy drift within a swing"
     walker: RigidModel
 
-    def again(self, case: Case) -> Case:
-        """Return the case for a repeated walk, with only the steps whose times are compared."""
-        return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
-
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
         """Walk a case; only heel strikes are judged, so nothing is sampled."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
@@ -87,23 +83,18 @@ class RigidStart(CaseStart):
         push = float(self.walker.push_off)
         momentum_change = strikes.momentum_change(record.before, record.after, push)
         gain = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
-        return [
-            Measure(
-                "distance of the feet from the slope at heel strike, in leg lengths", finite(distance), STRIKE_TOLERANCE
-            ),
-            Measure("momentum changed by a heel strike", momentum_change, STRIKE_TOLERANCE),
-            Measure("energy gained at a heel strike", finite(gain), STRIKE_TOLERANCE),
-        ]
+        measured = {
+            "distance of the feet from the slope at heel strike, in leg lengths": finite(distance),
+            "momentum changed by a heel strike": momentum_change,
+            "energy gained at a heel strike": finite(gain),
+        }
+        return [Measure(name, value, STRIKE_TOLERANCE) for name, value in measured.items()]
 
 
 @dataclass(frozen=True)
 class ContactStart(CaseStart):
     residual_name: ClassVar[str] = "energy balance residual"
     scene: ContactScene
-
-    def again(self, case: Case) -> Case:
-        """Return the case for a repeated walk: unchanged, because outcomes are compared, too, not only touch times."""
-        return case
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
         scene, unit = self.scene, pendulum_time(self.config)
