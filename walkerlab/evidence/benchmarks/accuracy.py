@@ -95,11 +95,10 @@ def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Itera
     # contact code is loaded only for scenes that have contact
     from walkerlab.evidence.benchmarks.contact_trials import contact_trial, near_rigid_trial
 
-    if not is_passive_compass(config):
-        yield contact_trial(config, state, length, SLOW_CONTACT_STEPS)
-        return
-    yield contact_trial(config, state, length, CONTACT_STEPS)
-    yield near_rigid_trial(config, state, length, NEAR_RIGID_STEPS)
+    compass = is_passive_compass(config)
+    yield contact_trial(config, state, length, CONTACT_STEPS if compass else SLOW_CONTACT_STEPS)
+    if compass:
+        yield near_rigid_trial(config, state, length, NEAR_RIGID_STEPS)
 
 
 def summarise(

@@ -75,9 +75,8 @@ def method_series(scene: str, results: Results) -> Iterator[Series]:
     methods = rows["method"].astype(str)
     for name in dict.fromkeys(methods.tolist()):
         look = LOOKS.get(name, replace(DEFAULT_LOOK, label=name))
-        yield Series(
-            look, {variable: rows[variable][methods == name] for variable in METHOD_VARIABLES}, look.style == "-"
-        )
+        runs = {variable: rows[variable][methods == name] for variable in METHOD_VARIABLES}
+        yield Series(look, runs, look.style == "-")
 
 
 def draw_methods(scene: str, results: Results) -> Drawn:
@@ -142,9 +141,8 @@ def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Ser
         place = places[engine] = places.get(engine, -1) + 1
         style, marker = SERIES_DASHES[place % len(SERIES_DASHES)], MARKERS[place % len(MARKERS)]
         look = Look(f"{engine} {name}", COLOURS.get(engine, GREY), style, 1.8 if engine == OURS else 1.1, marker)
-        yield Series(
-            look, {variable: rows[variable][rows_of_series] for variable in SERIES_VARIABLES}, place == 0, engine
-        )
+        runs = {variable: rows[variable][rows_of_series] for variable in SERIES_VARIABLES}
+        yield Series(look, runs, place == 0, engine)
 
 
 def draw_errors(scene: str, results: Results) -> Drawn:

@@ -69,12 +69,9 @@ class MethodRow:
 
 def ascend(trial: Trial, method: str) -> Ascent:
     """Run a method at tighter and tighter tolerances until a run is too expensive."""
-    own = method in METHODS and METHODS[method].compiled
-    ladder, short, last = (
-        (OWN_LADDER, RUN_BUDGET, RUN_BUDGET)
-        if own
-        else (LIBRARY_LADDER, min(SHORT_RUN_BUDGET, RUN_BUDGET), LAST_RUN_SIZE)
-    )
+    ladder, short, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
+    if method not in METHODS or not METHODS[method].compiled:
+        ladder, short, last = LIBRARY_LADDER, min(SHORT_RUN_BUDGET, RUN_BUDGET), LAST_RUN_SIZE
     trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     runs: list[MethodRun] = []
     for tolerance in ladder:
@@ -93,11 +90,12 @@ def complete_ascents(
     """Compute each trial's first reference end (or why it is missing) and, with `long_runs`, the postponed runs."""
     # longest first: the last trial is near the rigid limit, where the explicit reference method takes the most steps
     ends = [partial(try_first_end, trial) for trial in reversed(trials)]
-    postponed = [ascent for ascent in ascents if ascent.unfinished and long_runs]
-    long_runs_postponed = [
-        partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)]) for ascent in postponed
+    postponed = [
+        partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)])
+        for ascent in ascents
+        if ascent.unfinished and long_runs
     ]
-    calls: list[Callable[[], Any]] = [*ends, *long_runs_postponed]
+    calls: list[Callable[[], Any]] = [*ends, *postponed]
     results = in_order(calls, jobs)
     first_ends: list[End | WalkEndsError] = [next(results) for _ in trials][::-1]
     return first_ends, [

@@ -76,9 +76,7 @@ def make_truth(scene: EngineScene) -> Truth | None:
         return None
     last, following = walk.touch_time_s[COMPARED_TOUCHES - 1 : COMPARED_TOUCHES + 1]
     until = float(last + INTO_NEXT_STEP * (following - last))
-    reference, second = (
-        simulate(scene, *method_and_rtol, COMPARED_TOUCHES + 1, until) for method_and_rtol in REFERENCES
-    )
+    reference, second = (simulate(scene, *method, COMPARED_TOUCHES + 1, until) for method in REFERENCES)
     end, second_end = sampled_end(reference), sampled_end(second)
     assert end is not None, "the walk goes on beyond that time"
     assert second_end is not None, "the other method's walk goes on, too"
@@ -87,8 +85,8 @@ def make_truth(scene: EngineScene) -> Truth | None:
 
 def sampled_end(result: ContactWalkResult) -> Floats | None:
     """Return the state at a walk's second sample (the first is the start), or None if it was not reached."""
-    reached = result.samples is not None and len(result.samples.states) > 1
-    return np.asarray(result.samples.states[1]) if result.samples is not None and reached else None
+    samples = result.samples
+    return None if samples is None or len(samples.states) < 2 else np.asarray(samples.states[1])
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ class RuleFollower:
         """Update the walk after an engine step; returns whether the ground under a foot may have changed."""
         before, now = self._feet, self.feet(q, v)
         if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
-            self._end(int(Outcome.SOLVER_FAILED))
+            self._end(Outcome.SOLVER_FAILED)
             return False
         if self._bends:
             bends = self._bends_in(q, v)
@@ -132,7 +132,7 @@ class RuleFollower:
             walk_state.cells[foot], walk_state.has_ground[foot] = cell, has_ground_in_cell(cell)
             self._edges[foot] = self._edges_of(foot)
             if walk_state.has_ground[foot] and now[foot].height < 0.0:
-                self._end(int(Outcome.OFF_PAD))
+                self._end(Outcome.OFF_PAD)
         if (before[0].along < before[1].along) != (now[0].along < now[1].along):
             walk_state.sides[contact_events.PASSING] = 1 if now[1].along > now[0].along else -1
             for foot in range(2):
@@ -147,17 +147,14 @@ class RuleFollower:
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
             feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
+            event = form, terrain, walk_state, feet_at_event, foot
             if above:
-                contact_transitions.lift(form, terrain, walk_state, feet_at_event, foot, y)
+                contact_transitions.lift(*event, y)
             else:
-                self._end(
-                    contact_transitions.touch(
-                        form, terrain, walk_state, feet_at_event, foot, self.time_s + share * h, y
-                    )
-                )
+                self._end(contact_transitions.touch(*event, self.time_s + share * h, y))
         completed = walk_state.progress.steps == walk_state.touch_time.size
         if completed and not contact_state.is_to_lift(walk_state):
-            self._end(int(Outcome.WALKED))
+            self._end(Outcome.WALKED)
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
         """Return the first lock or release of a knee within a step of h (s); None if no knee locks or is released."""
@@ -216,13 +213,13 @@ class RuleFollower:
                 y = tuple(self.scene.about_centre(q, v).tolist())
                 material = contact_state.material_along(self.scene.ours.whole, stance, now[stance].along, y)
                 if abs(material - self.walk_state.touched[stance]) > far:
-                    self._end(int(Outcome.SLID))
+                    self._end(Outcome.SLID)
         elif t - self.grounded_s > LONGEST_FLIGHT * tau:
-            self._end(int(Outcome.LIFTED_OFF))
+            self._end(Outcome.LIFTED_OFF)
         if q[1] < FALLEN_HIP * ground.frame.leg_length:
-            self._end(int(Outcome.FELL))
+            self._end(Outcome.FELL)
         elif t - self.walk_state.progress.last_touch > LONGEST_STEP * tau:
-            self._end(int(Outcome.NO_HEEL_STRIKE))
+            self._end(Outcome.NO_HEEL_STRIKE)
 
 
 def crossing(x0: float, v0: float, x1: float, v1: float, h: float) -> float:
