@@ -4,56 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import is_dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.physics.orbits.rigid_map import RigidMap, WalkerAt
+from walkerlab.physics.orbits.rigid_map import RigidMap
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
-    from walkerlab.physics.orbits.contact_map import ContactMap, WalkerOnGround
+    from walkerlab.physics.orbits.contact_map import ContactMap
+    from walkerlab.scene.contact import ContactScene
 
 # Solver settings of one step of the contact model.
 CONTACT_STEP = Tolerances("radau5", 1e-10, 1e-12, 60_000)
 RELATIVE_CHANGE = 1e-3  # relative change of a parameter, to test whether a model depends on it
 
 
-def rigid_walkers(config: ContactConfig, parameter: Parameter) -> WalkerAt:
-    return parameter.over(config, rigid_walker)
-
-
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
-    return RigidMap(rigid_walkers(config, parameter), scale, rigid_walker(config))
+    return RigidMap(parameter.over(config, rigid_walker), scale, rigid_walker(config))
 
 
-def walkers_on_ground(
-    config: ContactConfig, parameter: Parameter, step_length_m: float
-) -> Callable[[float], WalkerOnGround | None]:
+def scene_for(step_length_m: float) -> Callable[[ContactConfig], ContactScene]:
+    """Return a function from configs to their contact scenes, with pads and terrain for steps of this length."""
     from walkerlab.scene.contact import contact_scene
 
-    return parameter.over(config, lambda changed: contact_scene(changed, step_length_m, step_length_m))
+    return lambda config: contact_scene(config, step_length_m, step_length_m)
 
 
 def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_length_m: float) -> ContactMap:
     from walkerlab.physics.orbits.contact_map import ContactMap
-    from walkerlab.scene.contact import contact_scene
 
-    walkers = walkers_on_ground(config, parameter, step_length_m)
-    like = contact_scene(config, step_length_m, step_length_m)
-    return ContactMap(walkers, scale, CONTACT_STEP, step_length_m, like)
+    scene = scene_for(step_length_m)
+    return ContactMap(parameter.over(config, scene), scale, CONTACT_STEP, step_length_m, scene(config))
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
-    walkers: Callable[..., Callable[[float], Any]] = (
-        rigid_walkers if model == "rigid" else partial(walkers_on_ground, step_length_m=1.0)
-    )
-    first, last = ([*iterate_values(walkers(config, parameter)(value))] for value in values)
+    make: Callable[[ContactConfig], Any] = rigid_walker if model == "rigid" else scene_for(1.0)
+    first, last = ([*iterate_values(parameter.over(config, make)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))
 
 

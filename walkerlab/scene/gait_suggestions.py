@@ -18,7 +18,6 @@ from walkerlab.config.walkers import Kneed
 from walkerlab.physics.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
 from walkerlab.physics.orbits.fixed_point import RigidGait, SearchSettings, find_gaits
 from walkerlab.physics.orbits.rigid_map import RigidMap, WalkerAt
-from walkerlab.scene.families import rigid_walkers
 from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
@@ -54,7 +53,7 @@ def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
     ranges: list[SlopeRange] = []
     for value in (*(factor * own for factor in SLOPE_FACTORS), *COMMON_SLOPES):
         if value in span and not any(candidate.stable for candidate in ranges):
-            ranges += walkable_ranges(follow(rigid_walkers(config, SLOPE), span, value))
+            ranges += walkable_ranges(follow(SLOPE.over(config, rigid_walker), span, value))
     return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, own)), default=None)
 
 

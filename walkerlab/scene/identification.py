@@ -19,16 +19,16 @@ from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSt
 from walkerlab.physics.estimation.mixed_model import evaluate, products_of
 from walkerlab.physics.estimation.prediction import DELAY, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
-from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
 from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
-from walkerlab.physics.orbits.similarity import Units, unit_walker
+from walkerlab.physics.orbits.similarity import Units
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.parameter import config_with, parameter_of
+from walkerlab.scene.families import scene_for
+from walkerlab.scene.parameter import R, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
@@ -71,22 +71,20 @@ class ConfigFamily:
         self.parameters = [parameter_of(key, config) for key in keys]
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
         self.at = lru_cache(CONFIGS_AT_ONCE)(partial(config_with, config, self.parameters))
-        self.rigid_walker = lru_cache(CONFIGS_AT_ONCE)(self._rigid_walker)
-
-    def _rigid_walker(self, values: Values) -> RigidModel | None:
-        config = self.at(values)
-        try:
-            return None if config is None else rigid_walker(config)
-        except ConfigError:
-            return None
+        self.rigid_walker = lru_cache(CONFIGS_AT_ONCE)(self.over(rigid_walker))
 
     def admits(self, values: Values) -> bool:
         return self.rigid_walker(values) is not None
 
-    def over(self, make: Callable[[ContactConfig], Any]) -> Callable[[Any], Any]:
-        def at_values(values: Values) -> Any:
+    def over(self, make: Callable[[ContactConfig], R]) -> Callable[[Any], R | None]:
+        """Return a function from values to `make(config)`, or to None if the schema rejects them or `make` does."""
+
+        def at_values(values: Values) -> R | None:
             config = self.at(values)
-            return None if config is None else make(config)
+            try:
+                return None if config is None else make(config)
+            except ConfigError:
+                return None
 
         return at_values
 
@@ -100,12 +98,9 @@ def step_map_of(model: str, family: ConfigFamily, length_m: float) -> StepMap:
     if model == RIGID:
         return RigidMap(family.rigid_walker, 1.0, rigid_walker(config))
     from walkerlab.physics.orbits.contact_map import ContactMap
-    from walkerlab.scene.contact import contact_scene
 
-    def on_ground(changed: ContactConfig) -> Any:
-        return contact_scene(changed, length_m, length_m)
-
-    return ContactMap(family.over(on_ground), 1.0, CONTACT_WALKS, length_m, on_ground(config))
+    scene = scene_for(length_m)
+    return ContactMap(family.over(scene), 1.0, CONTACT_WALKS, length_m, scene(config))
 
 
 def identify_walk(
@@ -241,7 +236,7 @@ def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit)
         forecast.steps.count,
         rms_residuals(steps) | rms_residuals(best),
         fitted.evaluation.squares / dof,
-        gait_with_errors(problem, fitted, information.covariance, units_of(subject) if question.robustness else None),
+        gait_with_errors(problem, fitted, information.covariance, subject.units if question.robustness else None),
         (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
         step_tables(steps),
         fitted,
@@ -300,10 +295,6 @@ def step_tables(fit: Fit) -> tuple[StepTable, ...]:
             range(0, steps * len(forecast.channels), steps), forecast.channels.items(), strict=True
         )
     )
-
-
-def units_of(subject: ModelUnderTest) -> Units:
-    return unit_walker(rigid_walker(subject.config))[1]
 
 
 def gait_with_errors(

@@ -13,7 +13,7 @@ from walkerlab.physics.orbits.family_search import CONTACT, RIGID
 from walkerlab.physics.orbits.gradients import Gradient, gradients
 from walkerlab.physics.orbits.rigid_map import coordinates_of
 from walkerlab.physics.orbits.robustness import GaitOnMap
-from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.orbits.similarity import Units, unit_walker
 from walkerlab.physics.orbits.step_map import StepMap
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats
@@ -48,8 +48,11 @@ class ModelUnderTest:
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
         step_map = step_map if exact else step_map.at(QUICK_WALKS[self.model])
-        _, units = unit_walker(rigid_walker(self.config))
-        return GaitOnMap(step_map, p, self.z, step_map.step(self.z, p).DP, units)
+        return GaitOnMap(step_map, p, self.z, step_map.step(self.z, p).DP, self.units)
+
+    @property
+    def units(self) -> Units:
+        return unit_walker(rigid_walker(self.config))[1]
 
     def gradients(self, parameter: Parameter, selection: Collection[str]) -> dict[str, Gradient]:
         return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, selection)

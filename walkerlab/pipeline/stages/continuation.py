@@ -27,7 +27,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.family_groups import groups
 from walkerlab.pipeline.stages.numerical_error import SAMPLE, USUAL, evenly_spread, tightened
 from walkerlab.pipeline.store.content import Content
-from walkerlab.scene.families import contact_map, model_differs, rigid_map, rigid_walkers, unused_key_error
+from walkerlab.scene.families import contact_map, model_differs, rigid_map, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.walk_outcomes import ground_causes, without_pads
@@ -163,7 +163,7 @@ def search_of(model: str, question: FamilyQuestion, progress: Progress) -> Famil
 
 def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
     """Find all one-step gaits of the rigid model at each start value."""
-    walker_at, seeds = rigid_walkers(question.config, question.parameter), list[Seed]()
+    walker_at, seeds = question.parameter.over(question.config, rigid_walker), list[Seed]()
     progress.start("continuation: gaits of the rigid model")
     for value in question.start_values():
         walker = walker_at(value)
