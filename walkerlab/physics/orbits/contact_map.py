@@ -50,6 +50,7 @@ from walkerlab.physics.orbits.step_map import (
     StepMap,
     Stepper,
     failed_step,
+    valid,
 )
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
@@ -311,6 +312,10 @@ class WalkerOnGround:
     ground: JudgedGround
 
 
+def on_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
+    return replace(site, ground=site.ground._replace(terrain=terrain))
+
+
 class ContactMap(StepMap):
     """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
 
@@ -333,9 +338,16 @@ class ContactMap(StepMap):
         like: WalkerOnGround,
     ) -> None:
         """Prepare a family's map; `walker_at` returns None for values without a valid walker, `like` sets the units."""
-        self._at = lru_cache(CACHE_SIZE)(walker_at)
-        self.scale, self.tolerances, self._measure = scale, tolerances, step_length_m
-        self._on_pads = like.ground.terrain.has_pads
+
+        @lru_cache(CACHE_SIZE)
+        def site_at(p: float) -> WalkerOnGround | None:
+            site = walker_at(p)
+            if site is None or not site.ground.terrain.has_pads:
+                return site
+            return on_terrain(site, after_mid_swing(step_length_m))
+
+        self._at = site_at
+        self.scale, self.tolerances, self._on_pads = scale, tolerances, like.ground.terrain.has_pads
         angled, turning = angled_bodies(like.walker, STANCE_FOOT), turning_bodies(like.walker, STANCE_FOOT)
         rates = (f"rate_{body}" for body in turning)
         self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
@@ -345,19 +357,9 @@ class ContactMap(StepMap):
     def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units)
 
-    def _valid_site(self, p: float) -> WalkerOnGround:
-        site = self._at(p)
-        assert site is not None, "p must give a valid walker"
-        return site
-
-    def _terrain(self, site: WalkerOnGround) -> Terrain:
-        own = site.ground.terrain
-        return after_mid_swing(self._measure) if own.has_pads else own
-
-    def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, terrain: Terrain | None = None) -> SectionStep:
-        terrain = terrain or self._terrain(site)
-        ground = site.ground._replace(terrain=terrain)
-        return step_from_section(site.walker, ground, self.tolerances, z * self._units, terrain.pitch, derived)
+    def _walk(self, site: WalkerOnGround, z: Floats, derived: bool) -> SectionStep:
+        pitch_m = site.ground.terrain.pitch
+        return step_from_section(site.walker, site.ground, self.tolerances, z * self._units, pitch_m, derived)
 
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         site = self._at(p)
@@ -370,22 +372,21 @@ class ContactMap(StepMap):
         return replace(step, z=step.z / self._units, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        site = self._valid_site(p)
+        site = valid(self._at(p))
         slip, tripped, start = 0.0, 0.0, z
         for _ in range(steps):
             step = self._walk(site, start, False)
             slip, start = max(slip, abs(step.slip_m)), step.z / self._units
             if self._on_pads and steps == 1:
-                on_pads = self._walk(site, z, False, checkerboard(step.length_m, (0.0, 0.0)))
-                tripped = float(on_pads.outcome is not Outcome.WALKED)
+                on_pads = on_terrain(site, checkerboard(step.length_m, (0.0, 0.0)))
+                tripped = float(self._walk(on_pads, z, False).outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
-        site = self._valid_site(p)
-        ground = site.ground._replace(terrain=self._terrain(site))
+        site = valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
-        walk = walk_from_section(site.walker, ground, endless, z * self._units, heights_m, push_N_s)
+        walk = walk_from_section(site.walker, site.ground, endless, z * self._units, heights_m, push_N_s)
         return replace(walk, z=walk.z / self._units)
 
     def settled(self, z: Floats, p: float) -> Floats:
@@ -393,18 +394,17 @@ class ContactMap(StepMap):
         return z if site is None else stand(site.walker, z * self._units, STANCE_FOOT) / self._units
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        site, touch = self._valid_site(p), self.step(z, p, derived=False)
-        ground = site.ground._replace(terrain=self._terrain(site))
+        site, touch = valid(self._at(p)), self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
-        return legs_sampled_from_section(site.walker, ground, endless, z * self._units, heights_m, times)
+        return legs_sampled_from_section(site.walker, site.ground, endless, z * self._units, heights_m, times)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         step = self.step(z, p, derived=False)
         return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        site = self._valid_site(p)
+        site = valid(self._at(p))
         return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
     def at(self, tolerances: Tolerances) -> ContactMap:

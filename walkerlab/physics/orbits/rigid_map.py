@@ -44,6 +44,7 @@ from walkerlab.physics.orbits.step_map import (
     StepMap,
     VariedWalk,
     failed_step,
+    valid,
 )
 from walkerlab.physics.solvers.events import CrossingFinder
 from walkerlab.physics.solvers.linear import factor, solve
@@ -164,23 +165,26 @@ class RigidStepper(local):
         floor  rises and nearest landing (see HeelStrikes), in units of the walker; even ground by default
         start  (2 n,) state off the section to walk from instead of z, without a derivative
         """
-        memory = self.memory
-        method = memory.varied if derived else self.plain
         d, size = section.basis.shape
+        method, columns = (self.memory.varied, d) if derived else (self.plain, 0)
         y = section.start[: method.y.size].copy()
         y[:size] = y[:size] + z @ section.basis if start is None else start
-        self._reset(method, steps)
         rises, nearest = floor or (None, 0.0)
-        strikes: HeelStrikes = new_heel_strikes(steps, y.size, True, rises, nearest, columns=d if derived else 0)
-        status, completed = walk(section.walker, method, memory.finder, observer or memory.observer, y, strikes)
-        ahead = strikes.after[:completed].take(section.places if derived else section.places[:d], axis=1)
-        DP = ahead[:, d:].reshape(completed, d if derived else 0, d) / TANGENT_SCALE
-        return Steps(Outcome(status), strikes.time[:completed], ahead[:, :d], DP, strikes)
+        strikes: HeelStrikes = new_heel_strikes(steps, y.size, True, rises, nearest, columns)
+        outcome, completed = self._walk(section, method, observer or self.memory.observer, y, strikes)
+        ahead = strikes.after[:completed].take(section.places[: d * (1 + columns)], axis=1)
+        DP = ahead[:, d:].reshape(completed, columns, d) / TANGENT_SCALE
+        return Steps(outcome, strikes.time[:completed], ahead[:, :d], DP, strikes)
 
-    def _reset(self, method: Any, steps: int) -> None:
+    def _walk(
+        self, section: StrikeSection, method: Any, observer: Observer, y: Floats, strikes: HeelStrikes
+    ) -> tuple[Outcome, int]:
+        """Walk until `strikes` is full or the walk ends; return the outcome and the number of completed steps."""
         method.counts[:BUDGET] = 0
-        method.counts[BUDGET] = min(steps * self.budget, ENDLESS)
+        method.counts[BUDGET] = min(strikes.time.size * self.budget, ENDLESS)
         method.clock[H_NEXT] = 0.0
+        status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)
+        return Outcome(status), completed
 
     def walk_along(
         self,
@@ -192,13 +196,11 @@ class RigidStepper(local):
         observer: Observer,
     ) -> tuple[Outcome, HeelStrikes, int]:
         """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which the rises change by `lift`."""
-        method, (rises, nearest) = self.with_columns(len(columns)), floor
         y = np.concatenate((start, columns.ravel()))
-        self._reset(method, rises.size - 1)
-        strikes: HeelStrikes = new_heel_strikes(rises.size - 1, y.size, True, rises, nearest, len(columns))
+        strikes: HeelStrikes = new_heel_strikes(floor[0].size - 1, y.size, True, *floor, len(columns))
         strikes.lift[:] = lift
-        status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)
-        return Outcome(status), strikes, completed
+        outcome, completed = self._walk(section, self.with_columns(len(columns)), observer, y, strikes)
+        return outcome, strikes, completed
 
     def solve_starts(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
         """Run Newton's method from starts (starts, d), overwritten with the last points tried.
@@ -208,9 +210,8 @@ class RigidStepper(local):
         Returns for each start (starts,) the index of the known gait reached, NEW_GAIT for another solution, or NO_GAIT.
         """
         d = starts.shape[1]
-        z, DP = np.zeros((len(gaits), d)), np.zeros((len(gaits), d, d))
-        for k, gait in enumerate(gaits):
-            z[k], DP[k] = gait
+        z = np.array([z for z, _ in gaits]).reshape(-1, d)
+        DP = np.array([DP for _, DP in gaits]).reshape(-1, d, d)
         results = np.zeros(len(starts), np.int64)
         solve_from_starts(section, self.memory, KnownGaits(z, np.linalg.pinv(np.eye(d) - DP)), starts, results)
         return results
@@ -319,11 +320,6 @@ class RigidMap(StepMap):
     def _quick(self) -> RigidStepper:
         return RigidStepper(self._like, LONG_WALKS)
 
-    def _valid_unit(self, p: float) -> SimilarWalker:
-        unit = self._unit_at(p)
-        assert unit is not None, "p must give a valid walker"
-        return unit
-
     def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
         unit = self._unit_at(p)
         if unit is None:
@@ -338,7 +334,7 @@ class RigidMap(StepMap):
         return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
-        unit = self._valid_unit(p)
+        unit = valid(self._unit_at(p))
         walker, units = unit.walker, unit.units
         walk = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
         extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
@@ -346,27 +342,21 @@ class RigidMap(StepMap):
 
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
-        unit = self._valid_unit(p)
+        unit = valid(self._unit_at(p))
         walker, units, start = unit.walker, unit.units, np.array(state_on_section(unit.walker, z))
         start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
-        walk = self._walk_over(unit, z, heights_m, start)
+        walk = self._exact.walk(unit.section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
         before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
         lengths = step_lengths(walker, np.vstack((start, after))[:-1], before)
         durations = np.diff(walk.time, prepend=0.0) * units.time
         last = walk.z[-1] if walk.z.size else z
         return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, STANCE], last)
 
-    def _walk_over(
-        self, unit: SimilarWalker, z: Floats, heights_m: Floats, start: Floats, observer: Observer | None = None
-    ) -> Steps:
-        floor = unit.floor(z, heights_m)
-        return self._exact.walk(unit.section, z, floor[0].size - 1, False, floor, start, observer)
-
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        unit = self._valid_unit(p)
-        start = np.array(state_on_section(unit.walker, z))
-        observer = new_observer(times_s / unit.units.time, start.size)
-        self._walk_over(unit, z, heights_m, start, observer)
+        unit = valid(self._unit_at(p))
+        observer = new_observer(times_s / unit.units.time, len(unit.walker.zero_state))
+        floor = unit.floor(z, heights_m)
+        self._exact.walk(unit.section, z, heights_m.size - 1, False, floor, observer=observer)
         return by_leg(observer.states[:, [SWING, STANCE]], observer.steps)
 
     def varied(
@@ -404,16 +394,14 @@ class RigidMap(StepMap):
         )
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        unit = self._unit_at(p)
-        if unit is None:
-            return None
-        walk = take_walk(unit.walker, EXACT_STEPS, state_on_section(unit.walker, z), 1)
+        walker = valid(self._unit_at(p)).walker
+        walk = take_walk(walker, EXACT_STEPS, state_on_section(walker, z), 1)
         return float(walk.driven.cost_of_transport(walk.lengths_m[0])) if walk.steps else None
 
     def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
         # Negative values mean that the ground would have to pull.
-        unit = self._valid_unit(p)
+        unit = valid(self._unit_at(p))
         walker, units, start = unit.walker, unit.units, state_on_section(unit.walker, z)
         pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
         impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
@@ -421,7 +409,7 @@ class RigidMap(StepMap):
         return impulse * units.impulse, walk.min_normal_force * units.force
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
-        unit = self._valid_unit(p)
+        unit = valid(self._unit_at(p))
         return unit.units.length, unit.units.time
 
     def at(self, tolerances: Tolerances) -> RigidMap:
@@ -434,26 +422,20 @@ class RigidMap(StepMap):
         unit, none = self._unit_at(p), np.zeros(0)
         if unit is None:
             return Iterates(Outcome.REJECTED, np.zeros((0, z.size)), none, none, none)
-        units, section = unit.units, unit.section
-        if tangent is None:
-            walk = self._quick.walk(section, z, steps, derived=False)
-            periods = np.diff(walk.time, prepend=0.0) * units.time
-            return Iterates(walk.outcome, walk.z, none, periods, walk.z[:, 0])
-        outcome = Outcome.WALKED
-        points, growth, times = list[Floats](), list[Floats](), list[Floats]()
-        while outcome is Outcome.WALKED and len(points) * STEPS_PER_BATCH < steps:
-            part = self._quick.walk(section, z, min(STEPS_PER_BATCH, steps - len(points) * STEPS_PER_BATCH))
-            outcome, images = part.outcome, part.DP @ tangent
-            sizes = np.linalg.norm(images, axis=1)
+        outcome, batch = Outcome.WALKED, steps if tangent is None else STEPS_PER_BATCH
+        points, growth, times = list[Floats](), [none], list[Floats]()
+        while outcome is Outcome.WALKED and len(points) * batch < steps:
+            part = self._quick.walk(unit.section, z, min(batch, steps - len(points) * batch), tangent is not None)
+            outcome = part.outcome
             points.append(part.z)
-            growth.append(sizes / np.append(1.0, sizes[:-1]) if sizes.size else sizes)
             times.append(np.diff(part.time, prepend=0.0))
-            if part.time.size:
+            if tangent is not None and part.time.size:
+                images = part.DP @ tangent
+                sizes = np.linalg.norm(images, axis=1)
+                growth.append(sizes / np.append(1.0, sizes[:-1]))
                 z, tangent = part.z[-1], images[-1] / sizes[-1]
-        all_points = np.concatenate(points)
-        return Iterates(
-            outcome, all_points, np.concatenate(growth), np.concatenate(times) * units.time, all_points[:, 0]
-        )
+        all_points, periods = np.concatenate(points), np.concatenate(times) * unit.units.time
+        return Iterates(outcome, all_points, np.concatenate(growth), periods, all_points[:, 0])
 
 
 def by_leg(angles: Floats, steps: Integers) -> Floats:

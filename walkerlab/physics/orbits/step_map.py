@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from walkerlab.physics.orbits.newton import Effort, Evaluated, NotConverged, new
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
 
+Walker = TypeVar("Walker")
 PARAMETER_STEP = 1e-3  # relative step of the parameter in difference formulas
 CACHE_SIZE = 4096  # walkers cached per step map
 CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
@@ -192,6 +193,11 @@ def differentiate_along(
         parts = (walk.durations_s, walk.lengths_m, walk.angles_rad, samples)
         ends.append([weight / h * part for part in parts])
     return tuple(first + second for first, second in zip(*ends, strict=True))
+
+
+def valid(walker: Walker | None) -> Walker:
+    assert walker is not None, "p must give a valid walker"
+    return walker
 
 
 def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
