@@ -22,6 +22,7 @@ from walkerlab.physics.orbits.newton import (
     Equations,
     Evaluated,
     NotConverged,
+    Solution,
     newton,
 )
 from walkerlab.physics.solvers.system import Floats
@@ -96,11 +97,8 @@ def interpolate(points: Points, x: float) -> Floats:
 
 
 @dataclass(frozen=True)
-class CurvePoint(Generic[Data]):
-    x: Floats
+class CurvePoint(Solution[Data]):
     tangent: Floats  # unit vector
-    evaluated: Evaluated[Data]
-    corrections: int
 
 
 def correct(
@@ -120,7 +118,7 @@ def correct(
         direction = np.linalg.solve(solution.evaluated.jacobian, np.eye(guess.size)[-1])
     except np.linalg.LinAlgError:
         return NotConverged(Outcome.WALKED, singular=True)
-    return CurvePoint(solution.x, direction / np.linalg.norm(direction), solution.evaluated, solution.corrections)
+    return CurvePoint(solution.x, solution.evaluated, solution.corrections, direction / np.linalg.norm(direction))
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ A branch is followed from a gait in both directions until it leaves the span or 
 twice the period is entered along the eigenvector of the multiplier -1, at an amplitude from the flip's normal form.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -57,9 +57,6 @@ class ValueSpan:
         return min(max(value, self.least), self.most)
 
 
-BRANCH_CONTROL = StepControl()
-
-
 @dataclass(frozen=True)
 class BranchEnd:
     value: float
@@ -108,6 +105,14 @@ class GaitBranch:
             stretches.append([*values, self.points[-1].value, self.ends[1].value])
         return tuple((min(stretch), max(stretch)) for stretch in stretches)
 
+    def passing(self, value: float) -> Iterator[tuple[Cycle, Floats]]:
+        """Yield the points just before the branch passes `value`, each with z (d,) interpolated at the value."""
+        for first, second in pairwise(self.points):
+            low, high = sorted((first.value, second.value))
+            if low < high and low <= value <= high:
+                share = (value - first.value) / (second.value - first.value)
+                yield first, first.z + share * (second.z - first.z)
+
     def closes_on(self, flip: Bifurcation) -> list[bool]:
         reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
         near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
@@ -133,7 +138,7 @@ class Seed(NamedTuple):
 class BranchFollower:
     step_map: StepMap
     span: ValueSpan
-    control: StepControl = BRANCH_CONTROL
+    control: StepControl = field(default_factory=StepControl)
     most: int = MAX_BRANCH_POINTS  # maximum number of points on a branch
     advance: Callable[[], None] = lambda: None  # called after each point
 
@@ -179,15 +184,9 @@ class BranchFollower:
         return None if isinstance(solution, NotConverged) else solution
 
     def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
-        value, effort = gait.value, Effort(self.control.tolerance, SEED_EVALUATIONS)
-        starts = [gait.z, *(step.z for step in gait.steps)]
-        for first, second in pairwise(branch.points):
-            low, high = sorted((first.value, second.value))
-            if low == high or not low <= value <= high:
-                continue
-            share = (value - first.value) / (second.value - first.value)
-            guess = first.z + share * (second.z - first.z)
-            neighbour = gait_near(self.step_map, guess, value, effort, branch.period)
+        starts, effort = [gait.z, *(step.z for step in gait.steps)], Effort(self.control.tolerance, SEED_EVALUATIONS)
+        for _, guess in branch.passing(gait.value):
+            neighbour = gait_near(self.step_map, guess, gait.value, effort, branch.period)
             if isinstance(neighbour, Cycle) and min(np.abs(neighbour.z - z).max() for z in starts) < SAME_STATE:
                 return True
         return False

@@ -1,7 +1,7 @@
 """Search for all gait families of one model over a span: branches, cascades, attractors, chaos, bifurcation curves."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -69,9 +69,6 @@ THOROUGHNESS = {
 }
 
 
-NO_ATTRACTORS = AttractorBranch()
-
-
 @dataclass(frozen=True, eq=False)
 class Family:
     """Search results for one model; `step_map` is None if there was no gait to start from."""
@@ -79,7 +76,7 @@ class Family:
     model: str
     step_map: StepMap | None
     branches: tuple[GaitBranch, ...] = ()
-    attractors: AttractorBranch = NO_ATTRACTORS
+    attractors: AttractorBranch = field(default_factory=AttractorBranch)
     exponents: tuple[Lyapunov, ...] = ()
     curves: tuple[BifurcationCurve, ...] = ()  # bifurcation curves over the plane of two parameters
     regions: Regions | None = None  # periods of attractors over that plane

@@ -13,7 +13,6 @@ Source: Kuznetsov, Elements of applied bifurcation theory, section 10.3.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -174,12 +173,10 @@ def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
     for branch in branches:
         if branch.period > 1:
             continue
-        for first, second in pairwise(branch.points):
-            low, high = sorted((first.value, second.value))
-            for index in np.flatnonzero((values >= low) & (values <= high) & (low < high)):
+        for index, value in enumerate(values.tolist()):
+            for first, z in branch.passing(value):
                 if gaits[index] is None or (first.stable and not stable[index]):
-                    share = (values[index] - first.value) / (second.value - first.value)
-                    gaits[index], stable[index] = first.z + share * (second.z - first.z), first.stable
+                    gaits[index], stable[index] = z, first.stable
     return gaits
 
 
