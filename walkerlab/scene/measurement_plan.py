@@ -34,6 +34,7 @@ STEP_MEASUREMENTS: Final = {
     "periods, lengths and touch angles": (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE),
 }
 ANGLES: Final = "angles over time"
+SHORTER_WALK: Final = "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change)."
 AT_GAIT, OFF_GAIT = "at the gait", "off the gait"
 CURVE: Final = (2, 3, 5, 7, 10, 14, 20, 30, 50, 70, 100, 150, 200, 300, 500)
 """Numbers of steps at which errors are listed."""
@@ -102,7 +103,7 @@ def predict_measured(subject: ModelUnderTest, question: Question, plan: Plan) ->
     if walk.durations_s.size <= plan.max_steps:
         raise NoAnswer(
             f"the {subject.model} model takes only {walk.durations_s.size} of {plan.max_steps + 1} steps.",
-            "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change).",
+            SHORTER_WALK,
         )
     steps = slice(plan.max_steps)
     touches = np.append(0.0, np.cumsum(walk.durations_s[steps]))
@@ -122,7 +123,7 @@ def walk_of(subject: ModelUnderTest, measured: Measured, question: Question) -> 
     if walk is None:
         raise NoAnswer(
             f"a {subject.model}-model walk with slightly changed parameters, needed for the derivatives, ends early.",
-            "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change).",
+            SHORTER_WALK,
         )
     return walk
 

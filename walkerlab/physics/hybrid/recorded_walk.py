@@ -75,11 +75,7 @@ class RigidWalkResult(WalkRecord):
     @property
     def objections(self) -> tuple[str, ...]:
         """Reasons why real ground would not support this walk."""
-        reasons = []
-        if self.min_normal_force < 0.0:
-            reasons.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
-        if self.min_normal_impulse is not None and self.min_normal_impulse < 0.0:
-            reasons.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+        reasons = describe_pulls(self.min_normal_force, self.min_normal_impulse or 0.0)
         if self.max_friction_ratio > MAX_FRICTION:
             reasons.append(
                 f"the stance foot would slip: it needs a friction coefficient of {self.max_friction_ratio:.3g}, "
@@ -91,6 +87,12 @@ class RigidWalkResult(WalkRecord):
     def final_state(self) -> State:
         """State after the last heel strike; the start if there was none."""
         return as_state(self.after[-1]) if self.steps else self.start
+
+
+def describe_pulls(min_force: float, min_impulse: float) -> list[str]:
+    """Describe a negative normal force (N) and a negative normal impulse in a strike (N s) of the ground."""
+    pulls = {f"{-min_force:.3g} N": min_force, f"{-min_impulse:.3g} N s in a strike": min_impulse}
+    return [f"the ground would have to pull with {pull}" for pull, least in pulls.items() if least < 0.0]
 
 
 def as_state(values: Any) -> State:

@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
-from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.hybrid.recorded_walk import describe_pulls, take_walk
 from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
@@ -101,11 +101,7 @@ class RigidGait:
     @property
     def objections(self) -> tuple[str, ...]:
         """Reasons why no ground can support this gait; empty for a physical gait, stable or not."""
-        reasons = []
-        if self.min_normal_force < 0.0:
-            reasons.append(f"the ground would have to pull with {-self.min_normal_force:.3g} N")
-        if self.min_normal_impulse < 0.0:
-            reasons.append(f"the ground would have to pull with {-self.min_normal_impulse:.3g} N s in a strike")
+        reasons = describe_pulls(self.min_normal_force, self.min_normal_impulse)
         if not self.trailing_foot_rises:
             reasons.append("the trailing foot would have to pass through the ground")
         if self.feet_meet:
