@@ -85,6 +85,14 @@ def test_a_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
 
+def test_the_unit_of_one_component_of_results_holds_for_it_alone(tmp_path):
+    """Also where that component is the time."""
+    text = RES.replace('"TIME" unitsValue="sec"', '"TIME" unitsValue="millisecond"')
+    walk = as_walk(read_recording(written(tmp_path, "walk.res", text)), {}, {})
+    assert walk.time_s == pytest.approx(TIMES / 1000.0, abs=1e-12)
+    assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
+
+
 def test_a_table_in_degrees_says_so_in_its_header(tmp_path):
     walk = as_walk(read_recording(written(tmp_path, "walk.mot", MOT)), {}, {})
     assert walk.both_legs("angle") == pytest.approx(np.radians(ANGLES), abs=1e-12)

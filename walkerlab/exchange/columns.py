@@ -23,7 +23,10 @@ LENGTHS: Final = {
     "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "foot": 0.3048,
 }  # fmt: skip
 UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
-    "time": {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "min": 60.0},
+    "time": {
+        "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "millisecond": 1e-3,
+        "min": 60.0, "minute": 60.0,
+    },
     "angle": ANGLES,
     "rate": {f"{unit}/{second}": value for unit, value in ANGLES.items() for second in ("s", "sec")},
     "length": LENGTHS,

@@ -268,13 +268,11 @@ def read_adams_results(path: Path) -> Recording:
             f"{path} holds no simulation steps.", "Run a dynamic simulation before exporting its results."
         )
     values = np.array([numbers_of_step(path, place, step, len(names)) for place, step in enumerate(steps)])
-    columns = {name: values[:, place] for place, (_, name, _) in enumerate(names)}
-    units = {name: unit for _, name, unit in names if unit not in ("", "no_units")}
-    time = next((name for name in columns if name.lower() in ("time", "time.time")), "")
-    recording = Recording(
-        path, {TIME if name == time else name: column for name, column in columns.items()}, units, xml_units(root)
-    )
-    return without_repeated_times(recording)
+    time = next((name for _, name, _ in names if name.lower() in ("time", "time.time")), "")
+    called = [TIME if name == time else name for _, name, _ in names]
+    columns = {name: values[:, place] for place, name in enumerate(called)}
+    units = {name: unit for name, (_, _, unit) in zip(called, names, strict=True) if unit not in ("", "no_units")}
+    return without_repeated_times(Recording(path, columns, units, xml_units(root)))
 
 
 def elements(node: ElementTree.Element, tag: str) -> Iterator[ElementTree.Element]:

@@ -56,7 +56,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     truth = experiments.make_truth(scene)
     if truth is None:
         raise NoAnswer(
-            "engines: under ADAMS's contact law, the walk ends too early in every scene",
+            "engines: under ADAMS's contact law, the walk ends too early",
             "Start closer to a gait (start: fixed-point).",
         )
     progress.start(f"engines: {scene.name}", len(engines) + 1)
