@@ -98,7 +98,7 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
         if data is None:
             return NO_NEIGHBOURS
         products, earlier = products_of(data), noise
-        noise = estimate_noise(products, NOISE_FLOOR * size, problem.leg_length_m, noise, anew=round_number == 1)
+        noise = estimate_noise(products, NOISE_FLOOR * size, problem.leg_length_m, noise)
         evaluation = evaluate(products, noise)
         heights = passable(problem, u, evaluation.heights_m)
         if why == NO_NEIGHBOURS:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -15,9 +16,10 @@ from numpy.typing import NDArray
 
 from walkerlab.physics.solvers.system import Floats
 
-ROUGHNESS_STARTS: Final = (1e-5, 1e-3, 1e-2)
-"""Fractions of the leg length from which the search for the roughness starts."""
+NOISE_STARTS: Final = tuple(product((1e-4, 1e-3, 1e-2, 0.1, 1.0), (1e-5, 1e-4, 1e-3, 1e-2)))
+"""Where the search may start: fractions of the measurement's noise before the search, and of the leg length."""
 ROUGHNESS_BOUNDS: Final = (1e-8, 0.2)  # fractions of the leg length
+NEARLY_EVEN: Final = 1e-5  # fraction of the leg length; a smaller roughness may be no roughness
 NOISE_RATIO: Final = 1.0
 """Prior standard deviation of the logarithm of the quantities' relative noises.
 
@@ -114,8 +116,11 @@ def noise_at(logs: Floats, rough: bool) -> Noise:
     return Noise(own[..., :-1], own[..., -1]) if rough else Noise(own, np.zeros(own.shape[:-1]))
 
 
-def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise, anew: bool = True) -> Noise:
-    """Maximise the restricted likelihood over standard deviations above `floors`; `anew` tries several starts."""
+def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
+    """Maximise the restricted likelihood over standard deviations above `floors`, from `start` if it has a rough floor.
+
+    Otherwise the search starts from the likeliest of several rough floors, and from even ground.
+    """
     from scipy.optimize import minimize
 
     def costs(logs: Floats, rough: bool) -> tuple[float, Floats]:
@@ -123,17 +128,19 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
         own = -evaluate(products, noise_at(logs + moves, rough)).restricted
         return own[0], (own[1 : 1 + logs.size] - own[1 + logs.size :]) / (2.0 * LOG_STEP)
 
-    best, most = start, -math.inf
     low, high = (math.log(share * leg_length_m) for share in ROUGHNESS_BOUNDS)
-    bounds = [(math.log(floor), math.log(floor * NOISE_RANGE)) for floor in floors]
+    bounds = [*((math.log(floor), math.log(floor * NOISE_RANGE)) for floor in floors), (low, high)]
     middle = np.maximum(start.measurement, 2.0 * floors)
-    near = start.roughness_m / leg_length_m
-    for share in (*ROUGHNESS_STARTS, 0.0) if anew or near <= ROUGHNESS_STARTS[0] else (near,):
-        rough = share > 0.0
-        logs = np.log(np.append(middle, share * leg_length_m)) if rough else np.log(middle)
-        result = minimize(
-            costs, logs, (rough,), "L-BFGS-B", jac=True, bounds=[*bounds, (low, high)] if rough else bounds
-        )
+    if start.roughness_m > NEARLY_EVEN * leg_length_m:
+        starts = [np.log(np.append(middle, start.roughness_m))]
+    else:
+        pairs = [np.append(share * middle, rough * leg_length_m) for share, rough in NOISE_STARTS]
+        likelihoods = evaluate(products, noise_at(np.log(pairs), True)).restricted
+        starts = [np.log(pairs[int(np.argmax(likelihoods))]), np.log(middle)]
+    best, most = start, -math.inf
+    for logs in starts:
+        rough = logs.size > middle.size
+        result = minimize(costs, logs, (rough,), "L-BFGS-B", jac=True, bounds=bounds[: logs.size])
         # Even ground is the simpler explanation, so it wins unless a roughness raises the likelihood.
         if -result.fun > most or (not rough and -result.fun > most - 1e-6):
             likeliest = noise_at(result.x, rough)
