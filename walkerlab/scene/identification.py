@@ -17,7 +17,7 @@ from walkerlab.physics.estimation.information import information_on, open_combin
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
 from walkerlab.physics.estimation.mixed_model import evaluate, products_of
-from walkerlab.physics.estimation.prediction import DELAY, NUISANCES, Forecast, felt_directions
+from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
@@ -41,10 +41,10 @@ CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
+RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
 CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
-GAIT_STEP: Final = 1e-3  # difference step for derivatives of the gait, relative to a parameter's scale
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def step_map_of(model: str, family: ConfigFamily, length_m: float) -> StepMap:
     """Return a model's step map as a function of the family's parameter values."""
     config = family.config
     if model == RIGID:
-        return RigidMap(family.rigid_walker, 1.0, rigid_walker(config))
+        return RigidMap(family.rigid_walker, 1.0, rigid_walker(config), RIGID_WALKS)
     from walkerlab.physics.orbits.contact_map import ContactMap
 
     scene = scene_for(length_m)
@@ -290,7 +290,7 @@ def step_tables(fit: Fit) -> tuple[StepTable, ...]:
     steps, variance = forecast.steps.count, fitted.noise.measurement[forecast.quantity] ** 2
     total = np.sqrt(variance + (fitted.noise.roughness_m**2) * (fitted.data.G**2).sum(axis=1))
     return tuple(
-        StepTable(name, values, fitted.predicted[first : first + steps], total[first : first + steps])
+        StepTable(name, values, fitted.predicted.values[first : first + steps], total[first : first + steps])
         for first, (name, values) in zip(
             range(0, steps * len(forecast.channels), steps), forecast.channels.items(), strict=True
         )
@@ -307,13 +307,12 @@ def gait_with_errors(
     units  units of the walker; None leaves out the gait's sensitivity to a drop of the floor
     """
     forecast = problem.forecast
-    values = np.array(forecast.parameters(fitted.u))
 
-    def quantities(p: Floats) -> Floats | None:
-        parameters = tuple(p.tolist())
+    def quantities(move: Floats) -> Floats | None:
+        parameters = forecast.parameters(fitted.u + move)
         if not forecast.admits(parameters):
             return None
-        z = forecast.walks.settled(fitted.z, parameters)
+        z = forecast.walks.settled(fitted.predicted.walk.z, parameters)
         gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
@@ -323,15 +322,15 @@ def gait_with_errors(
         responses = response(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units), "floor-drop")  # type: ignore[arg-type]
         return None if responses is None else np.array((*values, responses[0][0]))
 
-    centre = quantities(values)
+    centre = quantities(0.0 * fitted.u)
     if centre is None:
         return {}
-    slopes, names = np.zeros((values.size, centre.size)), GAIT_NAMES[: centre.size]
-    for place, scale in enumerate(forecast.scales):
-        along = scale * np.eye(values.size)[place]
-        slope = derivative(lambda share, along=along: quantities(values + share * along), GAIT_STEP)  # type: ignore[misc]
+    slopes, names = np.zeros((forecast.scales.size, centre.size)), GAIT_NAMES[: centre.size]
+    for place, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
+        # the derivatives of the walk take the same step, so the walkers exist already
+        slope = derivative(lambda share, unit=unit: quantities(share * unit), EXACT_STEP)  # type: ignore[misc]
         if slope is None:
             return {name: Uncertain(float(v), None) for name, v in zip(names, centre, strict=True)}
-        slopes[place] = slope / scale
+        slopes[place] = slope / forecast.scales[place]
     errors = np.sqrt(np.maximum(np.einsum("iq,ij,jq->q", slopes, covariance, slopes), 0.0))
     return {name: Uncertain(float(v), float(e)) for name, v, e in zip(names, centre, errors, strict=True)}

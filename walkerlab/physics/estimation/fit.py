@@ -17,7 +17,7 @@ from walkerlab.physics.estimation.mixed_model import (
     products_of,
     whitening,
 )
-from walkerlab.physics.estimation.prediction import Forecast
+from walkerlab.physics.estimation.prediction import Forecast, Prediction
 from walkerlab.physics.solvers.system import Floats
 
 Loss = Literal["linear", "soft_l1"]
@@ -32,7 +32,7 @@ NO_NEIGHBOURS: Final = "the predicted walk, or one with slightly changed paramet
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
 SETTLED_FIT: Final = 1e-6  # relative change of the cost, or of the unknowns, that ends a round
-SAME_DERIVATIVES: Final = 1e-3  # derivatives are kept until a scaled unknown has changed by this much
+SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
 INSIDE: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
 # prior standard deviation of each scaled unknown about its start, which keeps undetermined combinations there
 WEAK_PRIOR: Final = 1.0
@@ -71,9 +71,7 @@ class Fitted:
     noise: Noise
     evaluation: Evaluation
     data: Linearised
-    predicted: Floats  # (values,) predicted values over even ground, from the most probable start
-    z: Floats  # (d,) section coordinates at the end of the predicted walk
-    rounds: int
+    predicted: Prediction  # walk over even ground, from the most probable start
     why: str = ""  # reason why it did not converge; empty if it did
 
 
@@ -88,7 +86,7 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
     data = linearise(problem, u, heights)
     if data is None:
         return NO_NEIGHBOURS
-    for round_number in range(1, MAX_ROUNDS + 1):
+    for _ in range(MAX_ROUNDS):
         before, u = u, least_squares_fit(problem, u, start, heights, data, noise)
         data = None if forecast.predict(u, even) is None else linearise(problem, u, heights)
         if data is None:
@@ -112,8 +110,7 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return NO_NEIGHBOURS
-    z = forecast.walks.disturbed(forecast.start(u), forecast.parameters(u), even).z
-    return Fitted(u, heights, noise, evaluate(products_of(data), noise), data, predicted, z, round_number, why)
+    return Fitted(u, heights, noise, evaluate(products_of(data), noise), data, predicted, why)
 
 
 def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
@@ -150,11 +147,12 @@ def typical_sizes(forecast: Forecast) -> Floats:
 
 def linearise(problem: FitProblem, u: Floats, heights: Floats, exact: bool = False) -> Linearised | None:
     forecast = problem.forecast
-    values, derivatives = forecast.predict(u, heights), forecast.differentiate_all(u, heights, exact)
-    if values is None or derivatives is None:
+    prediction = forecast.predict(u, heights)
+    derivatives = forecast.differentiate(u, heights, np.eye(heights.size), exact)
+    if prediction is None or derivatives is None:
         return None
     J, G = derivatives
-    residuals = forecast.values - values + G @ heights
+    residuals = forecast.values - prediction.values + G @ heights
     return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u), typical_sizes(forecast))
 
 
@@ -170,15 +168,15 @@ def least_squares_fit(
     offset = forecast.values + data.G @ heights
 
     def residuals(x: Floats) -> Floats:
-        values = forecast.predict(x, heights)
-        own = np.full(offset.size, NO_WALK) if values is None else whiten(offset - values)
+        prediction = forecast.predict(x, heights)
+        own = np.full(offset.size, NO_WALK) if prediction is None else whiten(offset - prediction.values)
         return np.concatenate((own, problem.prior_rows(x)[:, 0], (start - x) / WEAK_PRIOR))
 
     def jacobian(x: Floats) -> Floats:
         nonlocal known
         if np.abs(x - known[0]).max() > SAME_DERIVATIVES:
-            J = forecast.differentiate(x, heights, exact=False)
-            known = x.copy(), np.zeros((offset.size, x.size)) if J is None else J
+            derivatives = forecast.differentiate(x, heights, np.zeros((heights.size, 0)), exact=False)
+            known = x.copy(), np.zeros((offset.size, x.size)) if derivatives is None else derivatives[0]
         own = -whiten(known[1])
         return np.vstack((own, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
 

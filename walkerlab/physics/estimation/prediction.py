@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import Any, Final, Protocol
+from functools import cached_property, lru_cache
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredAngles, MeasuredSteps
-from walkerlab.physics.orbits.robustness import CENTRAL_4TH
+from walkerlab.physics.orbits.robustness import derivative
 from walkerlab.physics.orbits.step_map import NO_TIMES, DisturbedWalk, MappedStep, VariedWalk
 from walkerlab.physics.solvers.system import Floats
 
@@ -30,8 +30,10 @@ LAST_INSTANT: Final = 1e-9  # samples in this last fraction of a walk count as a
 START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
-FORWARD: Final = ((0, -1.0), (1, 1.0))
-EXACT_STEP: Final = 1e-4  # step in an unknown's scale, for difference quotients of the result
+EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
+# the same for sampled angles, which have kinks at heel strikes: parameters move these past samples
+SAMPLED_STEP: Final = 1e-5
+PREDICTIONS_AT_ONCE: Final = 16  # predictions kept: searches, derivatives and checks ask for the same walks
 
 
 class WalkMap(Protocol):
@@ -51,6 +53,16 @@ class WalkMap(Protocol):
 
     def varied(self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ...) -> VariedWalk | None:
         """Differentiate the walk and its samples along columns (d + steps + 1, columns) of start and heights."""
+
+
+class Prediction(NamedTuple):
+    """A predicted walk; its arrays are shared, so never written to."""
+
+    values: Floats  # (values,) predicted values
+    walk: DisturbedWalk
+    times_s: Floats  # (samples,) times of angle samples from the walk's first heel strike
+    inside: NDArray[np.bool_]  # (samples,) whether they are within the walk
+    angles_rad: Floats  # (samples, 2) predicted angles without the sensors' offset and gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,46 +132,68 @@ class Forecast:
         first = self.scales.size
         return np.asarray(self.z + START_SCALE * self.directions @ u[first : first + self.directions.shape[1]])
 
-    def predict(self, u: Floats, heights_m: Floats) -> Floats | None:
-        """Return the predicted values (values,); None if the walk ends early or there is no valid walker."""
-        walk = self._walk(u, heights_m)
-        if walk is None:
+    def predict(self, u: Floats, heights_m: Floats) -> Prediction | None:
+        """Predict the walk; None if it ends early or there is no valid walker."""
+        return self._recent(u.tobytes(), heights_m.tobytes())
+
+    @cached_property
+    def _recent(self) -> Callable[[bytes, bytes], Prediction | None]:
+        recent = lru_cache(PREDICTIONS_AT_ONCE)
+        return recent(lambda u, heights_m: self._predict(np.frombuffer(u), np.frombuffer(heights_m)))
+
+    def _predict(self, u: Floats, heights_m: Floats) -> Prediction | None:
+        p = self.parameters(u)
+        if not self.admits(p):
             return None
-        sensors, count = self.sensors(u), self.steps.count
-        predicted = {
+        z, sensors = self.start(u), self.sensors(u)
+        walk = self.walks.disturbed(z, p, heights_m)
+        if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
+            return None
+        parts = self._by_step(walk, sensors)
+        if not isinstance(self.measured, MeasuredAngles):
+            return Prediction(np.concatenate(parts), walk, NO_TIMES, NO_TIMES > 0.0, np.zeros((0, 2)))
+        times, inside = self._times(walk, sensors)
+        angles = self.walks.sampled(z, p, heights_m, times)
+        values = np.concatenate((*parts, (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
+        return Prediction(values, walk, times, inside, angles)
+
+    def differentiate(self, u: Floats, heights_m: Floats, lifts: Floats, exact: bool) -> tuple[Floats, Floats] | None:
+        """Return derivatives for the unknowns, (values, unknowns), and for heights along `lifts`, (values, lifts).
+
+        lifts  (heights, lifts) changes of the heights
+        exact  whether differences over parameters are of 4th order
+        """
+        # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
+        prediction, starts = self.predict(u, heights_m), self.directions.shape[1]
+        if prediction is None:
+            return None
+        by_parameter = [self._along(u, unit, heights_m, exact) for unit in np.eye(u.size)[: self.scales.size]]
+        tangents = self._tangents(u, heights_m, lifts, prediction)
+        if tangents is None or any(column is None for column in by_parameter):
+            return None
+        moves, by_sensor = tangents
+        return np.column_stack((*by_parameter, moves[:, :starts], by_sensor)), moves[:, starts:]  # type: ignore[arg-type]
+
+    def _along(self, u: Floats, direction: Floats, heights_m: Floats, exact: bool) -> Floats | None:
+        """Return the difference quotient (values,) along a direction (unknowns,)."""
+
+        def values(share: float) -> Floats | None:
+            prediction = self.predict(u + share * direction, heights_m)
+            return None if prediction is None else prediction.values
+
+        if exact:
+            return derivative(values, SAMPLED_STEP if isinstance(self.measured, MeasuredAngles) else EXACT_STEP)
+        here, ahead = values(0.0), values(QUICK_STEP)
+        return None if here is None or ahead is None else (ahead - here) / QUICK_STEP
+
+    def _by_step(self, walk: DisturbedWalk | VariedWalk, sensors: Mapping[str, float]) -> list[Floats]:
+        """Return each channel's values (steps,) in a walk, or their derivatives (steps, columns)."""
+        values = {
             STEP_PERIOD: walk.durations_s * sensors[CLOCK],
             STEP_LENGTH: walk.lengths_m,
             LEG_ANGLE: walk.angles_rad,
         }
-        parts = [predicted[name][:count] for name in self.channels]
-        if isinstance(self.measured, MeasuredAngles):
-            angles = self.walks.sampled(self.start(u), self.parameters(u), heights_m, self._times(walk, sensors)[0])
-            parts.append((sensors[OFFSET] + sensors[GAIN] * angles).ravel())
-        return np.concatenate(parts)
-
-    def differentiate(self, u: Floats, heights_m: Floats, exact: bool) -> Floats | None:
-        """Return derivatives (values, unknowns); differences over parameters are forward, or 4th-order if `exact`."""
-        # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
-        none = np.zeros((heights_m.size, 0))
-        columns = self._columns_along(u, heights_m, none)
-        return None if columns is None else self._with_parameters(u, heights_m, columns, exact)
-
-    def differentiate_all(self, u: Floats, heights_m: Floats, exact: bool) -> tuple[Floats, Floats] | None:
-        """Return derivatives with respect to unknowns, (values, unknowns), and to heights, (values, heights) in 1/m."""
-        columns = self._columns_along(u, heights_m, np.eye(heights_m.size))
-        J = None if columns is None else self._with_parameters(u, heights_m, columns, exact)
-        if columns is None or J is None:
-            return None
-        starts = self.directions.shape[1]
-        return J, columns[:, starts : starts + heights_m.size]
-
-    def _walk(self, u: Floats, heights_m: Floats) -> DisturbedWalk | None:
-        p = self.parameters(u)
-        if not self.admits(p):
-            return None
-        walk = self.walks.disturbed(self.start(u), p, heights_m)
-        whole = walk.outcome is Outcome.WALKED and walk.durations_s.size >= self.heights - 1
-        return walk if whole else None
+        return [values[name][: self.steps.count] for name in self.channels]
 
     def _times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
         """Return the sample times (samples,) from the walk's first heel strike, and whether each is within the walk."""
@@ -177,40 +211,33 @@ class Forecast:
         touches, step = self.measured.touches_s, self.measured.step
         return np.asarray(touches[step] + self.measured.phase * np.diff(touches)[step] - touches[0])
 
-    def _columns_along(self, u: Floats, heights_m: Floats, lifts: Floats) -> Floats | None:
-        """Return derivatives (values, columns) for coordinates of the start, heights along `lifts`, and nuisances."""
-        walk, sensors, count = self._walk(u, heights_m), self.sensors(u), self.steps.count
-        if walk is None:
-            return None
+    def _tangents(
+        self, u: Floats, heights_m: Floats, lifts: Floats, prediction: Prediction
+    ) -> tuple[Floats, Floats] | None:
+        """Return derivatives for start and heights, (values, starts + lifts), and for sensors, (values, nuisances)."""
+        sensors, walk = self.sensors(u), prediction.walk
         z, starts = self.start(u), self.directions.shape[1]
         along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
         settling = settling_along(self.walks, self._unsettled(u), self.parameters(u), self.directions)
         along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
-        sampled = isinstance(self.measured, MeasuredAngles)
-        times, inside = self._times(walk, sensors) if sampled else (NO_TIMES, NO_TIMES)
-        varied = self.walks.varied(z, self.parameters(u), heights_m, along, times)
+        varied = self.walks.varied(z, self.parameters(u), heights_m, along, prediction.times_s)
         if varied is None:
             return None
-        changes = {
-            STEP_PERIOD: varied.durations_s * sensors[CLOCK],
-            STEP_LENGTH: varied.lengths_m,
-            LEG_ANGLE: varied.angles_rad,
-        }
-        parts = [changes[name][:count] for name in self.channels]
-        by_sensor = {name: [np.zeros(count) for _ in self.channels] for name in self.nuisances}
+        moves, of_steps = self._by_step(varied, sensors), self.steps.count * len(self.channels)
+        by_sensor = {name: np.zeros(self.values.size) for name in self.nuisances}
         if CLOCK in by_sensor and STEP_PERIOD in self.channels:
-            by_sensor[CLOCK][list(self.channels).index(STEP_PERIOD)] = walk.durations_s[:count]
-        if sampled:
-            rates = sensors[GAIN] * varied.rates * inside[:, None]
+            by_sensor[CLOCK][: self.steps.count] = walk.durations_s[: self.steps.count]
+        if isinstance(self.measured, MeasuredAngles):
+            rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
             moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
-            parts.append(moving.swapaxes(1, 2).reshape(-1, along.shape[1]))
-            angles = self.walks.sampled(z, self.parameters(u), heights_m, times)
-            clock = np.zeros(times.size) if self.in_phase else -self._measured_times() / sensors[CLOCK] ** 2
-            own = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock[:, None]}
-            for name, columns in by_sensor.items():
-                columns.append(own[name].ravel())
-        last = [NUISANCES[name][1] * np.concatenate(columns) for name, columns in by_sensor.items()]
-        return np.column_stack((np.concatenate(parts), *last))
+            moves.append(moving.swapaxes(1, 2).reshape(-1, along.shape[1]))
+            angles = prediction.angles_rad
+            clock = 0.0 if self.in_phase else -self._measured_times()[:, None] / sensors[CLOCK] ** 2
+            own = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
+            for name, column in by_sensor.items():
+                column[of_steps:] = own[name].ravel()
+        last = [NUISANCES[name][1] * column for name, column in by_sensor.items()]
+        return np.concatenate(moves), np.array(last).reshape(-1, self.values.size).T
 
     def _drift(self, durations: Floats) -> Floats:
         """Return the changes (samples, columns) of the sample times caused by changes of the steps' durations."""
@@ -220,19 +247,6 @@ class Forecast:
         touches = np.concatenate((np.zeros((1, durations.shape[1])), np.cumsum(durations, axis=0)))
         step = self.measured.step
         return np.asarray(touches[step] + self.measured.phase[:, None] * durations[step])
-
-    def _with_parameters(self, u: Floats, heights_m: Floats, columns: Floats, exact: bool) -> Floats | None:
-        """Join the derivatives for parameters with the `columns` of the other unknowns; returns (values, unknowns)."""
-        formula, step = (CENTRAL_4TH, EXACT_STEP) if exact else (FORWARD, QUICK_STEP)
-        starts, own = self.directions.shape[1], []
-        predict = cache(lambda place, offset: self.predict(u + offset * step * np.eye(u.size)[place], heights_m))
-        for place in range(self.scales.size):
-            values = [predict(place if offset else 0, offset) for offset, _ in formula]
-            known = [value for value in values if value is not None]
-            if len(known) < len(values):
-                return None
-            own.append(np.tensordot([weight / step for _, weight in formula], known, 1))
-        return np.column_stack((*own, columns[:, :starts], columns[:, columns.shape[1] - len(self.nuisances) :]))
 
 
 def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
