@@ -72,6 +72,16 @@ def test_a_rigid_walk_holds_no_scale_of_mass():
     assert abs(hip.value - 10.0) < 4.0 * hip.standard_error
 
 
+def test_two_exact_steps_name_every_parameter_that_they_leave_open():
+    own = truth()
+    walk = own.walks.disturbed(own.z * 1.01, tuple(own.values), np.zeros(3))
+    measured = MeasuredSteps(walk.durations_s, walk.lengths_m)
+    result = identify_walk(own.config, measured, own.gait, Question(dict.fromkeys(KEYS), {}))
+    left_open = {estimate.key for estimate in result.estimates if estimate.standard_error is None}
+    assert left_open == {key for key in KEYS if any(key in entry.combination for entry in result.not_identifiable)}
+    assert len(left_open) > 1
+
+
 def test_derivatives_equal_differences_of_other_sizes():
     own = truth()
     measured, _ = own.walk(3)

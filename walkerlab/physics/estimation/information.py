@@ -22,7 +22,8 @@ NOISE_DRAWS: Final = 200
 NOISE_LOG_STEP: Final = 0.05
 # largest distance below and above the most likely value, in the logarithm of a standard deviation
 FARTHEST_NOISE: Final = (3.0, 1.5)
-LOADED: Final = 0.1  # a parameter is named if its component in an undetermined direction is at least this
+# a parameter is named if its component in an undetermined direction is at least this, or moves it beyond its error
+LOADED: Final = 0.1
 
 
 def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quantities: tuple[str, ...]) -> Information:
@@ -116,15 +117,14 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
     """Describe the parameter combinations that the walk does not determine; also return the parameters in them."""
     named, keys = [], set[str]()
     largest = information.singular_values.max(initial=0.0)
+    errors = np.sqrt(np.diag(information.covariance))
     for value, direction in zip(information.singular_values, information.directions, strict=True):
         if not is_open(np.array([value, largest]))[0]:
             continue
         order = np.argsort(-np.abs(direction))
         signed = direction * np.sign(direction[order[0]])
-        parts = [(information.keys[k], float(signed[k])) for k in order if abs(signed[k]) >= LOADED]
-        moved = np.abs(direction) * information.scales
-        errors = np.sqrt(np.diag(information.covariance))
-        keys |= {key for key, move, error in zip(information.keys, moved, errors, strict=True) if move > error}
+        moved = (np.abs(direction) * information.scales > errors) & (errors > 0.0)
+        parts = [(information.keys[k], float(signed[k])) for k in order if moved[k] or abs(signed[k]) >= LOADED]
         keys |= {key for key, _ in parts}
         named.append(Unidentifiable(combination_in_words(parts), reason_in_words(value, largest)))
     return tuple(named), keys
