@@ -22,10 +22,11 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from walkerlab.api import in_memory
+from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.measurements import MeasuredSteps, split_into_steps
 from walkerlab.physics.orbits.family_search import CONTACT, RIGID
-from walkerlab.scene.identification import ConfigFamily, Question, identify_walk, step_map_of
+from walkerlab.scene.identification import ConfigFamily, identify_walk, step_map_of
 from walkerlab.scene.subject import find_model_gait
 
 WALKERS = {
@@ -52,7 +53,7 @@ class Truth:
         self.model = CONTACT if level == "contact" else RIGID
         subject = find_model_gait(self.model, self.config, self.gait, lambda _: None)
         self.family = ConfigFamily(self.config, keys)
-        self.walks = step_map_of(self.model, self.family, subject.length_m)
+        self.walks = step_map_of(subject, self.family)
         self.z, self.leg = subject.z, self.config.walker.leg_length_m
         self.values, self.clock = np.array(self.family.start), math.sqrt(self.leg / (self.config.gravity_m_s2 / 9.81))
         self.start_change, self.roughness = DISTURBANCES.get(name, DISTURBANCE)
@@ -77,8 +78,9 @@ class Truth:
         return split_into_steps(times, angles + draw.normal(0.0, ANGLE_NOISE, angles.shape), touches), weighed
 
     def identify(self, measured, weighed):
-        question = Question(dict.fromkeys(self.keys), {self.keys[-1]: (weighed, PRIOR * self.values[-1])})
-        return identify_walk(self.config, measured, self.gait, question, (self.model,))
+        prior = {self.keys[-1]: [weighed, PRIOR * self.values[-1]]}
+        question = Identify(fit=dict.fromkeys(self.keys), prior=prior, model=self.model)
+        return identify_walk(self.config, measured, self.gait, question)
 
 
 def region_holds(result, truth):

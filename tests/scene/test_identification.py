@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import MeasuredSteps
 from walkerlab.physics.orbits.step_map import StepMap
-from walkerlab.scene.identification import Question, identify_walk, problem_of
+from walkerlab.scene.identification import identify_walk, problem_of
 from walkerlab.scene.subject import find_model_gait
 
 CAMPAIGN = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "identification_coverage.py"))
@@ -27,7 +28,7 @@ def truth(level="steps", name="slope-3deg", keys=KEYS):
 
 def identify(measured, *sets, keys=KEYS, prior=None, **options):
     config = load(Path("slope-3deg"), sets).config
-    question = Question(dict.fromkeys(keys), prior or {}, **options)
+    question = Identify(fit=dict.fromkeys(keys), prior=prior or {}, **options)
     return identify_walk(config, measured, truth().gait, question)
 
 
@@ -66,7 +67,7 @@ def test_a_rigid_walk_holds_no_scale_of_mass():
         "walker.hip_mass_kg (0.71)", "walker.leg_mass_kg (0.71)",
     ]  # fmt: skip
     assert [estimate.standard_error for estimate in result.estimates] == [None, None]
-    weighed = identify(measured, keys=keys[:2], prior={"walker.leg_mass_kg": (5.0, 0.05)})
+    weighed = identify(measured, keys=keys[:2], prior={"walker.leg_mass_kg": [5.0, 0.05]})
     assert weighed.not_identifiable == ()
     hip, _ = weighed.estimates
     assert abs(hip.value - 10.0) < 4.0 * hip.standard_error
@@ -76,7 +77,7 @@ def test_two_exact_steps_name_every_parameter_that_they_leave_open():
     own = truth()
     walk = own.walks.disturbed(own.z * 1.01, tuple(own.values), np.zeros(3))
     measured = MeasuredSteps(walk.durations_s, walk.lengths_m)
-    result = identify_walk(own.config, measured, own.gait, Question(dict.fromkeys(KEYS), {}))
+    result = identify_walk(own.config, measured, own.gait, Identify(fit=dict.fromkeys(KEYS)))
     left_open = {estimate.key for estimate in result.estimates if estimate.standard_error is None}
     assert left_open == {key for key in KEYS if any(key in entry.combination for entry in result.not_identifiable)}
     assert len(left_open) > 1
@@ -86,7 +87,7 @@ def test_derivatives_equal_differences_of_other_sizes():
     own = truth()
     measured, _ = own.walk(3)
     subject = find_model_gait("rigid", own.config, own.gait, lambda _: None)
-    forecast = problem_of(subject, measured, Question(dict.fromkeys(KEYS), {})).forecast
+    forecast = problem_of(subject, measured, Identify(fit=dict.fromkeys(KEYS))).forecast
     u, heights = np.zeros(forecast.unknowns), np.zeros(forecast.heights)
     u[:2] = own.values / forecast.scales
     J, _ = forecast.differentiate(u, heights, np.zeros((heights.size, 0)), exact=True)

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from walkerlab.api import in_memory
+from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.config.plan import Plan
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD
-from walkerlab.scene.identification import Question
 from walkerlab.scene.measurement_plan import ANGLES, plan_measurements, predict_measured, walk_of
 from walkerlab.scene.subject import find_model_gait
 
 KEYS = ("slope_deg", "walker.leg_length_m")
-QUESTION = Question(dict.fromkeys(KEYS), {})
+QUESTION = Identify(fit=dict.fromkeys(KEYS))
 PLAN = Plan(steps=6, max_steps=8, errors={"slope_deg": 0.01})
 
 
@@ -31,7 +31,7 @@ def gait(config):
 
 @pytest.fixture(scope="module")
 def options(config, gait):
-    return plan_measurements(config, gait, QUESTION, PLAN, "rigid")
+    return plan_measurements(config, gait, QUESTION, PLAN)
 
 
 def errors(options, measurement, start="at the gait"):
@@ -42,12 +42,12 @@ def test_expected_errors_are_those_of_a_dense_normal_distribution(config, gait, 
     subject = find_model_gait("rigid", config, gait, print)
     walk = walk_of(subject, predict_measured(subject, QUESTION, PLAN)[0], QUESTION)
     noise = {STEP_PERIOD: PLAN.period_noise_s, STEP_LENGTH: PLAN.length_noise_m, LEG_ANGLE: PLAN.angle_noise_rad}
-    deviations = np.array([noise[walk.quantities[q]] for q in walk.data.quantity])
-    used = (walk.step < PLAN.steps) & (walk.data.quantity != walk.quantities.index(LEG_ANGLE))
+    deviations = np.array([noise[walk.forecast.quantities[q]] for q in walk.data.quantity])
+    used = (walk.step < PLAN.steps) & (walk.data.quantity != walk.forecast.quantities.index(LEG_ANGLE))
     J, G = walk.data.J[used], walk.data.G[used]
     covariance = np.diag(deviations[used] ** 2) + PLAN.roughness_m**2 * G @ G.T
     dense = np.linalg.inv(J.T @ np.linalg.solve(covariance, J))[: len(KEYS), : len(KEYS)]
-    expected = np.sqrt(np.diag(dense)) * walk.scales
+    expected = np.sqrt(np.diag(dense)) * walk.forecast.scales
     np.testing.assert_allclose(list(errors(options, "periods and lengths").errors.values()), expected, rtol=1e-6)
 
 
@@ -71,18 +71,18 @@ def test_periods_of_a_steady_gait_leave_the_slope_open(options):
 def test_the_steps_needed_are_the_fewest_that_reach_the_wanted_error(config, gait, options):
     needed = errors(options, ANGLES).steps_needed["slope_deg"]
     plan = PLAN.model_copy(update={"steps": needed})
-    enough = plan_measurements(config, gait, QUESTION, plan, "rigid")
+    enough = plan_measurements(config, gait, QUESTION, plan)
     assert errors(enough, ANGLES).errors["slope_deg"] <= 0.01
-    fewer = plan_measurements(config, gait, QUESTION, plan.model_copy(update={"steps": needed - 1}), "rigid")
+    fewer = plan_measurements(config, gait, QUESTION, plan.model_copy(update={"steps": needed - 1}))
     assert errors(fewer, ANGLES).errors["slope_deg"] > 0.01
 
 
 def test_a_value_known_beforehand_determines_what_periods_leave_open(config, gait):
-    weighed = Question(dict.fromkeys(KEYS), {"slope_deg": (3.0, 0.01)})
-    error = errors(plan_measurements(config, gait, weighed, PLAN, "rigid"), "periods").errors["slope_deg"]
+    weighed = Identify(fit=dict.fromkeys(KEYS), prior={"slope_deg": [3.0, 0.01]})
+    error = errors(plan_measurements(config, gait, weighed, PLAN), "periods").errors["slope_deg"]
     assert error == pytest.approx(0.01, rel=0.05)
 
 
 def test_a_start_too_far_from_the_gait_has_no_plan(config, gait):
     with pytest.raises(NoAnswer, match=r"takes only \d+ of 9 steps"):
-        plan_measurements(config, gait, QUESTION, PLAN.model_copy(update={"start_change": 0.5}), "rigid")
+        plan_measurements(config, gait, QUESTION, PLAN.model_copy(update={"start_change": 0.5}))

@@ -54,6 +54,15 @@ class Identify(Block):
         bounds="a unit for each kind, quantity or column",
     )
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of all parameters that are estimated, fitted or known beforehand."""
+        return tuple(dict.fromkeys((*self.fit, *self.prior)))
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        return ("rigid", "contact") if self.model == "both" else (self.model,)
+
     @field_validator("fit")
     @classmethod
     def _upwards(cls, value: dict[str, Pair | None]) -> dict[str, Pair | None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,11 +12,11 @@ import numpy as np
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.physics.estimation.fit import FitProblem, Fitted, Loss, evaluate_at, fit, typical_sizes
+from walkerlab.physics.estimation.fit import FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
-from walkerlab.physics.estimation.mixed_model import evaluate, products_of
+from walkerlab.physics.estimation.mixed_model import evaluate
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
 from walkerlab.physics.orbits.family_search import RIGID
@@ -33,6 +33,7 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
 if TYPE_CHECKING:
+    from walkerlab.config.identify import Identify
     from walkerlab.config.schema import Config
 
 Measured = MeasuredSteps | MeasuredAngles
@@ -47,27 +48,10 @@ GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
 
-@dataclass(frozen=True)
-class Question:
-    """Parameters to estimate from a measured walk, with the settings of the estimate."""
-
-    fit: Mapping[str, tuple[float, float] | None]  # bounds by fitted key, in its unit; None for the schema's bounds
-    prior: Mapping[str, tuple[float, float]]  # known value and standard deviation, by key
-    nuisance: tuple[str, ...] = ()  # properties of clock and sensors to estimate too
-    loss: Loss = "linear"
-    starts: int = 1  # number of starts of the fit
-    robustness: bool = False  # whether to compute the gait's sensitivity to a drop of the floor
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys((*self.fit, *self.prior)))
-
-
 class ConfigFamily:
     """Configs as a function of several parameters."""
 
     def __init__(self, config: ContactConfig, keys: Sequence[str]) -> None:
-        self.config = config
         self.parameters = [parameter_of(key, config) for key in keys]
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
         self.at = lru_cache(CONFIGS_AT_ONCE)(partial(config_with, config, self.parameters))
@@ -92,23 +76,21 @@ class ConfigFamily:
         return np.array([abs(value) or SCALE_OF_ZERO for value in self.start])
 
 
-def step_map_of(model: str, family: ConfigFamily, length_m: float) -> StepMap:
+def step_map_of(subject: ModelUnderTest, family: ConfigFamily) -> StepMap:
     """Return a model's step map as a function of the family's parameter values."""
-    config = family.config
-    if model == RIGID:
-        return RigidMap(family.rigid_walker, 1.0, rigid_walker(config), RIGID_WALKS)
+    if subject.model == RIGID:
+        return RigidMap(family.rigid_walker, 1.0, rigid_walker(subject.config), RIGID_WALKS)
     from walkerlab.physics.orbits.contact_map import ContactMap
 
-    scene = scene_for(length_m)
-    return ContactMap(family.over(scene), 1.0, CONTACT_WALKS, length_m, scene(config))
+    scene = scene_for(subject.length_m)
+    return ContactMap(family.over(scene), 1.0, CONTACT_WALKS, subject.length_m, scene(subject.config))
 
 
 def identify_walk(
     config: Config,
     measured: Measured,
     gait: Mapping[str, Any],
-    question: Question,
-    models: Sequence[str] = (RIGID,),
+    question: Identify,
     note: Callable[[str], None] = lambda _: None,
 ) -> Identification:
     """Fit parameters to a measured walk with each model; return the likeliest result, preferring models that fit.
@@ -118,11 +100,11 @@ def identify_walk(
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
-    results = [identify_with(model, config, measured, gait, question, note) for model in models]
+    results = [identify_with(model, config, measured, gait, question, note) for model in question.models]
     answers = [result for result in results if isinstance(result, Identification)]
     verdicts = tuple(
         result.models[0] if isinstance(result, Identification) else ModelFit(model, None, "not-converged", result)
-        for model, result in zip(models, results, strict=True)
+        for model, result in zip(question.models, results, strict=True)
     )
     if not answers:
         raise NoAnswer(
@@ -138,7 +120,7 @@ def identify_with(
     config: Config,
     measured: Measured,
     gait: Mapping[str, Any],
-    question: Question,
+    question: Identify,
     note: Callable[[str], None],
 ) -> Identification | str:
     """Fit one model; return the reason as text if no walk of the model can be fitted."""
@@ -149,62 +131,52 @@ def identify_with(
     if not walked:
         return str(fits[0])
     best = max(walked, key=lambda result: (not result.why, result.evaluation.likelihood))
-    in_phase = Fit(problem, best)
-    timed = in_time(in_phase)
+    timed = in_time(best)
     if timed is None:
-        return describe(subject, question, in_phase, in_phase)
-    again = evaluate_at(problem, timed.fitted.u[: best.u.size], best)
-    return describe(subject, question, in_phase if again is None else Fit(problem, again), timed)
+        return describe(subject, question, best, best)
+    return describe(subject, question, evaluate_at(timed.u[: best.u.size], best) or best, timed)
 
 
-@dataclass(frozen=True)
-class Fit:
-    problem: FitProblem
-    fitted: Fitted
-
-
-def in_time(first: Fit) -> Fit | None:
+def in_time(first: Fitted) -> Fitted | None:
     """Refit angles at their sample times, from the fit at equal phase; None for measured steps or a failed fit."""
-    forecast, u = first.problem.forecast, first.fitted.u
+    forecast, u = first.forecast, first.u
     if not isinstance(forecast.measured, MeasuredAngles):
         return None
     nuisances = forecast.nuisances if DELAY in forecast.nuisances else (*forecast.nuisances, DELAY)
     start = u if nuisances == forecast.nuisances else np.append(u, 0.0)
     problem = replace(first.problem, forecast=replace(forecast, in_phase=False, nuisances=nuisances))
     fitted = fit(problem, start)
-    return Fit(problem, fitted) if isinstance(fitted, Fitted) and not fitted.why else None
+    return fitted if isinstance(fitted, Fitted) and not fitted.why else None
 
 
-def problem_of(subject: ModelUnderTest, measured: Measured, question: Question) -> FitProblem:
+def problem_of(subject: ModelUnderTest, measured: Measured, question: Identify) -> FitProblem:
     family = ConfigFamily(subject.config, question.keys)
-    walks = step_map_of(subject.model, family, subject.length_m)
+    walks = step_map_of(subject, family)
     directions = felt_directions(walks, subject.z, family.start)
     forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.nuisance)
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
-    priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
+    known = enumerate(map(question.prior.get, question.keys))
+    priors = {place: pair for place, pair in known if pair is not None}
     return FitProblem(forecast, subject.config.walker.leg_length_m, family.start, bounds, priors, question.loss)
 
 
 def starts_of(problem: FitProblem, count: int) -> list[Floats]:
     """Return the starts of the fit, each (unknowns,): the config's values, then random values near them."""
-    parameters = np.array(problem.start) / problem.forecast.scales
-    rng, starts = np.random.default_rng(0), []
-    for place in range(count):
-        spread = SPREAD_OF_STARTS * rng.uniform(-1.0, 1.0, parameters.size) if place else 0.0
-        start = np.zeros(problem.forecast.unknowns)
-        start[: parameters.size] = parameters * (1.0 + spread)
-        starts.append(start)
+    rng, own = np.random.default_rng(0), problem.forecast.scales.size
+    starts = [problem.first() for _ in range(count)]
+    for start in starts[1:]:
+        start[:own] *= 1.0 + SPREAD_OF_STARTS * rng.uniform(-1.0, 1.0, own)
     return starts
 
 
-def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit) -> Identification:
+def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: Fitted) -> Identification:
     """Build the result of an identification from its fits.
 
     steps  fit that predicts the step periods; differs from `best` only if angles were fitted at their sample times
     """
-    problem, fitted, forecast, keys = best.problem, best.fitted, best.problem.forecast, question.keys
-    information = information_on(fitted, keys, forecast.scales, forecast.quantities)
+    problem, forecast, keys = best.problem, best.forecast, question.keys
+    information = information_on(best, keys)
     combinations, left_open = open_combinations(information)
     errors = np.sqrt(np.diag(information.covariance)).tolist()
     estimates = tuple(
@@ -217,46 +189,44 @@ def describe(subject: ModelUnderTest, question: Question, steps: Fit, best: Fit)
             any(abs(value - bound) <= AT_BOUND * scale for bound in bounds),
         )
         for key, value, error, start, bounds, scale in zip(
-            keys, forecast.parameters(fitted.u), errors, problem.start, problem.bounds, forecast.scales, strict=True
+            keys, forecast.parameters(best.u), errors, problem.start, problem.bounds, forecast.scales, strict=True
         )
     )
-    verdicts = [
-        judge(each.problem.forecast, each.fitted, typical_sizes(each.problem.forecast), problem.leg_length_m)
-        for each in (steps, best)
-    ]
-    fit_word, reason = next((verdict for verdict in verdicts if verdict[0] != "fits"), verdicts[-1])
-    dof = max(1, fitted.data.residuals.size - fitted.u.size)
+    fit_word, reason = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] != "fits"), ("fits", ""))
+    dof = max(1, best.data.residuals.size - best.u.size)
+    walk = forecast.predict(best.u, best.heights_m)
+    assert walk is not None, "a fitted walk takes all steps"
     return Identification(
         subject.model,
         estimates,
         combinations,
         information,
-        process_noise(fitted),
+        process_noise(best),
         measurement_noise(steps) | measurement_noise(best),
         forecast.steps.count,
         rms_residuals(steps) | rms_residuals(best),
-        fitted.evaluation.squares / dof,
-        gait_with_errors(problem, fitted, information.covariance, subject.units if question.robustness else None),
-        (ModelFit(subject.model, fitted.evaluation.likelihood, fit_word, reason),),
+        best.evaluation.squares / dof,
+        gait_with_errors(best, information.covariance, subject.units if question.robustness else None),
+        (ModelFit(subject.model, best.evaluation.likelihood, fit_word, reason),),
         step_tables(steps),
-        fitted,
-        forecast.walks.disturbed(forecast.start(fitted.u), forecast.parameters(fitted.u), fitted.heights_m),
-        forecast.sensors(fitted.u),
+        best,
+        walk.walk,
+        forecast.sensors(best.u),
         nuisances_with_errors(best, question.nuisance),
     )
 
 
-def nuisances_with_errors(fit: Fit, names: Sequence[str]) -> dict[str, Uncertain]:
+def nuisances_with_errors(fitted: Fitted, names: Sequence[str]) -> dict[str, Uncertain]:
     """Return the estimated properties of clock and sensors with their standard errors."""
-    forecast, fitted = fit.problem.forecast, fit.fitted
+    forecast = fitted.forecast
     variances = np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True))
     own = dict(zip(forecast.nuisances, variances[forecast.unknowns - len(forecast.nuisances) :], strict=True))
     values = forecast.sensors(fitted.u)
     return {name: Uncertain(values[name], NUISANCES[name][1] * math.sqrt(max(own[name], 0.0))) for name in names}
 
 
-def measurement_noise(fit: Fit) -> dict[str, float]:
-    return dict(zip(fit.problem.forecast.quantities, fit.fitted.noise.measurement.tolist(), strict=True))
+def measurement_noise(fitted: Fitted) -> dict[str, float]:
+    return dict(zip(fitted.forecast.quantities, fitted.noise.measurement.tolist(), strict=True))
 
 
 def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
@@ -264,29 +234,26 @@ def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
     roughness = fitted.noise.roughness_m
     if roughness == 0.0:
         return {"roughness_m": 0.0, "standard_error": None, "at_bound": True}
-    products, h = products_of(fitted.data), 1e-2
-    logs = [
-        evaluate(products, fitted.noise._replace(roughness_m=roughness * math.exp(k * h))).restricted
-        for k in (-1, 0, 1)
-    ]
+    h = 1e-2
+    moved = fitted.noise._replace(roughness_m=roughness * np.exp([-h, 0.0, h]))
+    logs = evaluate(fitted.products, moved).restricted
     curvature = (2.0 * logs[1] - logs[0] - logs[2]) / h**2
-    error = roughness / math.sqrt(curvature) if curvature > 0.0 else None
+    error = float(roughness / math.sqrt(curvature)) if curvature > 0.0 else None
     return {"roughness_m": roughness, "standard_error": error, "at_bound": False}
 
 
-def rms_residuals(fit: Fit) -> dict[str, float]:
+def rms_residuals(fitted: Fitted) -> dict[str, float]:
     """Return the rms of measured minus predicted values by quantity, given the most probable floor heights."""
-    forecast, fitted = fit.problem.forecast, fit.fitted
-    about = fitted.data.residuals - fitted.data.G @ fitted.heights_m
+    quantity = fitted.forecast.quantity
     return {
-        name: float(np.sqrt(np.mean(about[forecast.quantity == place] ** 2)))
-        for place, name in enumerate(forecast.quantities)
+        name: float(np.sqrt(np.mean(fitted.residuals[quantity == place] ** 2)))
+        for place, name in enumerate(fitted.forecast.quantities)
     }
 
 
-def step_tables(fit: Fit) -> tuple[StepTable, ...]:
+def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
     """Tabulate measured steps, predicted steps on even ground, and the standard deviation of their difference."""
-    forecast, fitted = fit.problem.forecast, fit.fitted
+    forecast = fitted.forecast
     steps, variance = forecast.steps.count, fitted.noise.measurement[forecast.quantity] ** 2
     total = np.sqrt(variance + (fitted.noise.roughness_m**2) * (fitted.data.G**2).sum(axis=1))
     return tuple(
@@ -297,16 +264,14 @@ def step_tables(fit: Fit) -> tuple[StepTable, ...]:
     )
 
 
-def gait_with_errors(
-    problem: FitProblem, fitted: Fitted, covariance: Floats, units: Units | None
-) -> dict[str, Uncertain]:
+def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) -> dict[str, Uncertain]:
     """Return period, step length and spectral radius of the identified gait, with errors propagated from the estimates.
 
     Empty if the identified walker has no one-step gait near the fitted start.
 
     units  units of the walker; None leaves out the gait's sensitivity to a drop of the floor
     """
-    forecast = problem.forecast
+    forecast = fitted.forecast
 
     def quantities(move: Floats) -> Floats | None:
         parameters = forecast.parameters(fitted.u + move)

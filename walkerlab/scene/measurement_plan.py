@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.errors import NoAnswer
-from walkerlab.physics.estimation.expectation import PlannedWalk, planned_walk
-from walkerlab.physics.estimation.information import open_combinations
+from walkerlab.physics.estimation.fit import linearise
+from walkerlab.physics.estimation.information import information_from, open_combinations
 from walkerlab.physics.estimation.measurements import (
     LEG_ANGLE,
     STEP_LENGTH,
@@ -19,12 +21,14 @@ from walkerlab.physics.estimation.measurements import (
     MeasuredSteps,
     split_into_steps,
 )
-from walkerlab.physics.estimation.prediction import DELAY
+from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
+from walkerlab.physics.estimation.prediction import DELAY, Forecast
 from walkerlab.physics.estimation.result import Unidentifiable
-from walkerlab.scene.identification import ConfigFamily, Measured, Question, problem_of, step_map_of
+from walkerlab.scene.identification import ConfigFamily, Measured, problem_of, step_map_of
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
 if TYPE_CHECKING:
+    from walkerlab.config.identify import Identify
     from walkerlab.config.plan import Plan
     from walkerlab.config.schema import Config
 
@@ -56,9 +60,8 @@ class WayToMeasure:
 def plan_measurements(
     config: Config,
     gait: Mapping[str, Any],
-    question: Question,
+    question: Identify,
     plan: Plan,
-    model: str,
     note: Callable[[str], None] = lambda _: None,
 ) -> tuple[WayToMeasure, ...]:
     """Compute the parameter errors that would remain after each way of measuring a walk, simple ways first.
@@ -68,23 +71,14 @@ def plan_measurements(
 
     Raises NoAnswer if the model's walk ends early, ConfigError for keys that are not parameters.
     """
-    subject = find_model_gait(model, config, gait, note)
-    noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
+    subject = find_model_gait(question.model, config, gait, note)
     options = []
     for start, change in ((AT_GAIT, 0.0), (OFF_GAIT, plan.start_change)):
         moved = replace(subject, z=subject.z * (1.0 + change))
-        steps, angles = predict_measured(moved, question, plan)
-        of_steps, of_angles = walk_of(moved, steps, question), walk_of(moved, angles, question)
+        of_steps, of_angles = (walk_of(moved, each, question) for each in predict_measured(moved, question, plan))
         for measurement, quantities in (*STEP_MEASUREMENTS.items(), (ANGLES, (LEG_ANGLE,))):
             walk = of_angles if measurement == ANGLES else of_steps
-
-            def errors_after(count: int, walk: PlannedWalk = walk, quantities: tuple[str, ...] = quantities) -> Errors:
-                information = walk.expect(count, quantities, noise, plan.roughness_m)
-                combinations, left_open = open_combinations(information)
-                deviations = np.sqrt(np.diag(information.covariance)).tolist()
-                by_key = zip(question.keys, deviations, strict=True)
-                return {key: None if key in left_open else value for key, value in by_key}, combinations
-
+            errors_after = partial(expected_errors, walk, quantities, question.keys, plan)
             counts = {*(count for count in CURVE if count <= plan.max_steps), plan.max_steps}
             needed = {key: steps_for(key, error, errors_after, plan.max_steps) for key, error in plan.errors.items()}
             curve = {count: errors_after(count)[0] for count in sorted(counts)}
@@ -95,10 +89,10 @@ def plan_measurements(
 Errors = tuple[dict[str, float | None], tuple[Unidentifiable, ...]]
 
 
-def predict_measured(subject: ModelUnderTest, question: Question, plan: Plan) -> tuple[MeasuredSteps, MeasuredAngles]:
+def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) -> tuple[MeasuredSteps, MeasuredAngles]:
     """Predict the measurements of a walk from the subject's state z; raises NoAnswer if the walk ends early."""
     family = ConfigFamily(subject.config, question.keys)
-    walks, level = step_map_of(subject.model, family, subject.length_m), np.zeros(plan.max_steps + 2)
+    walks, level = step_map_of(subject, family), np.zeros(plan.max_steps + 2)
     walk = walks.disturbed(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
         raise NoAnswer(
@@ -113,19 +107,48 @@ def predict_measured(subject: ModelUnderTest, question: Question, plan: Plan) ->
     return of_steps, split_into_steps(times, angles, touches)
 
 
-def walk_of(subject: ModelUnderTest, measured: Measured, question: Question) -> PlannedWalk:
+@dataclass(frozen=True, eq=False)
+class PlannedWalk:
+    """Predicted walk that has not been measured, with its derivatives."""
+
+    forecast: Forecast
+    data: Linearised
+    step: NDArray[np.int64]  # (values,) index of each value's step
+
+
+def walk_of(subject: ModelUnderTest, measured: Measured, question: Identify) -> PlannedWalk:
     """Return the planned walk with its derivatives; raises NoAnswer if a slightly changed walk ends early."""
     problem = problem_of(subject, measured, question)
     if isinstance(measured, MeasuredAngles):
         nuisances = tuple(dict.fromkeys((*question.nuisance, DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
-    walk = planned_walk(problem, question.keys)
-    if walk is None:
+    forecast = problem.forecast
+    data = linearise(problem, problem.first(), np.zeros(forecast.heights), exact=True)
+    if data is None:
         raise NoAnswer(
             f"a {subject.model}-model walk with slightly changed parameters, needed for the derivatives, ends early.",
             SHORTER_WALK,
         )
-    return walk
+    step = np.tile(np.arange(forecast.steps.count), len(forecast.channels))
+    if isinstance(measured, MeasuredAngles):
+        step = np.append(step, np.repeat(measured.step, 2))
+    return PlannedWalk(forecast, data, step)
+
+
+def expected_errors(
+    walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
+) -> Errors:
+    """Return the errors that remain after the `measured` quantities of the first steps, and what remains open."""
+    noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
+    data, quantities = walk.data, walk.forecast.quantities
+    rows = np.isin(data.quantity, [quantities.index(name) for name in measured]) & (walk.step < steps)
+    seen = replace(data, residuals=data.residuals[rows], J=data.J[rows], G=data.G[rows], quantity=data.quantity[rows])
+    deviations = Noise(np.array([noise[name] for name in quantities]), plan.roughness_m)
+    whole = evaluate(products_of(seen), deviations).information
+    information = information_from(whole, keys, walk.forecast.scales, int(np.count_nonzero(rows)))
+    combinations, left_open = open_combinations(information)
+    errors = zip(keys, np.sqrt(np.diag(information.covariance)).tolist(), strict=True)
+    return {key: None if key in left_open else error for key, error in errors}, combinations
 
 
 def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], most: int) -> int | None:

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from walkerlab.api import in_memory
+from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.fit import linearise
 from walkerlab.physics.estimation.measurements import MeasuredSteps
 from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
-from walkerlab.scene.identification import Question, problem_of
+from walkerlab.scene.identification import problem_of
 from walkerlab.scene.subject import find_model_gait
 
 SLOPES_DEG = (2.96, 3.0, 3.02)
@@ -25,7 +26,7 @@ STEPS, PARTICLES, ROUGHNESS_M, NOISE = 4, 1000, 2e-4, np.array([1e-3, 1e-3])
 def problem():
     config = load(Path("slope-3deg")).config
     subject = find_model_gait("rigid", config, in_memory("fixedpoint", config).summary, print)
-    question = Question({"slope_deg": None}, {})
+    question = Identify(fit={"slope_deg": None})
     rng = np.random.default_rng(5)
     planned = MeasuredSteps(np.ones(STEPS), np.ones(STEPS))
     walks = problem_of(subject, planned, question).forecast.walks

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from walkerlab.physics.estimation.mixed_model import (
     Evaluation,
     Linearised,
     Noise,
+    Products,
     estimate_noise,
     evaluate,
     products_of,
@@ -43,10 +45,16 @@ class FitProblem:
     forecast: Forecast
     leg_length_m: float
     start: tuple[float, ...]  # initial values of the parameters, in their units
-    bounds: Sequence[tuple[float, float]]  # (low, high) of each parameter, infinite where unbounded
+    bounds: Sequence[Sequence[float]]  # (low, high) of each parameter, infinite where unbounded
     # (value, standard deviation) of parameters with prior knowledge, by index, in their units
-    priors: dict[int, tuple[float, float]] = field(default_factory=dict)
+    priors: Mapping[int, Sequence[float]] = field(default_factory=dict)
     loss: Loss = "linear"
+
+    def first(self) -> Floats:
+        """Return the scaled unknowns (unknowns,) at the start."""
+        u = np.zeros(self.forecast.unknowns)
+        u[: self.forecast.scales.size] = np.array(self.start) / self.forecast.scales
+        return u
 
     def limits(self) -> tuple[Floats, Floats]:
         """Return lower and upper bounds (unknowns,) of the scaled unknowns."""
@@ -66,6 +74,7 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
+    problem: FitProblem
     u: Floats  # (unknowns,) scaled unknowns
     heights_m: Floats  # (heights,) most probable floor heights
     noise: Noise
@@ -73,6 +82,19 @@ class Fitted:
     data: Linearised
     predicted: Prediction  # walk over even ground, from the most probable start
     why: str = ""  # reason why it did not converge; empty if it did
+
+    @property
+    def forecast(self) -> Forecast:
+        return self.problem.forecast
+
+    @cached_property
+    def products(self) -> Products:
+        return products_of(self.data)
+
+    @property
+    def residuals(self) -> Floats:
+        """Measured minus predicted values (values,) over the most probable floor."""
+        return np.asarray(self.data.residuals - self.data.G @ self.heights_m)
 
 
 def fit(problem: FitProblem, start: Floats) -> Fitted | str:
@@ -110,12 +132,12 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return NO_NEIGHBOURS
-    return Fitted(u, heights, noise, evaluate(products_of(data), noise), data, predicted, why)
+    return Fitted(problem, u, heights, noise, evaluate(products_of(data), noise), data, predicted, why)
 
 
-def evaluate_at(problem: FitProblem, u: Floats, like: Fitted) -> Fitted | None:
+def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     """Estimate the standard deviations at u (unknowns,), starting from another fit; None if a walk ends early."""
-    even = np.zeros(problem.forecast.heights)
+    problem, even = like.problem, np.zeros(like.forecast.heights)
     data, predicted = linearise(problem, u, even), problem.forecast.predict(u, even)
     if data is None or predicted is None:
         return None

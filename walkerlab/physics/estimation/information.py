@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.physics.estimation.fit import Fitted
-from walkerlab.physics.estimation.mixed_model import Evaluation, evaluate, noise_at, products_of
+from walkerlab.physics.estimation.mixed_model import Evaluation, evaluate, noise_at
 from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
@@ -26,16 +26,12 @@ FARTHEST_NOISE: Final = (3.0, 1.5)
 LOADED: Final = 0.1
 
 
-def information_on(fitted: Fitted, keys: tuple[str, ...], scales: Floats, quantities: tuple[str, ...]) -> Information:
-    """Return a fit's information about its parameters; `scales` (parameters,) are their typical changes."""
+def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
+    """Return a fit's information about its parameters."""
     values_count = fitted.data.residuals.size + len(fitted.data.prior)
-    plain = information_from(fitted.evaluation.information, keys, scales, values_count)
+    plain = information_from(fitted.evaluation.information, keys, fitted.forecast.scales, values_count)
     basis = plain.directions[~is_open(plain.singular_values)]
-    return replace(
-        plain,
-        freedom=effective_freedom(fitted, plain, basis),
-        contributions=contributions(fitted, quantities, len(keys), basis),
-    )
+    return replace(plain, freedom=effective_freedom(fitted, plain, basis), contributions=contributions(fitted, basis))
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
@@ -71,13 +67,13 @@ def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -
 def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     """Average the covariance along directions `basis` (directions, parameters) over plausible standard deviations."""
     # The weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
-    products, noise = products_of(fitted.data), fitted.noise
-    count = basis.shape[1]
+    noise, count = fitted.noise, basis.shape[1]
+    rough = float(noise.roughness_m > 0.0)
     centre = np.log(np.append(noise.measurement, noise.roughness_m or 1.0))
 
     def evaluate_at(logs: Floats) -> Evaluation:
         drawn = noise_at(logs, True)
-        return evaluate(products, drawn if noise.roughness_m else drawn._replace(roughness_m=0.0 * drawn.roughness_m))
+        return evaluate(fitted.products, drawn._replace(roughness_m=rough * drawn.roughness_m))
 
     draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
     logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(evaluate_at, centre)))
@@ -145,16 +141,17 @@ def reason_in_words(value: float, largest: float) -> str:
     return f"changing it by its whole size moves the walk by only {value:.2g} standard deviations of the data"
 
 
-def contributions(fitted: Fitted, quantities: tuple[str, ...], count: int, basis: Floats) -> dict[str, float]:
+def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
     """Return the fraction of information along `basis` (directions, count) that is lost without each quantity."""
+    count, quantities = basis.shape[1], fitted.forecast.quantities
     if not len(basis):
         return dict.fromkeys(quantities, 0.0)
     whole = np.diag(basis @ free_the_rest(fitted.evaluation.information, count) @ basis.T)
-    products, losses = products_of(fitted.data), []
+    losses = []
     for place in range(len(quantities)):
         noise = fitted.noise.measurement.copy()
         noise[place] *= 1e6
-        without = evaluate(products, fitted.noise._replace(measurement=noise)).information
+        without = evaluate(fitted.products, fitted.noise._replace(measurement=noise)).information
         left = np.diag(basis @ free_the_rest(without, count) @ basis.T)
         losses.append(float(np.mean(1.0 - np.clip(left / whole, 0.0, 1.0))))
     return dict(zip(quantities, losses, strict=True))

@@ -11,7 +11,6 @@ from scipy.special import ndtri, stdtr
 from walkerlab.physics.estimation.fit import Fitted
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, MeasuredAngles
 from walkerlab.physics.estimation.mixed_model import whitening
-from walkerlab.physics.estimation.prediction import Forecast
 from walkerlab.physics.estimation.result import Fit
 from walkerlab.physics.solvers.system import Floats
 
@@ -23,8 +22,9 @@ ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even s
 PHASE_BINS: Final = 20
 
 
-def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float) -> tuple[Fit, str]:
-    """Return whether a model fits, and the reason if it does not; `sizes` are the quantities' typical values."""
+def judge(fitted: Fitted) -> tuple[Fit, str]:
+    """Return whether a model fits, and the reason if it does not."""
+    forecast, sizes = fitted.forecast, fitted.data.sizes
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             name, unit = name_and_unit(quantity)
@@ -35,9 +35,9 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
             )
     if fitted.why:
         return "not-converged", fitted.why
-    if fitted.noise.roughness_m > ROUGHEST * leg_length_m:
+    if fitted.noise.roughness_m > ROUGHEST * fitted.problem.leg_length_m:
         return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough could explain the steps"
-    white = whitened_residuals(forecast, fitted)
+    white = whitening(fitted.data.G, forecast.quantity, fitted.noise)(fitted.data.residuals)
     steps = forecast.steps.count
     for place, quantity in enumerate(forecast.channels):
         own, name = white[place * steps : (place + 1) * steps], name_and_unit(quantity)[0]
@@ -51,18 +51,15 @@ def judge(forecast: Forecast, fitted: Fitted, sizes: Floats, leg_length_m: float
             reason = f"the {name} alternates from step to step by {alternation:.2g} standard deviations: a limp"
             return "misfit", reason
     if isinstance(forecast.measured, MeasuredAngles):
-        return judge_phases(forecast, fitted, sizes[forecast.quantities.index(LEG_ANGLE)])
+        systematic = float(np.sqrt(np.nanmean(phase_means(forecast.measured, fitted) ** 2)))
+        if systematic > LARGEST_SHARE * sizes[forecast.quantities.index(LEG_ANGLE)]:
+            return "misfit", f"the angles differ by {systematic:.3g} rad at the same phase of every step"
     return "fits", ""
 
 
 def name_and_unit(quantity: str) -> tuple[str, str]:
     name, _, unit = quantity.rpartition("_")
     return name.replace("_", " "), unit
-
-
-def whitened_residuals(forecast: Forecast, fitted: Fitted) -> Floats:
-    whiten = whitening(fitted.data.G, forecast.quantity, fitted.noise)
-    return whiten(fitted.data.residuals)
 
 
 def alternation_of(residuals: Floats) -> float:
@@ -75,23 +72,12 @@ def alternation_of(residuals: Floats) -> float:
     return -float(ndtri(max(stdtr(residuals.size - 2, -t), 1e-300)))
 
 
-def judge_phases(forecast: Forecast, fitted: Fitted, size: float) -> tuple[Fit, str]:
-    """Judge the angles by their mean difference at each phase of the step, relative to their `size` (rad)."""
-    assert isinstance(forecast.measured, MeasuredAngles)
-    mean = phase_means(forecast, fitted)
-    systematic = float(np.sqrt(np.nanmean(mean**2)))
-    if systematic > LARGEST_SHARE * size:
-        return "misfit", f"the angles differ by {systematic:.3g} rad at the same phase of every step"
-    return "fits", ""
-
-
-def phase_means(forecast: Forecast, fitted: Fitted) -> Floats:
+def phase_means(measured: MeasuredAngles, fitted: Fitted) -> Floats:
     """Return the mean residual (phases, 2) of the angles at each phase of the step, the swing leg's first."""
-    assert isinstance(forecast.measured, MeasuredAngles)
-    residuals = fitted.data.residuals[-forecast.measured.angles_rad.size :].reshape(-1, 2)
-    swaps = forecast.measured.step % 2 == 1
+    residuals = fitted.data.residuals[-measured.angles_rad.size :].reshape(-1, 2)
+    swaps = measured.step % 2 == 1
     residuals = np.where(swaps[:, None], residuals[:, ::-1], residuals)
-    bins = np.minimum((PHASE_BINS * forecast.measured.phase).astype(int), PHASE_BINS - 1)
+    bins = np.minimum((PHASE_BINS * measured.phase).astype(int), PHASE_BINS - 1)
     counts = np.bincount(bins, minlength=PHASE_BINS)
     sums = np.array([np.bincount(bins, residuals[:, leg], PHASE_BINS) for leg in range(2)]).T
     return np.asarray(sums[counts > 0] / counts[counts > 0, None])

@@ -10,37 +10,22 @@ from walkerlab.config.reads import ContactConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.scene.families import refuse_unread
-from walkerlab.scene.identification import SCALE_OF_ZERO, Question
+from walkerlab.scene.identification import SCALE_OF_ZERO
 from walkerlab.scene.parameter import parameter_of
 
 EXACT: Final = 1e-9  # a prior whose standard deviation is below this fraction of its value counts as exact
 
 
-def question_of(block: Identify) -> Question:
-    return Question(
-        {key: None if bounds is None else (bounds[0], bounds[1]) for key, bounds in block.fit.items()},
-        {key: (value, sigma) for key, (value, sigma) in block.prior.items()},
-        block.nuisance,
-        block.loss,
-        block.starts,
-        block.robustness,
-    )
-
-
-def models_of(block: Identify) -> tuple[str, ...]:
-    return ("rigid", "contact") if block.model == "both" else (block.model,)
-
-
 def refuse_model(config: ContactConfig, block: Identify) -> None:
     """Raise ConfigError if the contact model is requested and the config has no contact block."""
-    if "contact" in models_of(block) and config.contact is None:
+    if "contact" in block.models and config.contact is None:
         raise contact_required_error(f"identify.model: {block.model}", config.walker, "Add one.")
 
 
 def refuse_keys(config: ContactConfig, block: Identify) -> None:
     """Raise ConfigError for a key that is not a parameter of the models, or a value or prior that cannot be used."""
-    refuse_values(config, "fit", block.fit, models_of(block))
-    refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, models_of(block))
+    refuse_values(config, "fit", block.fit, block.models)
+    refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, block.models)
     for key, (value, sigma) in block.prior.items():
         if sigma < EXACT * (abs(value) or SCALE_OF_ZERO):
             raise ConfigError(

@@ -22,7 +22,7 @@ from walkerlab.physics.hybrid.rigid_measures import FootholdsOfWalk, places
 from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.estimated import models_of, question_of, refuse_keys, refuse_model
+from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, Measured, divide_at, read_divisions, read_measured
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, over_time
@@ -53,10 +53,10 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     block = config.identify
     assert block is not None, "refuse rejects a config without the block"
     progress.start("identify")
-    gait, models = inputs["fixedpoint"].summary, models_of(block)
+    gait = inputs["fixedpoint"].summary
 
     def ask(measured: Measured) -> Identification:
-        return identify_walk(cast("Config", config), measured, gait, question_of(block), models, progress.note)
+        return identify_walk(cast("Config", config), measured, gait, block, progress.note)
 
     result, measured = identify_divided(config, block, ask)
     content, verdict = content_of(config, result, measured), verdict_of(result)
@@ -223,8 +223,7 @@ def step_group(result: Identification) -> Group:
 
 def angle_residuals(result: Identification, measured: MeasuredAngles) -> Floats:
     """Return measured minus predicted angles (samples, 2) on the most probable floor."""
-    about = result.fitted.data.residuals - result.fitted.data.G @ result.fitted.heights_m
-    return about[-measured.angles_rad.size :].reshape(-1, 2)
+    return result.fitted.residuals[-measured.angles_rad.size :].reshape(-1, 2)
 
 
 def sample_group(result: Identification, measured: MeasuredAngles) -> Group:

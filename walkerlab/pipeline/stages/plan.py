@@ -13,7 +13,7 @@ from walkerlab.config.plan import Plan
 from walkerlab.config.reads import PlanConfig
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.estimated import question_of, refuse_keys, refuse_model
+from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.measurement_plan import WayToMeasure, plan_measurements
 from walkerlab.scene.parameter import parameter_of
@@ -32,7 +32,7 @@ def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -
     if block.data:
         progress.note(f"a plan needs no measured walk: {block.data} is not read")
     gait = inputs["fixedpoint"].summary
-    options = plan_measurements(cast("Config", config), gait, question_of(block), plan, block.model, progress.note)
+    options = plan_measurements(cast("Config", config), gait, block, plan, progress.note)
     keys = tuple(options[0].errors)
     units = {key: parameter_of(key, config).unit for key in keys}
     determining = next((option for option in options if None not in option.errors.values()), None)
@@ -57,12 +57,11 @@ def refuse(config: PlanConfig) -> None:
     if block.model == "both":
         raise ConfigError("identify.model: both: a plan is for one model.", "Choose --model rigid or contact.")
     refuse_model(config, block)
-    question = question_of(block)
     refuse_keys(config, block)
     for key in plan.errors:
-        if key not in question.keys:
+        if key not in block.keys:
             raise ConfigError(
-                f"plan.errors: {key} is not estimated.", f"Name one of {', '.join(question.keys)}, or add --fit {key}.",
+                f"plan.errors: {key} is not estimated.", f"Name one of {', '.join(block.keys)}, or add --fit {key}.",
                 ("plan", "errors"),
             )  # fmt: skip
     if plan.steps > plan.max_steps:
