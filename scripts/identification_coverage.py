@@ -24,7 +24,7 @@ from scipy.stats import f as fisher
 from walkerlab.api import in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
-from walkerlab.physics.estimation.measurements import MeasuredSteps, split_into_steps
+from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.physics.orbits.family_search import CONTACT, RIGID
 from walkerlab.scene.identification import ConfigFamily, identify_walk, step_map_of
 from walkerlab.scene.subject import find_model_gait
@@ -71,7 +71,7 @@ class Truth:
         periods = walk.durations_s + draw.normal(0.0, NOISE[0] * self.clock, STEPS)
         lengths = walk.lengths_m + draw.normal(0.0, NOISE[1] * self.leg, STEPS)
         if self.level != "angles":
-            return MeasuredSteps(periods, lengths), weighed
+            return MeasuredWalk(periods, lengths), weighed
         touches = np.append(0.0, np.cumsum(walk.durations_s))
         times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3 * self.clock)
         angles = self.walks.sampled(z, tuple(self.values), heights, times)

@@ -12,7 +12,7 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.outcome import Outcome
-from walkerlab.physics.estimation.measurements import MeasuredSteps
+from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.orbits.step_map import StepMap
 from walkerlab.scene.identification import identify_walk, problem_of
 from walkerlab.scene.subject import find_model_gait
@@ -76,7 +76,7 @@ def test_a_rigid_walk_holds_no_scale_of_mass():
 def test_two_exact_steps_name_every_parameter_that_they_leave_open():
     own = truth()
     walk = own.walks.disturbed(own.z * 1.01, tuple(own.values), np.zeros(3))
-    measured = MeasuredSteps(walk.durations_s, walk.lengths_m)
+    measured = MeasuredWalk(walk.durations_s, walk.lengths_m)
     result = identify_walk(own.config, measured, own.gait, Identify(fit=dict.fromkeys(KEYS)))
     left_open = {estimate.key for estimate in result.estimates if estimate.standard_error is None}
     assert left_open == {key for key in KEYS if any(key in entry.combination for entry in result.not_identifiable)}
@@ -122,7 +122,7 @@ def test_tangent_columns_of_a_walk_are_its_difference_quotients(name):
 def test_noise_free_steps_give_the_parameters_to_many_digits():
     own = truth()
     walk = own.walks.disturbed(own.z * 1.005, tuple(own.values), np.zeros(21))
-    measured = MeasuredSteps(walk.durations_s, walk.lengths_m)
+    measured = MeasuredWalk(walk.durations_s, walk.lengths_m)
     result = identify(measured, "slope_deg=3.03", "walker.leg_length_m=1.01")
     assert result.process["at_bound"]
     assert [estimate.value for estimate in result.estimates] == pytest.approx(own.values, rel=1e-5)
@@ -135,10 +135,10 @@ def wrong_walks():
     missed = np.concatenate((periods[:7], [periods[7] + periods[8]], periods[9:]))
     missed_lengths = np.concatenate((lengths[:7], [lengths[7] + lengths[8]], lengths[9:]))
     return {
-        "limp": MeasuredSteps(periods * limp, lengths / limp),
-        "missed step": MeasuredSteps(missed, missed_lengths),
-        "mm for m": MeasuredSteps(periods, 1e3 * lengths),
-        "ms for s": MeasuredSteps(1e3 * periods, lengths),
+        "limp": MeasuredWalk(periods * limp, lengths / limp),
+        "missed step": MeasuredWalk(missed, missed_lengths),
+        "mm for m": MeasuredWalk(periods, 1e3 * lengths),
+        "ms for s": MeasuredWalk(1e3 * periods, lengths),
     }
 
 

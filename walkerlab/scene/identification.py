@@ -15,7 +15,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.estimation.fit import FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
-from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
+from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import evaluate
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from walkerlab.config.identify import Identify
     from walkerlab.config.schema import Config
 
-Measured = MeasuredSteps | MeasuredAngles
 Values = tuple[float, ...]
 CONFIGS_AT_ONCE: Final = 512
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
@@ -88,7 +87,7 @@ def step_map_of(subject: ModelUnderTest, family: ConfigFamily) -> StepMap:
 
 def identify_walk(
     config: Config,
-    measured: Measured,
+    measured: MeasuredWalk,
     gait: Mapping[str, Any],
     question: Identify,
     note: Callable[[str], None] = lambda _: None,
@@ -118,7 +117,7 @@ def identify_walk(
 def identify_with(
     model: str,
     config: Config,
-    measured: Measured,
+    measured: MeasuredWalk,
     gait: Mapping[str, Any],
     question: Identify,
     note: Callable[[str], None],
@@ -140,7 +139,7 @@ def identify_with(
 def in_time(first: Fitted) -> Fitted | None:
     """Refit angles at their sample times, from the fit at equal phase; None for measured steps or a failed fit."""
     forecast, u = first.forecast, first.u
-    if not isinstance(forecast.measured, MeasuredAngles):
+    if not forecast.measured.sampled:
         return None
     nuisances = forecast.nuisances if DELAY in forecast.nuisances else (*forecast.nuisances, DELAY)
     start = u if nuisances == forecast.nuisances else np.append(u, 0.0)
@@ -149,7 +148,7 @@ def in_time(first: Fitted) -> Fitted | None:
     return fitted if isinstance(fitted, Fitted) and not fitted.why else None
 
 
-def problem_of(subject: ModelUnderTest, measured: Measured, question: Identify) -> FitProblem:
+def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> FitProblem:
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family)
     directions = felt_directions(walks, subject.z, family.start)
@@ -203,7 +202,6 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         information,
         process_noise(best),
         measurement_noise(steps) | measurement_noise(best),
-        forecast.steps.count,
         rms_residuals(steps) | rms_residuals(best),
         best.evaluation.squares / dof,
         gait_with_errors(best, information.covariance, subject.units if question.robustness else None),
@@ -211,7 +209,6 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         step_tables(steps),
         best,
         walk.walk,
-        forecast.sensors(best.u),
         nuisances_with_errors(best, question.nuisance),
     )
 
@@ -254,7 +251,7 @@ def rms_residuals(fitted: Fitted) -> dict[str, float]:
 def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
     """Tabulate measured steps, predicted steps on even ground, and the standard deviation of their difference."""
     forecast = fitted.forecast
-    steps, variance = forecast.steps.count, fitted.noise.measurement[forecast.quantity] ** 2
+    steps, variance = forecast.measured.count, fitted.noise.measurement[forecast.quantity] ** 2
     total = np.sqrt(variance + (fitted.noise.roughness_m**2) * (fitted.data.G**2).sum(axis=1))
     return tuple(
         StepTable(name, values, fitted.predicted.values[first : first + steps], total[first : first + steps])

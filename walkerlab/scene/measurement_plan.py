@@ -17,14 +17,13 @@ from walkerlab.physics.estimation.measurements import (
     LEG_ANGLE,
     STEP_LENGTH,
     STEP_PERIOD,
-    MeasuredAngles,
-    MeasuredSteps,
+    MeasuredWalk,
     split_into_steps,
 )
 from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
 from walkerlab.physics.estimation.prediction import DELAY, Forecast
 from walkerlab.physics.estimation.result import Unidentifiable
-from walkerlab.scene.identification import ConfigFamily, Measured, problem_of, step_map_of
+from walkerlab.scene.identification import ConfigFamily, problem_of, step_map_of
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
 if TYPE_CHECKING:
@@ -89,7 +88,7 @@ def plan_measurements(
 Errors = tuple[dict[str, float | None], tuple[Unidentifiable, ...]]
 
 
-def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) -> tuple[MeasuredSteps, MeasuredAngles]:
+def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) -> tuple[MeasuredWalk, MeasuredWalk]:
     """Predict the measurements of a walk from the subject's state z; raises NoAnswer if the walk ends early."""
     family = ConfigFamily(subject.config, question.keys)
     walks, level = step_map_of(subject, family), np.zeros(plan.max_steps + 2)
@@ -103,7 +102,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     touches = np.append(0.0, np.cumsum(walk.durations_s[steps]))
     times = np.arange(0.0, touches[-1], 1.0 / plan.rate_hz)
     angles = walks.sampled(subject.z, family.start, level, times)  # type: ignore[arg-type]
-    of_steps = MeasuredSteps(walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps])
+    of_steps = MeasuredWalk(walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps])
     return of_steps, split_into_steps(times, angles, touches)
 
 
@@ -116,10 +115,10 @@ class PlannedWalk:
     step: NDArray[np.int64]  # (values,) index of each value's step
 
 
-def walk_of(subject: ModelUnderTest, measured: Measured, question: Identify) -> PlannedWalk:
+def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> PlannedWalk:
     """Return the planned walk with its derivatives; raises NoAnswer if a slightly changed walk ends early."""
     problem = problem_of(subject, measured, question)
-    if isinstance(measured, MeasuredAngles):
+    if measured.sampled:
         nuisances = tuple(dict.fromkeys((*question.nuisance, DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast
@@ -129,10 +128,8 @@ def walk_of(subject: ModelUnderTest, measured: Measured, question: Identify) -> 
             f"a {subject.model}-model walk with slightly changed parameters, needed for the derivatives, ends early.",
             SHORTER_WALK,
         )
-    step = np.tile(np.arange(forecast.steps.count), len(forecast.channels))
-    if isinstance(measured, MeasuredAngles):
-        step = np.append(step, np.repeat(measured.step, 2))
-    return PlannedWalk(forecast, data, step)
+    steps = np.tile(np.arange(measured.count), len(forecast.channels))
+    return PlannedWalk(forecast, data, np.append(steps, np.repeat(measured.step, 2)))
 
 
 def expected_errors(

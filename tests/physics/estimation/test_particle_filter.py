@@ -12,7 +12,7 @@ from walkerlab.api import in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.fit import linearise
-from walkerlab.physics.estimation.measurements import MeasuredSteps
+from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
 from walkerlab.scene.identification import problem_of
 from walkerlab.scene.subject import find_model_gait
@@ -28,12 +28,12 @@ def problem():
     subject = find_model_gait("rigid", config, in_memory("fixedpoint", config).summary, print)
     question = Identify(fit={"slope_deg": None})
     rng = np.random.default_rng(5)
-    planned = MeasuredSteps(np.ones(STEPS), np.ones(STEPS))
+    planned = MeasuredWalk(np.ones(STEPS), np.ones(STEPS))
     walks = problem_of(subject, planned, question).forecast.walks
     heights = rng.normal(0.0, ROUGHNESS_M, STEPS + 1)
     walk = walks.disturbed(subject.z, (3.0,), heights)
     periods, lengths = (values + rng.normal(0.0, 1e-3, STEPS) for values in (walk.durations_s, walk.lengths_m))
-    return problem_of(subject, MeasuredSteps(periods, lengths), question)
+    return problem_of(subject, MeasuredWalk(periods, lengths), question)
 
 
 def likelihood(problem, u):

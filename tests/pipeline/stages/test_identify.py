@@ -181,7 +181,7 @@ def test_sampled_angles_are_divided_at_their_heel_strikes(transient, tmp_path):
     measured = read_measured(config.identify, config)
     expected = transient.groups["steps"]["period_s"][-measured.count :]
     assert measured.count >= 18
-    assert np.allclose(measured.steps.periods_s, expected, atol=2e-4)
+    assert np.allclose(measured.periods_s, expected, atol=2e-4)
     assert 0.0 <= measured.phase.min() <= measured.phase.max() < 1.0
 
 

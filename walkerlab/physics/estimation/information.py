@@ -42,13 +42,9 @@ def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, value
     singular, directions = np.sqrt(np.maximum(sizes[order], 0.0)), vectors[:, order].T
     basis = directions[~is_open(singular)]
     covariance = basis.T @ np.linalg.pinv(basis @ reduced @ basis.T, hermitian=True) @ basis
-    freedom, scaled = float(max(1, values - len(whole))), covariance * np.outer(scales, scales)
-    return Information(keys, correlations(covariance), singular, directions, scaled, scales, freedom, {})
-
-
-def correlations(covariance: Floats) -> Floats:
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    return np.asarray(covariance / np.outer(errors, errors))
+    freedom, scaled = float(max(1, values - len(whole))), covariance * np.outer(scales, scales)
+    return Information(keys, covariance / np.outer(errors, errors), singular, directions, scaled, scales, freedom, {})
 
 
 def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:

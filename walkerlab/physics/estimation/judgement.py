@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri, stdtr
 
 from walkerlab.physics.estimation.fit import Fitted
-from walkerlab.physics.estimation.measurements import LEG_ANGLE, MeasuredAngles
+from walkerlab.physics.estimation.measurements import LEG_ANGLE
 from walkerlab.physics.estimation.mixed_model import whitening
 from walkerlab.physics.estimation.result import Fit
 from walkerlab.physics.solvers.system import Floats
@@ -27,8 +27,7 @@ def judge(fitted: Fitted) -> tuple[Fit, str]:
     forecast, sizes = fitted.forecast, fitted.data.sizes
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
-            name, unit = name_and_unit(quantity)
-            share = 100.0 * noise / size
+            (name, unit), share = name_and_unit(quantity), 100.0 * noise / size
             return (
                 "misfit",
                 f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.0f} % of its size",
@@ -38,7 +37,7 @@ def judge(fitted: Fitted) -> tuple[Fit, str]:
     if fitted.noise.roughness_m > ROUGHEST * fitted.problem.leg_length_m:
         return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough could explain the steps"
     white = whitening(fitted.data.G, forecast.quantity, fitted.noise)(fitted.data.residuals)
-    steps = forecast.steps.count
+    steps = forecast.measured.count
     for place, quantity in enumerate(forecast.channels):
         own, name = white[place * steps : (place + 1) * steps], name_and_unit(quantity)[0]
         worst = int(np.argmax(np.abs(own)))
@@ -50,8 +49,8 @@ def judge(fitted: Fitted) -> tuple[Fit, str]:
         if (alternation := alternation_of(own)) > ALTERNATION:
             reason = f"the {name} alternates from step to step by {alternation:.2g} standard deviations: a limp"
             return "misfit", reason
-    if isinstance(forecast.measured, MeasuredAngles):
-        systematic = float(np.sqrt(np.nanmean(phase_means(forecast.measured, fitted) ** 2)))
+    if forecast.measured.sampled:
+        systematic = float(np.sqrt(np.nanmean(phase_means(fitted) ** 2)))
         if systematic > LARGEST_SHARE * sizes[forecast.quantities.index(LEG_ANGLE)]:
             return "misfit", f"the angles differ by {systematic:.3g} rad at the same phase of every step"
     return "fits", ""
@@ -72,8 +71,9 @@ def alternation_of(residuals: Floats) -> float:
     return -float(ndtri(max(stdtr(residuals.size - 2, -t), 1e-300)))
 
 
-def phase_means(measured: MeasuredAngles, fitted: Fitted) -> Floats:
+def phase_means(fitted: Fitted) -> Floats:
     """Return the mean residual (phases, 2) of the angles at each phase of the step, the swing leg's first."""
+    measured = fitted.forecast.measured
     residuals = fitted.data.residuals[-measured.angles_rad.size :].reshape(-1, 2)
     swaps = measured.step % 2 == 1
     residuals = np.where(swaps[:, None], residuals[:, ::-1], residuals)

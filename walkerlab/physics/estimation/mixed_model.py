@@ -7,6 +7,7 @@ likelihood does not depend on the number of samples.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final, NamedTuple
@@ -148,23 +149,17 @@ def estimate_noise(products: Products, floors: Floats, leg_length_m: float, star
     return best
 
 
-class Whitening(NamedTuple):
-    """Transforms values of covariance G G^T roughness^2 + noise^2 into independent values of unit variance."""
+def whitening(G: Floats, quantity: NDArray[np.int64], noise: Noise) -> Callable[[Floats], Floats]:
+    """Return a function that whitens values (values,), or columns (values, n), of a walk with this noise.
 
-    scale: Floats  # (values,)
-    U: Floats  # (values, heights)
-    shrink: Floats  # (heights,)
-
-    def __call__(self, values: Floats) -> Floats:
-        """Whiten values (values,) or columns (values, n)."""
-        scaled = values * (self.scale if values.ndim == 1 else self.scale[:, None])
-        along = self.U.T @ scaled
-        return np.asarray(scaled - self.U @ (along * (self.shrink if values.ndim == 1 else self.shrink[:, None])))
-
-
-def whitening(G: Floats, quantity: NDArray[np.int64], noise: Noise) -> Whitening:
+    It makes values of covariance G G^T roughness^2 + noise^2 independent, of unit variance.
+    """
     scale = 1.0 / noise.measurement[quantity]
-    if noise.roughness_m == 0.0:
-        return Whitening(scale, np.zeros((scale.size, 0)), np.zeros(0))
     U, s, _ = np.linalg.svd(noise.roughness_m * G * scale[:, None], full_matrices=False)
-    return Whitening(scale, U, 1.0 - 1.0 / np.sqrt(1.0 + s**2))
+    shrink = 1.0 - 1.0 / np.sqrt(1.0 + s**2)
+
+    def whiten(values: Floats) -> Floats:
+        scaled = (values.T * scale).T
+        return np.asarray(scaled - U @ (shrink * (U.T @ scaled).T).T)
+
+    return whiten

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
-from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredAngles, MeasuredSteps
+from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD, MeasuredWalk
 from walkerlab.physics.orbits.robustness import derivative
-from walkerlab.physics.orbits.step_map import NO_TIMES, DisturbedWalk, MappedStep, VariedWalk
+from walkerlab.physics.orbits.step_map import DisturbedWalk, MappedStep, VariedWalk
 from walkerlab.physics.solvers.system import Floats
 
 CLOCK, OFFSET, GAIN, DELAY = "clock_rate", "angle_offset_rad", "angle_gain", "time_offset_s"
@@ -79,13 +79,9 @@ class Forecast:
     scales: Floats  # (parameters,) typical changes
     z: Floats  # (d,) section coordinates around which the start is searched for
     directions: Floats  # (d, starts) directions of the start that affect the next step
-    measured: MeasuredSteps | MeasuredAngles
+    measured: MeasuredWalk
     nuisances: tuple[str, ...] = ()
     in_phase: bool = True  # whether angles are compared at fractions of each step rather than at their sample times
-
-    @cached_property
-    def steps(self) -> MeasuredSteps:
-        return self.measured.steps if isinstance(self.measured, MeasuredAngles) else self.measured
 
     @property
     def unknowns(self) -> int:
@@ -94,28 +90,28 @@ class Forecast:
     @property
     def heights(self) -> int:
         """Number of footholds; one more for angles at sample times, in case predicted steps are shorter."""
-        return self.steps.count + (1 if self.in_phase else 2)
+        return self.measured.count + (1 if self.in_phase else 2)
 
     @cached_property
     def channels(self) -> dict[str, Floats]:
         """Measured values (steps,) by quantity, without angle samples."""
-        return {name: values for name, values in self.steps.channels().items() if self.in_phase or name != STEP_PERIOD}
+        measured = self.measured.channels()
+        return measured if self.in_phase else {name: measured[name] for name in measured if name != STEP_PERIOD}
 
     @cached_property
     def values(self) -> Floats:
         """Measured values (values,): quantities of the steps, then angle samples."""
-        angles = [self.measured.angles_rad.ravel()] if isinstance(self.measured, MeasuredAngles) else []
-        return np.concatenate([*self.channels.values(), *angles])
+        return np.concatenate((*self.channels.values(), self.measured.angles_rad.ravel()))
 
     @cached_property
     def quantities(self) -> tuple[str, ...]:
-        return (*self.channels, *([LEG_ANGLE] if isinstance(self.measured, MeasuredAngles) else []))
+        return (*self.channels, LEG_ANGLE) if self.measured.sampled else tuple(self.channels)
 
     @cached_property
     def quantity(self) -> NDArray[np.int64]:
         """Index (values,) of the quantity of each value."""
-        sizes = [self.steps.count] * len(self.channels)
-        sizes += [self.values.size - sum(sizes)] if isinstance(self.measured, MeasuredAngles) else []
+        sizes = [self.measured.count] * len(self.channels)
+        sizes.append(self.measured.angles_rad.size)
         return np.repeat(np.arange(len(sizes)), sizes)
 
     def parameters(self, u: Floats) -> tuple[float, ...]:
@@ -149,12 +145,9 @@ class Forecast:
         walk = self.walks.disturbed(z, p, heights_m)
         if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
             return None
-        parts = self._by_step(walk, sensors)
-        if not isinstance(self.measured, MeasuredAngles):
-            return Prediction(np.concatenate(parts), walk, NO_TIMES, NO_TIMES > 0.0, np.zeros((0, 2)))
         times, inside = self._times(walk, sensors)
-        angles = self.walks.sampled(z, p, heights_m, times)
-        values = np.concatenate((*parts, (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
+        angles = self.walks.sampled(z, p, heights_m, times) if times.size else np.zeros((0, 2))
+        values = np.concatenate((*self._by_step(walk, sensors), (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
         return Prediction(values, walk, times, inside, angles)
 
     def differentiate(self, u: Floats, heights_m: Floats, lifts: Floats, exact: bool) -> tuple[Floats, Floats] | None:
@@ -182,7 +175,7 @@ class Forecast:
             return None if prediction is None else prediction.values
 
         if exact:
-            return derivative(values, SAMPLED_STEP if isinstance(self.measured, MeasuredAngles) else EXACT_STEP)
+            return derivative(values, SAMPLED_STEP if self.measured.sampled else EXACT_STEP)
         here, ahead = values(0.0), values(QUICK_STEP)
         return None if here is None or ahead is None else (ahead - here) / QUICK_STEP
 
@@ -193,11 +186,10 @@ class Forecast:
             STEP_LENGTH: walk.lengths_m,
             LEG_ANGLE: walk.angles_rad,
         }
-        return [values[name][: self.steps.count] for name in self.channels]
+        return [values[name][: self.measured.count] for name in self.channels]
 
     def _times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
         """Return the sample times (samples,) from the walk's first heel strike, and whether each is within the walk."""
-        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         touches, step = np.append(0.0, np.cumsum(walk.durations_s)), self.measured.step
         times = self._measured_times() / sensors[CLOCK]
         if self.in_phase:
@@ -207,9 +199,8 @@ class Forecast:
 
     def _measured_times(self) -> Floats:
         """Return the sample times (samples,) from the first measured heel strike, on the measurement's clock."""
-        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
-        touches, step = self.measured.touches_s, self.measured.step
-        return np.asarray(touches[step] + self.measured.phase * np.diff(touches)[step] - touches[0])
+        touches, step = np.append(0.0, np.cumsum(self.measured.periods_s)), self.measured.step
+        return np.asarray(touches[step] + self.measured.phase * self.measured.periods_s[step])
 
     def _tangents(
         self, u: Floats, heights_m: Floats, lifts: Floats, prediction: Prediction
@@ -223,25 +214,22 @@ class Forecast:
         varied = self.walks.varied(z, self.parameters(u), heights_m, along, prediction.times_s)
         if varied is None:
             return None
-        moves, of_steps = self._by_step(varied, sensors), self.steps.count * len(self.channels)
-        by_sensor = {name: np.zeros(self.values.size) for name in self.nuisances}
-        if CLOCK in by_sensor and STEP_PERIOD in self.channels:
-            by_sensor[CLOCK][: self.steps.count] = walk.durations_s[: self.steps.count]
-        if isinstance(self.measured, MeasuredAngles):
-            rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
-            moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
-            moves.append(moving.swapaxes(1, 2).reshape(-1, along.shape[1]))
-            angles = prediction.angles_rad
-            clock = 0.0 if self.in_phase else -self._measured_times()[:, None] / sensors[CLOCK] ** 2
-            own = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
-            for name, column in by_sensor.items():
-                column[of_steps:] = own[name].ravel()
-        last = [NUISANCES[name][1] * column for name, column in by_sensor.items()]
-        return np.concatenate(moves), np.array(last).reshape(-1, self.values.size).T
+        angles, count = prediction.angles_rad, self.measured.count
+        rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
+        moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
+        moves = np.concatenate((*self._by_step(varied, sensors), moving.swapaxes(1, 2).reshape(-1, along.shape[1])))
+        clock = 0.0 if self.in_phase else -self._measured_times()[:, None] / sensors[CLOCK] ** 2
+        own = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
+        by_sensor = np.zeros((self.values.size, len(self.nuisances)))
+        for column, name in zip(by_sensor.T, self.nuisances, strict=True):
+            column[count * len(self.channels) :] = own[name].ravel()
+            if name == CLOCK and STEP_PERIOD in self.channels:
+                column[:count] = walk.durations_s[:count]
+            column *= NUISANCES[name][1]
+        return moves, by_sensor
 
     def _drift(self, durations: Floats) -> Floats:
         """Return the changes (samples, columns) of the sample times caused by changes of the steps' durations."""
-        assert isinstance(self.measured, MeasuredAngles), "only angles are sampled"
         if not self.in_phase:
             return np.zeros((self.measured.step.size, durations.shape[1]))
         touches = np.concatenate((np.zeros((1, durations.shape[1])), np.cumsum(durations, axis=0)))

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from walkerlab.physics.estimation.fit import Fitted
+from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.orbits.step_map import DisturbedWalk
 from walkerlab.physics.solvers.system import Floats
 
@@ -81,7 +82,6 @@ class Identification:
     information: Information
     process: dict[str, float | bool | None]  # roughness_m, standard_error, at_bound
     measurement: dict[str, float]  # standard deviation of each quantity
-    steps: int
     rms_residual: dict[str, float]
     chi_square_per_dof: float
     gait: dict[str, Uncertain]
@@ -89,5 +89,17 @@ class Identification:
     tables: tuple[StepTable, ...]
     fitted: Fitted = field(repr=False)
     walk: DisturbedWalk = field(repr=False)  # walk over the most probable floor
-    sensors: dict[str, float]  # properties of clock and sensors, named as in `prediction.NUISANCES`
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
+
+    @property
+    def verdict(self) -> ModelFit:
+        return next(model for model in self.models if model.model == self.model)
+
+    @property
+    def measured(self) -> MeasuredWalk:
+        return self.fitted.forecast.measured
+
+    @property
+    def sensors(self) -> dict[str, float]:
+        """Properties of clock and sensors, named as in `prediction.NUISANCES`."""
+        return self.fitted.forecast.sensors(self.fitted.u)

@@ -15,15 +15,15 @@ from walkerlab.config.reads import IdentifyConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label, unit_by_name
 from walkerlab.physics.estimation.information import is_open
-from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps
+from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.prediction import GAIN, OFFSET
-from walkerlab.physics.estimation.result import Estimate, Identification, Information, ModelFit
+from walkerlab.physics.estimation.result import Estimate, Identification, Information
 from walkerlab.physics.hybrid.rigid_measures import FootholdsOfWalk, places
 from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
-from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, Measured, divide_at, read_divisions, read_measured
+from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, read_divisions, read_measured
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, over_time
 from walkerlab.pipeline.store.columns import numbered, rows_group
@@ -55,11 +55,11 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     progress.start("identify")
     gait = inputs["fixedpoint"].summary
 
-    def ask(measured: Measured) -> Identification:
+    def ask(measured: MeasuredWalk) -> Identification:
         return identify_walk(cast("Config", config), measured, gait, block, progress.note)
 
-    result, measured = identify_divided(config, block, ask)
-    content, verdict = content_of(config, result, measured), verdict_of(result)
+    result = identify_divided(config, block, ask)
+    content, verdict = content_of(config, result), result.verdict
     if verdict.fit == "not-converged":
         raise NoAnswer(f"the fit of the {verdict.model} model did not converge: {verdict.reason}", FEWER, content)
     return content
@@ -82,8 +82,7 @@ def refuse(config: IdentifyConfig) -> None:
         )
     refuse_keys(config, block)
     measured = read_measured(block, config)
-    steps = measured.steps if isinstance(measured, MeasuredAngles) else measured
-    values_count = steps.count * len(steps.channels()) + (isinstance(measured, MeasuredAngles) and measured.step.size)
+    values_count = measured.count * len(measured.channels()) + measured.step.size
     if values_count + len(block.prior) <= len(block.fit):
         raise ConfigError(
             f"{block.data} holds {values_count} values, too few for {len(block.fit)} parameters.",
@@ -92,53 +91,41 @@ def refuse(config: IdentifyConfig) -> None:
 
 
 def identify_divided(
-    config: IdentifyConfig, block: Identify, ask: Callable[[Measured], Identification]
-) -> tuple[Identification, Measured]:
+    config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification]
+) -> Identification:
     """Try divisions of the walk into steps; return the first with a good fit, or else the first that can be fitted."""
-    first: tuple[Identification, Measured] | None = None
-    problem: NoAnswer | None = None
+    answers, problems = list[Identification](), list[NoAnswer]()
     for measured in read_divisions(block, config):
         try:
-            answer = divide_again(config, block, ask, (ask(measured), measured))
+            answers.append(divide_again(config, block, ask, ask(measured)))
         except NoAnswer as error:
-            problem = problem or error
+            problems.append(error)
             continue
-        if verdict_of(answer[0]).fit == "fits":
-            return answer
-        first = first or answer
-    if first is None:
-        assert problem is not None, "a file without a walk raises"
-        raise problem
-    return first
+        if answers[-1].verdict.fit == "fits":
+            return answers[-1]
+    if not answers:
+        raise problems[0]
+    return answers[0]
 
 
 def divide_again(
-    config: IdentifyConfig,
-    block: Identify,
-    ask: Callable[[Measured], Identification],
-    before: tuple[Identification, Measured],
-) -> tuple[Identification, Measured]:
+    config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification], before: Identification
+) -> Identification:
     """Repeat a fit if the identified slope and sensors move heel strikes; keep the old fit if the new one is bad."""
-    result, measured = before
-    if not isinstance(measured, MeasuredAngles):
+    if not before.measured.sampled:
         return before
-    slope_change = identified_config(config, result).slope_rad - config.slope_rad
-    touch_sum = 2.0 * (result.sensors[OFFSET] - slope_change)
-    if abs(touch_sum - measured.touch_sum_rad) < SAME_TOUCHES:
+    slope_change = identified_config(config, before).slope_rad - config.slope_rad
+    touch_sum = 2.0 * (before.sensors[OFFSET] - slope_change)
+    if abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
         return before
     try:
-        divided = divide_at(block, config, touch_sum)
-        again = ask(divided)
+        again = ask(divide_at(block, config, touch_sum))
     except (ConfigError, NoAnswer):
         return before
-    return (again, divided) if verdict_of(again).fit == "fits" else before
+    return again if again.verdict.fit == "fits" else before
 
 
-def verdict_of(result: Identification) -> ModelFit:
-    return next(model for model in result.models if model.model == result.model)
-
-
-def content_of(config: IdentifyConfig, result: Identification, measured: MeasuredSteps | MeasuredAngles) -> Content:
+def content_of(config: IdentifyConfig, result: Identification) -> Content:
     """Build the content: estimates, steps and, for measured angles, residuals over the phase of a step."""
     known, block = result.information, config.identify or Identify()
     estimates = [
@@ -162,7 +149,7 @@ def content_of(config: IdentifyConfig, result: Identification, measured: Measure
             if estimate.key in block.prior
         ],
         "nuisance": {name: asdict(value) for name, value in result.nuisances.items()},
-        "steps": result.steps,
+        "steps": result.measured.count,
         "rms_residual": dict(result.rms_residual),
         "chi_square_per_dof": result.chi_square_per_dof,
         "gait": {name: asdict(value) for name, value in result.gait.items()},
@@ -177,9 +164,9 @@ def content_of(config: IdentifyConfig, result: Identification, measured: Measure
     if moves is not None:
         meaning = "standard deviations of the two worst-determined combinations, in the keys' units, the worst first"
         groups["worst"] = Group({"moves": Variable(moves, ("combination", "parameter"), "1", meaning)})
-    if isinstance(measured, MeasuredAngles):
-        groups["samples"] = sample_group(result, measured)
-        groups |= motions(identified_config(config, result), result, measured)
+    if result.measured.sampled:
+        groups["samples"] = sample_group(result)
+        groups |= motions(identified_config(config, result), result)
     return Content(groups, summary)
 
 
@@ -212,7 +199,7 @@ def worst_moves(known: Information) -> Floats | None:
 
 def step_group(result: Identification) -> Group:
     """Build the group of measured and predicted step quantities, with the standard deviations of their differences."""
-    columns = numbered(result.steps, "step", "step")
+    columns = numbered(result.measured.count, "step", "step")
     for table in result.tables:
         parts = {"measured": table.measured, "predicted": table.predicted, "deviation": table.deviation}
         for name, values in parts.items():
@@ -221,14 +208,15 @@ def step_group(result: Identification) -> Group:
     return Group(columns)
 
 
-def angle_residuals(result: Identification, measured: MeasuredAngles) -> Floats:
+def angle_residuals(result: Identification) -> Floats:
     """Return measured minus predicted angles (samples, 2) on the most probable floor."""
-    return result.fitted.residuals[-measured.angles_rad.size :].reshape(-1, 2)
+    return result.fitted.residuals[-result.measured.angles_rad.size :].reshape(-1, 2)
 
 
-def sample_group(result: Identification, measured: MeasuredAngles) -> Group:
+def sample_group(result: Identification) -> Group:
     """Build the group of angle residuals (swing leg, stance leg) over the phase of a step."""
-    swing_first = reorder_by_leg(angle_residuals(result, measured), 1 - measured.step % 2)
+    measured = result.measured
+    swing_first = reorder_by_leg(angle_residuals(result), 1 - measured.step % 2)
     return Group(
         {
             "phase": Variable(measured.phase, ("sample",), "1", "elapsed fraction of the step's period"),
@@ -245,7 +233,7 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
     return changed
 
 
-def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAngles) -> dict[str, Group]:
+def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
     """Build the identified and measured motions of the first steps; empty for kneed walkers (no shank angles are read).
 
     Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
@@ -255,12 +243,13 @@ def motions(config: IdentifyConfig, result: Identification, measured: MeasuredAn
     walker, walk, sensors = rigid_walker(config), result.walk, result.sensors
     if walker.kneed:
         return {}
+    measured = result.measured
     shown = np.flatnonzero(measured.step < SHOWN_STEPS)
     sides = np.flatnonzero(np.diff(measured.step[shown])) + np.array([[0], [1]])
     every = max(1, shown.size // SHOWN_SAMPLES)
     rows = np.union1d(shown[::every], shown[sides])
     step, stance = measured.step[rows], 1 - measured.step[rows] % 2
-    residuals = angle_residuals(result, measured)[rows] / sensors[GAIN]
+    residuals = angle_residuals(result)[rows] / sensors[GAIN]
     seen = (measured.angles_rad[rows] - sensors[OFFSET]) / sensors[GAIN]
     along, touches = (np.append(0.0, np.cumsum(each)) for each in (walk.lengths_m, walk.durations_s))
     time = touches[step] + measured.phase[rows] * walk.durations_s[step]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -18,7 +17,7 @@ from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import TIME, Recording, read_delimited, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
 from walkerlab.labels import unit_by_name
-from walkerlab.physics.estimation.measurements import MeasuredAngles, MeasuredSteps, split_into_steps
+from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.physics.estimation.prediction import OFFSET
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
@@ -37,8 +36,6 @@ SLOPE_KEY: Final = "slope_deg"
 SAME_TOUCHES: Final = 0.002  # rad, largest change of the sum of leg angles at heel strike that counts as no change
 NO_DATA_FILE: Final = "there is no such file"
 
-Measured = MeasuredSteps | MeasuredAngles
-
 
 def digests(config: Config) -> Mapping[str, str]:
     """Return the digest of the data file's content, so that a changed file makes results outdated."""
@@ -50,12 +47,12 @@ def digests(config: Config) -> Mapping[str, str]:
         return {"identify.data": NO_DATA_FILE}
 
 
-def read_measured(block: Identify, config: RigidConfig) -> Measured:
+def read_measured(block: Identify, config: RigidConfig) -> MeasuredWalk:
     """Read the block's file as steps or angles, as `block.level` says; raises ConfigError if it holds no such walk."""
     return next(read_divisions(block, config))
 
 
-def read_divisions(block: Identify, config: RigidConfig) -> Iterator[Measured]:
+def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWalk]:
     """Read the file that the block names, and yield its walk in steps; angles may be divided in several ways.
 
     They are divided in more than one way only if slope or sensor offset is estimated: heel strikes depend on both.
@@ -88,7 +85,7 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[Measured]:
         raise problem
 
 
-def refuse_count(path: Path, measured: Measured) -> Measured:
+def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
     if measured.count > MOST_STEPS:
         raise ConfigError(
             f"{path} has {measured.count} steps; at most {MOST_STEPS} are fitted at once.", "Cut it into shorter walks."
@@ -107,13 +104,13 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
     yield from (each for each in sums if each)
 
 
-def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredAngles:
+def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredWalk:
     """Divide the angles in the block's file into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
     walk = as_walk(read_recording(Path(block.data)), block.columns, block.units)
     return divide_angles(walk, config, block.data, touch_sum_rad)
 
 
-def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float) -> MeasuredAngles:
+def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float) -> MeasuredWalk:
     """Divide angles of the config's walker into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
     steps = divide_into_steps(walk, rigid_walker(config), source, touch_sum_rad)
     if steps.touch_time_s.size < MIN_STEPS:
@@ -122,11 +119,10 @@ def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_su
     assert angles is not None, "a walk in steps has angles"
     # use only measured samples: the samples of `steps` at heel strikes are interpolated
     own = angles[:, ::-1] if steps.swapped else angles
-    measured = split_into_steps(walk.time_s - steps.origin_s, own, np.append(0.0, steps.touch_time_s))
-    return replace(measured, touch_sum_rad=touch_sum_rad)
+    return split_into_steps(walk.time_s - steps.origin_s, own, np.append(0.0, steps.touch_time_s), touch_sum_rad)
 
 
-def read_steps(path: Path, block: Identify) -> MeasuredSteps:
+def read_steps(path: Path, block: Identify) -> MeasuredWalk:
     """Read a table with one row per step: `period_s` and, if measured, `length_m` and `touch_angle_rad`."""
     table = read_delimited(path)
     for name in block.columns.keys() - STEP_KINDS.keys():
@@ -141,7 +137,7 @@ def read_steps(path: Path, block: Identify) -> MeasuredSteps:
         )
     if period.size < MIN_STEPS:
         raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
-    return MeasuredSteps(period, values["length_m"], values["touch_angle_rad"])
+    return MeasuredWalk(period, values["length_m"], values["touch_angle_rad"])
 
 
 def read_column(table: Recording, name: str, block: Identify) -> Floats | None:

@@ -35,7 +35,7 @@ def quantities(steps: Group) -> list[str]:
 
 
 def axis_name(quantity: str) -> str:
-    return label_of(quantity.rpartition("_")[0].replace("_", " "), unit_by_name(quantity))
+    return label_of(axis_label(quantity), unit_by_name(quantity))
 
 
 def draw_steps(results: Results) -> Drawn:
@@ -71,7 +71,7 @@ def draw_residuals(results: Results) -> Drawn:
         panel.axhspan(-TWO_SIGMA, TWO_SIGMA, color=PALE)
         panel.axhline(0.0, color=GREY, linewidth=0.7)
         panel.plot(number, scaled, linestyle="none", marker="o", markersize=3.0, color=BLACK)
-        panel.set(xlabel="step", ylabel=f"{name.rpartition('_')[0].replace('_', ' ')} (σ)")
+        panel.set(xlabel="step", ylabel=f"{axis_label(name)} (σ)")
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     if samples is not None:
         draw_residuals_in_phase(axes[-1, 0], samples)
@@ -141,13 +141,13 @@ def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str
 def draw_worth(results: Results) -> Drawn:
     """Plot the information lost without each measured quantity; the caption names the most informative one."""
     shares = results[IDENTIFY_STAGE].summary["contributions"]
-    names = [name.rpartition("_")[0].replace("_", " ") for name in shares]
+    names = [axis_label(name) for name in shares]
     figure, axes = panels(0.9 + 0.35 * len(names))
     axes.barh(names, [100.0 * share for share in shares.values()], 0.6, color=ORANGE)
     axes.set(xlabel="information lost without it (%)", xlim=(0.0, 100.0))
     axes.invert_yaxis()
     most = max(shares, key=lambda name: shares[name])
-    return figure, (most.rpartition("_")[0].replace("_", " "), float(shares[most]))
+    return figure, (axis_label(most), float(shares[most]))
 
 
 STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), NO_MEASURED_STEPS)

@@ -80,7 +80,7 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     quality = [
         {
-            "quantity": name.rpartition("_")[0].replace("_", " "),
+            "quantity": axis_label(name),
             "residual": residual,
             "noise": summary["noise"]["measurement"].get(name),
             "unit": unit_by_name(name),
@@ -167,7 +167,7 @@ def noise_in_words(summary: Mapping[str, Any]) -> str:
     floor = summary["noise"]["process"]["roughness_m"]
     parts = [f"floor {number(1e3 * floor, 2)} mm rough" if floor else "an even floor"]
     parts += [
-        f"{name.rpartition('_')[0].replace('_', ' ')} measured to {quantity(value, unit_by_name(name), 2)}"
+        f"{axis_label(name)} measured to {quantity(value, unit_by_name(name), 2)}"
         for name, value in summary["noise"]["measurement"].items()
     ]
     return join_words(parts)
