@@ -1,15 +1,16 @@
 """Failures that a user can act on, each with its exit code; any other exception is a bug."""
 
 import re
+from collections.abc import Callable
 from typing import Any, ClassVar, Final
 
 COMMAND_PATTERN: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
 """Pattern for commands in a message, except those that do not act on a run."""
 
 
-def add_run_options(text: str, typed: str) -> str:
-    """Append the options that select the run, `typed` with a leading space, to every command in a message."""
-    return COMMAND_PATTERN.sub(lambda match: f"`{match[1]}{typed}`", text) if typed else text
+def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
+    """Append the options that select the run to every command in a message; `options_of` returns those of a command."""
+    return COMMAND_PATTERN.sub(lambda match: f"`{match[1]}{options_of(match[1].split()[1])}`", text)
 
 
 class WalkerlabError(Exception):

@@ -12,7 +12,7 @@ import pytest
 
 from walkerlab.config.loader import load, safe_name
 from walkerlab.errors import add_run_options
-from walkerlab.views.cli.request import Request
+from walkerlab.views.cli.request import Request, SetByOption
 
 
 def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
@@ -186,10 +186,18 @@ def test_a_film_needs_no_name(walker):
 def test_advice_can_be_typed_back(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
     assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
-    typed = Request("simulate", sets=["start=[0, 1, 2, 3]"]).typed
-    assert add_run_options("`walkerlab status` or `walkerlab schema`", typed) == (
+    request = Request("simulate", sets=["start=[0, 1, 2, 3]"])
+    assert add_run_options("`walkerlab status` or `walkerlab schema`", request.typed_for) == (
         "`walkerlab status --set 'start=[0, 1, 2, 3]'` or `walkerlab schema`"
     )
+
+
+def test_advice_repeats_a_commands_own_options_only_where_they_matter():
+    own = SetByOption('identify.data="my steps.csv"', "--data", "my steps.csv")
+    request = Request("identify", (own,), sets=["slope_deg=40"])
+    assert request.typed_for("identify") == " --set slope_deg=40 --data 'my steps.csv'"
+    assert request.typed_for("continuation") == " --set slope_deg=40"
+    assert request.typed_for("status") == " --set slope_deg=40 --set 'identify.data=\"my steps.csv\"'"
 
 
 def test_the_slope_is_set_once(toy):

@@ -8,7 +8,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -42,7 +42,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         sys.stdout.flush()
     except WalkerlabError as error:
         print_failed(error)
-        print_error(error, request.typed)
+        print_error(error, request.typed_for)
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
         stopped = StoppedError("interrupted", "Finished results are kept; the same command computes the rest.")
@@ -78,14 +78,14 @@ def print_result(
     else:
         sys.stdout.writelines(f"{line}\n" for line in lines)
     if error is not None:
-        print_error(error, request.typed)
+        print_error(error, request.typed_for)
         raise typer.Exit(error.exit_code)
 
 
-def print_error(error: WalkerlabError, typed: str = "") -> None:
+def print_error(error: WalkerlabError, options_of: Callable[[str], str] = lambda _: "") -> None:
     print(f"error: {error.message}", file=sys.stderr)
     if error.advice:
-        print(f"advice: {add_run_options(error.advice, typed)}", file=sys.stderr)
+        print(f"advice: {add_run_options(error.advice, options_of)}", file=sys.stderr)
 
 
 def print_json(value: dict[str, Any]) -> None:

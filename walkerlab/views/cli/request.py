@@ -58,12 +58,16 @@ def configs_and_files(incomplete: str) -> list[str]:
 class SetByOption(str):
     """A setting KEY=VALUE made from a stage's own option; messages quote the option as the user typed it."""
 
-    source: str
+    words: tuple[str, ...]  # the option as typed
 
-    def __new__(cls, text: str, source: str) -> "SetByOption":
+    def __new__(cls, text: str, *words: str) -> "SetByOption":
         setting = super().__new__(cls, text)
-        setting.source = source
+        setting.words = words
         return setting
+
+    @property
+    def source(self) -> str:
+        return " ".join(self.words)
 
 
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
@@ -89,7 +93,7 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
             continue
         if any(values[flag] is None for flag in option.needs):
             raise typer.BadParameter(f"requires {' and '.join(option.needs)}", param_hint=option.flag)
-        typed = " ".join(f"{option.flag} {item}" for item in (value if isinstance(value, list) else [value]))
+        typed = [word for item in (value if isinstance(value, list) else [value]) for word in (option.flag, str(item))]
         if ":" in option.metavar:
             text = bounds(option.flag, value, option.metavar)
         elif "=" in option.metavar:
@@ -97,8 +101,8 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
         elif option.metavar == "FILE" or option.type is list:
             text = json.dumps(value)
         else:
-            text, typed = str(value), f"{option.flag} {str(value).removesuffix('.0')}"
-        settings.append(SetByOption(f"{option.key}={text}", typed))
+            text, typed = str(value), [option.flag, str(value).removesuffix(".0")]
+        settings.append(SetByOption(f"{option.key}={text}", *(typed[:1] if option.type is bool else typed)))
     return tuple(settings)
 
 
@@ -181,12 +185,23 @@ class Request:
         """All changes of the config, as KEY=VALUE."""
         return (*(self.sets or ()), *self.own)
 
-    @property
-    def typed(self) -> str:
-        """Options that select the run, each preceded by a space; empty for the default run."""
+    def typed_for(self, command: str) -> str:
+        """Return the options, each preceded by a space, with which a command works on this run.
+
+        This command repeats its own options, other stages get those settings that they read, and other commands all.
+        """
+        from walkerlab.pipeline.graph import PIPELINE
+
+        stage = next((stage for stage in PIPELINE.stages if stage.name == command), None)
         words = [] if self.config is None else ["-c", self.config]
-        for setting in self.settings:
+        for setting in self.sets or ():
             words += ["--set", setting]
+        for own in self.own:
+            block = own.partition("=")[0].partition(".")[0]
+            if command == self.command:
+                words += own.words
+            elif stage is None or any(key.partition(".")[0] == block for key in stage.reads):
+                words += ["--set", own]
         words += [] if self.strides is None else ["--set", f"strides={self.strides}"]
         words += [] if self.name is None else ["--name", self.name]
         words += [] if self.runs == RUNS else ["--runs", str(self.runs)]

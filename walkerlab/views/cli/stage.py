@@ -63,7 +63,7 @@ def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
     # Imported here: most commands find a gait.
     from walkerlab.scene.gait_suggestions import suggest_gaits
 
-    suggestions = suggest_gaits(request.resolved, request.typed)
+    suggestions = suggest_gaits(request.resolved, request.typed_for("fixedpoint"))
     return replace(report, no_answer=NoAnswer(error.message, f"{suggestions} {error.advice}".strip()))
 
 
@@ -101,7 +101,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     if "html" in own:
         page = (report.run_dir / str(own["html"])).resolve()
         shows = f"`walkerlab open {shlex.quote(str(report.run_dir))}` shows it"
-        details = f"`walkerlab show STAGE{request.typed}` lists every value"
+        details = f"`walkerlab show STAGE{request.typed_for('show')}` lists every value"
         where = ["", f"page: {page}", f"next: {shows}; {details}."]
         rigid_alone = ["", why_rigid_alone(request.resolved.walker)] if request.resolved.contact is None else []
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]

@@ -61,7 +61,7 @@ def environment(run: str = "") -> Environment:
         lstrip_blocks=True,
     )
     options = f" -c {shlex.quote(run)}" if run else ""
-    template_environment.filters["to_markup"] = lambda text: to_markup(add_run_options(text, options))
+    template_environment.filters["to_markup"] = lambda text: to_markup(add_run_options(text, lambda _: options))
     return template_environment
 
 
