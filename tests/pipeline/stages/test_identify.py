@@ -174,12 +174,14 @@ def test_a_changed_file_changes_the_key_of_the_result(tmp_path):
 def test_sampled_angles_are_divided_at_their_heel_strikes(transient, tmp_path):
     samples = transient.groups["trajectory"]
     time, angle, path = samples["time"], samples["angle"], tmp_path / "angles.csv"
-    rising = np.append(True, np.diff(time) > 0.0)
+    # rounding decides whether the touch with which the walk ends is in the data, so its step is left out
+    touches = transient.groups["steps"]["touch_time_s"]
+    rising = np.append(True, np.diff(time) > 0.0) & (time < 0.5 * (touches[-2] + touches[-1]))
     lines = (f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(time[rising].tolist(), angle[rising].tolist(), strict=True))
     path.write_text("time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(lines))
     config = taken(*ask(path, "identify.level=angles", "identify.fit={slope_deg: null}"))
     measured = read_measured(config.identify, config)
-    expected = transient.groups["steps"]["period_s"][-measured.count :]
+    expected = transient.groups["steps"]["period_s"][:-1][-measured.count :]
     assert measured.count >= 18
     assert np.allclose(measured.periods_s, expected, atol=2e-4)
     assert 0.0 <= measured.phase.min() <= measured.phase.max() < 1.0
