@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.mechanics import impact
-from walkerlab.physics.mechanics.rigid_model import BENT, NO_SHANK, STANCE, STRAIGHT, Mode
+from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, BENT, NO_SHANK, STANCE, STRAIGHT, Mode
 from walkerlab.physics.solvers.system import derivative
 
 LATEST = 10.0  # pendulum times that a swing may take
@@ -49,7 +49,7 @@ def plain_walk(walker, y, heights, nearest=0.0):
         if outcome is not Outcome.WALKED:
             return np.array(seen).reshape(len(seen), 1 + len(y)), outcome, ahead
         y = np.zeros(len(y))
-        impact.heel_strike(walker, before, y)
+        impact.strike(walker, AT_STRIKE, before, y)
         seen.append((t, *y))
     return np.array(seen), Outcome.WALKED, ahead
 
@@ -88,7 +88,7 @@ def swing(walker, t, y, rise):
             return t, y, Outcome.FELL
         if len(met) > 2 and met[2]:
             new = np.zeros(len(y))
-            impact.strike(walker, STRAIGHT, False, y, new)
+            impact.strike(walker, STRAIGHT, y, new)
             phase, y, left_s = STRAIGHT, new, 0.0
         elif not met[0]:
             return t, y, Outcome.NO_HEEL_STRIKE

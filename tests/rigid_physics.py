@@ -6,7 +6,16 @@ from scipy.integrate import solve_ivp
 from walkerlab.physics.mechanics import impact
 from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
 from walkerlab.physics.mechanics.rigid import group_bodies
-from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, apply_couplings, energies
+from walkerlab.physics.mechanics.rigid_model import (
+    AT_STRIKE,
+    BENT,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    Mode,
+    apply_couplings,
+    energies,
+)
 from walkerlab.physics.solvers.system import derivative
 
 
@@ -26,21 +35,18 @@ def potential_energy(model, y):
 
 
 def heel_strike(model, y, columns=()):
-    return struck(impact.heel_strike, model, y, columns)
+    return struck(AT_STRIKE, model, y, columns)
 
 
 def knee_strike(model, y, columns=()):
-    def lock(model, before, after):
-        impact.strike(model, STRAIGHT, False, before, after)
-
-    return struck(lock, model, y, columns)
+    return struck(STRAIGHT, model, y, columns)
 
 
-def struck(strike, model, y, columns):
+def struck(phase, model, y, columns):
     """The state after a strike, with the images of directions behind it."""
     before = np.concatenate((y, *columns))
     after = np.full(before.size, np.nan)
-    strike(model, before, after)
+    impact.strike(model, phase, before, after)
     return tuple(after)
 
 

@@ -13,7 +13,6 @@ from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.ground.friction import FrictionLaw, create_law
-from walkerlab.physics.ground.knees import KneeStop
 from walkerlab.physics.ground.normal_force import NormalLaw
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
@@ -111,7 +110,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
-    return KneeRules(KneeStop(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
+    return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
 TERRAINS: dict[str, Callable[[float], Terrain]] = {

@@ -13,8 +13,8 @@ from walkerlab.evidence.verification.judge import CaseCell
 from walkerlab.evidence.verification.masses import RigidMasses
 from walkerlab.evidence.verification.scaling import scaled, to_twin
 from walkerlab.evidence.verification.stability import with_numbers
-from walkerlab.physics.mechanics.impact import heel_strike
-from walkerlab.physics.mechanics.rigid_model import STANCE, kinetic_energy
+from walkerlab.physics.mechanics.impact import strike
+from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, STANCE, kinetic_energy
 from walkerlab.physics.orbits.similarity import Units
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
@@ -105,7 +105,7 @@ def test_a_heel_strike_keeps_momentum_summed_over_the_masses_of_any_walker(name)
     config = config_of(name)
     model, before = start_of(config)
     after = np.zeros(before.size)
-    heel_strike(model, before, after)
+    strike(model, AT_STRIKE, before, after)
     masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
     assert masses.feet_off_the_slope(before[None]) < 1e-12
     assert masses.momentum_change(before[None], after[None]) < 1e-12

@@ -13,6 +13,7 @@ from walkerlab.physics.kernels import kernel, uncompiled
 from walkerlab.physics.mechanics import impact
 from walkerlab.physics.mechanics.rigid import standing
 from walkerlab.physics.mechanics.rigid_model import (
+    AT_STRIKE,
     BENT,
     STANCE,
     STRAIGHT,
@@ -295,8 +296,8 @@ def compiled(system, y, f, reaction):
 
 @kernel
 def compiled_strikes(model, y, heel, knee):
-    impact.heel_strike(model, y, heel)
-    impact.strike(model, STRAIGHT, False, y, knee)
+    impact.strike(model, AT_STRIKE, y, heel)
+    impact.strike(model, STRAIGHT, y, knee)
 
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from walkerlab.physics.ground.hinges import spring_energy, stop_energy
+from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.normal_force import elastic_energy
 from walkerlab.physics.ground.pulse import push_on
 from walkerlab.physics.ground.walker import (
@@ -57,7 +57,8 @@ def total_energy(system: OnGround, y: Any) -> float:
     for foot in range(2):
         if system.has_ground[foot] != 0:
             total += foot_elastic_energy(system, foot, y)
-    return total + stop_energy(system, y) + spring_energy(system, y)
+    springs, stops = hinge_energies(system, y)
+    return total + stops + springs
 
 
 @kernel_part

@@ -46,7 +46,10 @@ def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
         return own
     stop = hinge_torque(system.stop, angle, rate)
     return HingeTorque(
-        own.torque + stop.torque, own.elastic + stop.elastic, own.by_angle + stop.by_angle, own.by_rate + stop.by_rate
+        own.resistance + stop.resistance,
+        own.elastic + stop.elastic,
+        own.by_angle + stop.by_angle,
+        own.by_rate + stop.by_rate,
     )
 
 
@@ -76,47 +79,31 @@ def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None
 
 
 @kernel_part
-def stop_energy(system: OnGround, y: Any) -> float:
-    """Compute the elastic energy (J) in the knees' stops."""
-    total = 0.0
-    for row in range(FIRST_KNEE, len(system.form.hinges)):
-        if is_stopping(system, row):
-            total += hinge_energy(system.stop, angle_at(system, row, y)[0])
-    return total
-
-
-@kernel_part
-def stop_power(system: OnGround, y: Any) -> float:
-    """Compute the power (W) dissipated in the knees' stops."""
-    total = 0.0
-    for row in range(FIRST_KNEE, len(system.form.hinges)):
-        if is_stopping(system, row):
-            angle, rate = angle_at(system, row, y)
-            now = hinge_torque(system.stop, angle, rate)
-            total += (now.torque - now.elastic) * rate
-    return total
-
-
-@kernel_part
-def spring_energy(system: OnGround, y: Any) -> float:
-    """Compute the elastic energy (J) of the springs at all hinges."""
-    total = 0.0
+def hinge_energies(system: OnGround, y: Any) -> tuple[float, float]:
+    """Compute the elastic energy (J) of the springs at all hinges, and that in the knees' stops."""
+    springs, stops = 0.0, 0.0
     for row in range(len(system.form.hinges)):
+        angle, _ = angle_at(system, row, y)
         if is_sprung(system.form, row):
-            total += hinge_energy(hinge_law(system.form, row), angle_at(system, row, y)[0])
-    return total
+            springs += hinge_energy(hinge_law(system.form, row), angle)
+        if is_stopping(system, row):
+            stops += hinge_energy(system.stop, angle)
+    return springs, stops
 
 
 @kernel_part
-def spring_power(system: OnGround, y: Any) -> float:
-    """Compute the power (W) that dampers (negative) and drives supply at all hinges; springs only store energy."""
-    total = 0.0
+def hinge_powers(system: OnGround, y: Any) -> tuple[float, float]:
+    """Compute the power (W) that drives and, negative, dampers supply at all hinges, and that lost in knees' stops."""
+    supplied, lost = 0.0, 0.0
     for row in range(len(system.form.hinges)):
+        angle, rate = angle_at(system, row, y)
         if is_sprung(system.form, row):
-            angle, rate = angle_at(system, row, y)
-            now = hinge_torque(hinge_law(system.form, row), angle, rate)
-            total += (now.elastic - now.torque) * rate
-    return total
+            own = hinge_torque(hinge_law(system.form, row), angle, rate)
+            supplied += (own.elastic - own.resistance) * rate
+        if is_stopping(system, row):
+            stop = hinge_torque(system.stop, angle, rate)
+            lost += (stop.resistance - stop.elastic) * rate
+    return supplied, lost
 
 
 @legs_apart.case(OnGround)

@@ -18,21 +18,6 @@ class IdealLock(NamedTuple):
     """Lock that stops a knee by a plastic impact as soon as it is straight."""
 
 
-class KneeStop(NamedTuple):
-    """Compliant stop that pushes a knee back, by the IMPACT law, when it extends beyond straight."""
-
-    stiffness: float  # [k] N m/rad^e
-    exponent: float  # [e]
-    damping: float  # [c_max] N m s/rad
-    full_damping_angle: float  # [d_max] rad
-
-
-@kernel_part
-def stop_law(stop: KneeStop) -> NormalLaw:
-    """Return the IMPACT law with a stop's parameters, in rad and N m instead of m and N."""
-    return NormalLaw(stop.stiffness, stop.exponent, stop.damping, stop.full_damping_angle)
-
-
 @kernel_part
 def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
     """Return the angle (rad) from a hinge's second body to its first, or its rate if y[first] is the first rate."""
@@ -50,17 +35,19 @@ def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
     return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
 
-@hinge_torque.case(KneeStop)
-def stop_torque(law: KneeStop, angle: float, rate: float) -> HingeTorque:
+@hinge_torque.case(NormalLaw)
+def stop_torque(law: NormalLaw, angle: float, rate: float) -> HingeTorque:
+    """Compute the torque of a compliant stop, which pushes a knee back when it extends beyond straight."""
+    # a stop's law is in rad and N m instead of m and N
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
-    torque = impact_normal_force(angle, rate, stop_law(law))
+    torque = impact_normal_force(angle, rate, law)
     return HingeTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
 
 
-@hinge_energy.case(KneeStop)
-def stop_energy(law: KneeStop, angle: float) -> float:
-    return elastic_energy(angle, stop_law(law))
+@hinge_energy.case(NormalLaw)
+def stop_energy(law: NormalLaw, angle: float) -> float:
+    return elastic_energy(angle, law)
 
 
 class Locked(NamedTuple):
@@ -79,9 +66,9 @@ def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | N
     x = np.array(x, float)
     n, p, rates = int(whole.bodies), int(whole.places), x.size - int(whole.bodies)
     after = np.zeros((x.size, 0)) if columns is None else columns.copy()
-    E, m = np.zeros((1, n, n)), int(form.bodies)
-    E[0][:, form.first[:m]] = form.E[0, form.onto[:n], :m]
+    E, m = np.zeros((n, n)), int(form.bodies)
+    E[:, form.first[:m]] = form.E[0, form.onto[:n], :m]
     pairs, arms = (whole.A[:n, :n], whole.B[:n, :n]), (whole.arm_x[:n], whole.arm_y[:n])
-    tree = RootedTree(E, *pairs, *arms, whole.mass, 0.0, whole.slope)
-    x[rates:], lost, after[rates:] = lock(tree, x[p : p + n], x[rates:], after[p : p + n], after[rates:])
+    tree = RootedTree(*pairs, *arms, whole.mass, 0.0, whole.slope)
+    x[rates:], lost, after[rates:] = lock(tree, E, x[p : p + n], x[rates:], after[p : p + n], after[rates:])
     return Locked(x, lost, after)

@@ -15,7 +15,7 @@ from walkerlab.physics.ground.walker import (
     sines_cosines,
 )
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
-from walkerlab.physics.mechanics.links import CountedModel, factor_linked, solve_linked
+from walkerlab.physics.mechanics.links import factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import (
     add_gravity,
     add_gravity_gradient,
@@ -52,10 +52,14 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
 
 
 @forced_inline
-def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: Any) -> tuple[float, float]:
-    """Compute forces of ground and push-off (N, along and normal to the slope), mass matrix M and torques r (N m)."""
-    # r is the sum of the torques of feet, hinges, knee stops and centrifugal forces and, in a hinged form, of gravity.
+def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: Any) -> tuple[float, float]:
+    """Compute forces of ground and push-off (N, along and normal to the slope), and write angular accelerations into r.
+
+    Writes sines and cosines of the angles into s and c, and the factors of the mass matrix into M.
+    """
+    # r is first the sum of the torques of feet, hinges, stops and centrifugal forces and, in a hinged form, of gravity
     form = system.form
+    sines_cosines(form, y, s, c)
     n, half = form.bodies, half_size(form)
     for k in range(n):
         r[k] = 0.0
@@ -70,6 +74,8 @@ def all_forces(system: OnGround, t: float, s: Any, c: Any, y: Any, M: Any, r: An
         normal += force[1]
     add_torques(system, y, r)
     add_inertia(form, n, s, c, y[half + form.places : 2 * half], M, r)
+    factor_linked(form.E[0], n, M)
+    solve_linked(form.E[0], n, M, r)
     return along, normal
 
 
@@ -79,11 +85,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     form = system.form
     n, half, first = form.bodies, half_size(form), form.places
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
-    sines_cosines(form, y, s, c)
-    along, normal = all_forces(system, t, s, c, y, M, r)
-    links = CountedModel(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M)
-    solve_linked(links, 0, M, r)
+    along, normal = solve_motion(system, t, y, s, c, M, r)
     for i in range(half):
         f[i] = y[half + i]
     if first > 0:
@@ -164,21 +166,16 @@ def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     """Compute the Jacobian of the equations of motion, exact except at switching points of the force law."""
     form = system.form
     n, p, half = form.bodies, form.places, half_size(form)
-    s, c, alpha, M, by_torque = (
-        vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES), matrix(OF_BODIES),
-    )  # fmt: skip
+    s, c, alpha = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
+    M, by_torque = matrix(OF_BODIES), matrix(OF_BODIES)
     for i in range(half):
         for j in range(2 * half):
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
-    sines_cosines(form, y, s, c)
-    all_forces(system, t, s, c, y, M, alpha)
-    links = CountedModel(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M)
-    solve_linked(links, 0, M, alpha)
+    solve_motion(system, t, y, s, c, M, alpha)
     for k in range(n):  # row k: angular accelerations due to a unit torque on body k
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
-        solve_linked(links, 0, M, by_torque[k])
+        solve_linked(form.E[0], n, M, by_torque[k])
     for foot in range(2):
         add_foot_gradients(system, t, foot, s, c, y, J)
     add_torque_gradients(system, s, c, y, alpha, J[half + p :, p:half], J[half + p :, half + p :])

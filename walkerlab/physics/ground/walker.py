@@ -74,7 +74,7 @@ class ContactWalker(NamedTuple):
     forms: Any  # (2, 4) records of FORM: row 0 with both feet free, row 1 with a foot hinged; columns by `locked_knees`
     normal: NormalLaw
     friction: Any  # a FrictionLaw
-    stop: Any  # stop of both knees: IdealLock or a KneeStop
+    stop: Any  # stop of both knees: IdealLock, or the NormalLaw (rad, N m) of a compliant stop
     legs: Integers  # (2, bodies of a leg) indices of each leg's bodies from the hip down
 
     @property
@@ -249,7 +249,8 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
 def to_form(form: GroundModel, x: Any) -> Floats:
     """Convert a full state (of all bodies), or variational columns, to the state of a form with the same root."""
     # Merged bodies have equal angles and rates up to rounding; those of the first are used.
-    return np.asarray(x)[places_in_whole(form, len(x))]
+    p, half, first = int(form.places), len(x) // 2, form.first[: form.bodies]
+    return np.asarray(x)[[*range(p), *(p + first), *range(half, half + p), *(half + p + first)]]
 
 
 def to_full(form: GroundModel, y: Any, size: int) -> Floats:
@@ -257,12 +258,6 @@ def to_full(form: GroundModel, y: Any, size: int) -> Floats:
     p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
     onto = form.onto[:every]
     return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
-
-
-def places_in_whole(form: GroundModel, size: int) -> list[int]:
-    """Return the index of each entry of a form's state in the full state (size,) of all bodies with the same root."""
-    p, half, first = int(form.places), size // 2, form.first[: form.bodies]
-    return [*range(p), *(p + first), *range(half, half + p), *(half + p + first)]
 
 
 @kernel_part

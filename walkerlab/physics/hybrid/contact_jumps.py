@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.physics.energy_channels import KNEE_STOP, KNEE_STRIKES
-from walkerlab.physics.ground.hinges import stop_energy
+from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.knees import lock_knee
 from walkerlab.physics.ground.motion import motion_gradient
 from walkerlab.physics.ground.walker import (
@@ -51,7 +51,7 @@ def change_form(
             stopping = before.knee.copy()
             stopping[(event - EXTENSION) % 2] = STOPPING
             before = before._replace(knee=stopping)
-            observer.account[KNEE_STOP] += stop_energy(before, y)
+            observer.account[KNEE_STOP] += hinge_energies(before, y)[1]
     z = to_form(after.form, new)
     Phi = observer.tangent.Phi
     if Phi.shape[1] > 0:

@@ -18,8 +18,8 @@ from walkerlab.physics.energy_channels import (
     TORQUE,
 )
 from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
-from walkerlab.physics.ground.hinges import spring_energy, spring_power, stop_power
-from walkerlab.physics.ground.walker import OF_STATES, STOPPING, OnGround, one_foot_motion, over_ground, store_whole
+from walkerlab.physics.ground.hinges import hinge_energies, hinge_powers
+from walkerlab.physics.ground.walker import OF_STATES, OnGround, one_foot_motion, over_ground, store_whole
 from walkerlab.physics.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY
 from walkerlab.physics.hybrid.contact_state import WalkState
 from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
@@ -154,7 +154,7 @@ def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
     """Copy the account at a step's end, for the work in completed steps; the copied hip work includes the springs."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
-    observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - spring_energy(system, y)
+    observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - hinge_energies(system, y)[0]
 
 
 @kernel_part
@@ -220,12 +220,11 @@ def add_work(
             damping, friction = foot_work(system, states, weights, foot, span)
             account[DAMPING_LOSS] += damping
             account[FRICTION_LOSS] += friction
-    stopping = system.knee[0] == STOPPING or system.knee[1] == STOPPING
     for i in range(1, len(nodes)):
         weight = span * weights[i]
-        if stopping:
-            account[KNEE_STOP] += weight * stop_power(system, states[i])
-        account[HIP_WORK] += weight * spring_power(system, states[i])
+        supplied, lost = hinge_powers(system, states[i])
+        account[HIP_WORK] += weight * supplied
+        account[KNEE_STOP] += weight * lost
         account[PUSH_OFF] += weight * push_power(system, begin + nodes[i] * span, states[i])
 
 

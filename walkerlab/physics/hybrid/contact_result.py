@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSS_ENTRIES, LOSSES, PUSH_OFF, TORQUE
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy, total_energy
-from walkerlab.physics.ground.hinges import spring_energy
+from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.terrain import Terrain, is_uneven
 from walkerlab.physics.ground.walker import (
     OF_BODIES,
@@ -142,7 +142,7 @@ def new_observer(
     tally = new_record(CONTACT_TALLY)
     if track_energy or walker.whole.sprung:
         system = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
-        tally.start_energy, tally.start_spring = total_energy(system, y), spring_energy(system, y)
+        tally.start_energy, tally.start_spring = total_energy(system, y), hinge_energies(system, y)[0]
         tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
         times,

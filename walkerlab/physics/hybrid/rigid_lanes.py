@@ -22,8 +22,8 @@ from walkerlab.physics.hybrid.endings import (
 from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING, hip_above_fall, hull
 from walkerlab.physics.kernels import by_type, kernel, kernel_part, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_law, hinge_torque
-from walkerlab.physics.mechanics.impact import heel_strike
-from walkerlab.physics.mechanics.rigid_model import RigidModel, feet_on_slope
+from walkerlab.physics.mechanics.impact import strike
+from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, RigidModel, feet_on_slope
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.dop853 import GROW_MOST, SAFETY, SHRINK_MOST
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, new_crossing_finder
@@ -42,13 +42,9 @@ from walkerlab.physics.solvers.system import State
 
 # rows of a batch's memory, with one value per lane
 START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the last attempt
-NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = (
-    16,
-    17,
-    18,
-    19,
-)  # s: next step, last attempted step, time, time left for a heel strike
-ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = 20, 21, 22, 23, 24
+# s: next step, last attempted step, time, time left for a heel strike
+NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = range(16, 20)
+ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = range(20, 25)
 LANE_ROWS = 25
 SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of `LaneMemory.slots`
 
@@ -121,7 +117,7 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     turning = system.A[2] * sin_d - system.B[2] * cos_d
     r_2 = r_2 + squared_1 * (turning + system.unpaired * sin_d)
     r_1 = r_1 - squared_2 * turning
-    hip = hinge_torque(system.hip, y[0] - y[1], y[2] - y[3]).torque
+    hip = hinge_torque(system.hip, y[0] - y[1], y[2] - y[3]).resistance
     r_1, r_2 = r_1 - hip, r_2 + hip
     inverse = 1.0 / system.A[0]
     factor = M_12 * inverse
@@ -212,12 +208,7 @@ def begin_swing(walker: TwoLegs, memory: LaneMemory, lane: int, t: float, y: Sta
 
 @kernel_part
 def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-    return (
-        load_lanes(rows, row),
-        load_lanes(rows, row + 1),
-        load_lanes(rows, row + 2),
-        load_lanes(rows, row + 3),
-    )
+    return load_lanes(rows, row), load_lanes(rows, row + 1), load_lanes(rows, row + 2), load_lanes(rows, row + 3)
 
 
 @kernel_part
@@ -316,7 +307,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
         return GOES_ON
     y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
     bridge(rows, lane, wait, y)
-    heel_strike(walker.model, y, new)
+    strike(walker.model, AT_STRIKE, y, new)
     step, t = slots[STEPS_TAKEN, lane], rows[LANE_TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
     outcome = record_strike(observer, slots[SLOT_OF_START, lane], step, t, new)

@@ -264,7 +264,7 @@ def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> 
                 wait += lift / upward
             waits[step, column - 1] = wait
             shift_column(y, at, f, wait)
-    strike(model, STRAIGHT if knee else AT_STRIKE, not knee, y, new)
+    strike(model, STRAIGHT if knee else AT_STRIKE, y, new)
     if knee and len(y) > 2 * n:
         for i in range(2 * n):
             before[i] = new[i]

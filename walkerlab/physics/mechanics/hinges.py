@@ -1,7 +1,7 @@
 """Torques at hinges, for both models, from the angle between two bodies and its rate.
 
-A law is a type registered with `hinge_torque` and `hinge_energy`. Its torque turns the first body back and the second
-one forward; it dissipates the power (torque - elastic part) times the rate.
+A law is a type registered with `hinge_torque` and `hinge_energy`. Its resistance turns the first body back and the
+second one forward; it dissipates the power (resistance - elastic part) times the rate.
 
 Each hinge is a row of two arrays in both models: `hinges` holds its two bodies, `laws` the parameters of a
 SpringDamper. The first row is the hip; the others are the knees that can bend: the swing knee in the rigid model, both
@@ -20,9 +20,9 @@ def legs_apart(system: Any, y: Any) -> tuple[float, float]:
 
 
 class HingeTorque(NamedTuple):
-    """Torque that opposes the angle by which one body is ahead of another, and its derivatives."""
+    """Torque at a hinge, and its derivatives with respect to the angle by which the first body is ahead."""
 
-    torque: float  # N m
+    resistance: float  # N m, turns the first body back and the second forward; the opposite of `SpringDamper.torque`
     elastic: float  # N m, the part that stores energy
     by_angle: float  # N m/rad
     by_rate: float  # N m s/rad
@@ -41,11 +41,11 @@ def hinge_energy(law: Any, angle: float) -> float:
 
 
 class SpringDamper(NamedTuple):
-    """Spring that is relaxed at zero angle, damper, and constant torque that turns the first body forward."""
+    """Spring that is relaxed at zero angle, damper, and constant torque."""
 
     stiffness: float  # N m/rad
     damping: float  # N m s/rad
-    torque: float  # N m
+    torque: float  # N m, turns the first body forward and the second back
 
 
 @hinge_torque.case(SpringDamper, forced_inline=True)
@@ -80,8 +80,8 @@ def is_sprung(model: Any, row: int) -> bool:
 
 @forced_inline
 def add_hinge_torque(now: HingeTorque, body: int, other: int, r: Any) -> None:
-    r[body] -= now.torque
-    r[other] += now.torque
+    r[body] -= now.resistance
+    r[other] += now.resistance
 
 
 @kernel_part

@@ -32,22 +32,17 @@ from walkerlab.physics.solvers.system import Floats
 
 
 @kernel_part
-def heel_strike(model: RigidModel, y: Any, new: Any) -> None:
-    """Write the state just after heel strike, with the legs' roles exchanged, into `new`; y is the state before it."""
-    # Any number of variational columns may follow the state; they are also mapped and written into `new`.
-    strike(model, AT_STRIKE, True, y, new)
+def strike(model: RigidModel, phase: int, y: Any, new: Any) -> None:
+    """Write the state after a plastic impact under constraints E[phase] into `new`; y is the state before it.
 
-
-@kernel_part
-def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) -> None:
-    """Apply a plastic impact under constraints E[phase]; if `other_foot`, the swing foot becomes the stance foot."""
+    At a heel strike, AT_STRIKE, the swing foot becomes the stance foot and the legs exchange their roles. Any number of
+    variational columns may follow the state; they are also mapped and written into `new`.
+    """
     # E[phase] makes bodies follow others, such as a locked shank its thigh (see links.py).
-    like = model.arm_x
-    n, R = len(like), model.radius
-    s, c, F, U, p, M, factors = (
-        vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like), matrix(like),
-    )  # fmt: skip
-    foot_F, foot_U = vector(like), vector(like)
+    like, other_foot = model.arm_x, phase == AT_STRIKE
+    n, R, E = len(like), model.radius, model.E[phase]
+    s, c, F, U, foot_F, foot_U = vector(like), vector(like), vector(like), vector(like), vector(like), vector(like)
+    p, jump, turned, M, factors = vector(like), vector(like), vector(like), matrix(like), matrix(like)
     sines_cosines(model, n, y, s, c)
     projections(model.foot_x, model.foot_y, n, s, c, foot_F, foot_U)
     # velocity of the new stance foot's centre, along the slope and normal to it
@@ -63,12 +58,12 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
     for k in range(n):
         for l in range(n):
             factors[k, l] = M[k, l]
-    factor_linked(model, phase, factors)
+        turned[k] = 0.0
+    factor_linked(E, n, factors)
     pushed = other_foot and model.push_off != 0.0
     twist = push_off(model, new).angular if pushed else 0.0
-    constraints = Constraints(phase, M, factors, F, U)
-    project(model, constraints, new[n : 2 * n], along, upward, twist, p)
-    jump, turned = vector(like), vector(like)
+    constraints = Constraints(E, M, factors, F, U)
+    project(model, constraints, new[n : 2 * n], along, upward, twist, turned, p)
     for k in range(n):
         jump[k] = p[k] - new[n + k]
         new[n + k] = p[k]
@@ -88,7 +83,7 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
             twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
         turn, rate = new[at : at + n], new[at + n : at + 2 * n]
         mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
-        project_change(model, constraints, rate, along, upward, twist, turned, p)
+        project(model, constraints, rate, along, upward, twist, turned, p)
         for k in range(n):
             new[at + n + k] = p[k]
 
@@ -96,7 +91,6 @@ def strike(model: RigidModel, phase: int, other_foot: bool, y: Any, new: Any) ->
 class RootedTree(NamedTuple):
     """Tree of n bodies about its root: the fields of a model's Mechanism that `project` needs."""
 
-    E: Floats  # (phases, n, n)
     A: Floats  # (n, n) kg m^2
     B: Floats
     arm_x: Floats  # (n,) kg m
@@ -106,18 +100,14 @@ class RootedTree(NamedTuple):
     slope: float  # rad
 
 
-class Lock(NamedTuple):
-    """Result of locking a joint by a plastic impact that leaves the root's motion unchanged."""
-
-    velocities: Floats  # (n,) rad/s, after the impact
-    lost: float  # J, kinetic energy lost
-    changes: Floats  # (n, columns) rad/s, changes of `velocities`, one column per column of `rates`
-
-
-def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: Floats) -> Lock:
-    """Project the angular velocities omega (n,) onto those that E[0] allows; the root's motion does not change.
+def lock(
+    tree: RootedTree, E: Floats, angles: Floats, omega: Floats, turns: Floats, rates: Floats
+) -> tuple[Floats, float, Floats]:
+    """Project the angular velocities omega (n,) onto those that E (n, n) allows; the root's motion does not change.
 
     turns, rates  (n, columns) changes of the angles (rad) and of omega (rad/s) just before the lock
+
+    Returns the velocities after the lock, the kinetic energy lost (J), and the changes (n, columns) of the velocities.
     """
     n = len(omega)
     s, c, F, U, p = np.zeros((5, n))
@@ -125,13 +115,13 @@ def lock(tree: RootedTree, angles: Floats, omega: Floats, turns: Floats, rates: 
     sines_cosines(tree, n, angles, s, c)
     add_inertia(tree, n, s, c, omega, M, p)
     factors = M.copy()
-    factor_linked(tree, 0, factors)
-    constraints = Constraints(0, M, factors, F, U)
-    project(tree, constraints, omega, 0.0, 0.0, 0.0, p)
+    factor_linked(E, n, factors)
+    constraints = Constraints(E, M, factors, F, U)
+    project(tree, constraints, omega, 0.0, 0.0, 0.0, np.zeros(n), p)
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
-        project_change(tree, constraints, rates, 0.0, 0.0, 0.0, turned, changes)
-    return Lock(p, float(0.5 * (M @ omega) @ (omega - p)), changes)
+        project(tree, constraints, rates, 0.0, 0.0, 0.0, turned, changes)
+    return p, float(0.5 * (M @ omega) @ (omega - p)), changes
 
 
 class PushOffImpulse(NamedTuple):
@@ -192,22 +182,22 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
 def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
     """Return the state y (2 n,) after an impulse (N s) at the hip along the slope, applied just after a heel strike."""
     # The new stance foot stays at rest. The trailing knee is already released and moves freely.
-    n, new, phase = len(model.arm_x), np.array(y, float), BENT if model.kneed else STRAIGHT
+    n, new, E = len(model.arm_x), np.array(y, float), model.E[BENT if model.kneed else STRAIGHT]
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
     equations(model, new, s, c, F, U, M, p)
     p[:] = 0.0
     p[STANCE] = -impulse * hip_height(model, new)
-    factor_linked(model, phase, M)
-    solve_linked(model, phase, M, p)
+    factor_linked(E, n, M)
+    solve_linked(E, n, M, p)
     new[n:] += p
     return new
 
 
 class Constraints(NamedTuple):
-    """Constraints E[phase] of an impact, with the mass matrix and moments of the tree about its new root."""
+    """Constraints of an impact, with the mass matrix and moments of the tree about its new root."""
 
-    phase: int
+    E: Any  # (n, n) reduction of links.py
     M: Any  # (n, n) kg m^2
     factors: Any  # (n, n) factors from `factor_linked`
     F: Any  # (n,) kg m, first moments projected on the slope
@@ -216,30 +206,16 @@ class Constraints(NamedTuple):
 
 @forced_inline
 def project(
-    model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, p: Any
+    model: Any, constraints: Constraints, omega: Any, along: float, upward: float, twist: float, turned: Any, p: Any
 ) -> None:
-    """Write angular velocities (rad/s) after an impact into p (n,); `twist` (N m s) acts on the stance leg."""
-    momenta(model, constraints.M, constraints.F, constraints.U, omega, along, upward, p)
-    p[STANCE] += twist
-    solve_linked(model, constraints.phase, constraints.factors, p)
+    """Write the angular velocities (rad/s) after an impact, or a change of them, into p (n,).
 
-
-@forced_inline
-def project_change(
-    model: Any, constraints: Constraints, rate: Any, along: float, upward: float, twist: float, turned: Any, p: Any
-) -> None:
-    """Project a change of velocities as `project` does; `turned` (n,) is the momentum change due to the angles."""
-    momenta(model, constraints.M, constraints.F, constraints.U, rate, along, upward, p)
-    for k in range(len(model.arm_x)):
-        p[k] -= turned[k]
-    p[STANCE] += twist
-    solve_linked(model, constraints.phase, constraints.factors, p)
-
-
-@forced_inline
-def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward: float, p: Any) -> None:
-    """Write the generalised momenta Z^T M u into p (n,); u is (along, upward) in m/s and omega (n,) in rad/s."""
+    omega, along, upward  velocities u before the impact, or their change: the bodies' (n,) in rad/s, the root's in m/s
+    twist                 N m s, impulse on the stance leg, or its change
+    turned                (n,) change of momentum due to a change of the angles; zero for velocities
+    """
     # M is M' of rigid_model.py and includes the root's rolling velocity -R omega; `sliding` is `along` minus that.
+    M, F, U = constraints.M, constraints.F, constraints.U
     n, R = len(model.arm_x), model.radius
     sliding = along + R * omega[STANCE]
     for k in range(n):
@@ -248,6 +224,10 @@ def momenta(model: Any, M: Any, F: Any, U: Any, omega: Any, along: float, upward
             total += M[k, l] * omega[l]
         p[k] = total
     p[STANCE] -= R * model.mass * sliding
+    for k in range(n):
+        p[k] -= turned[k]
+    p[STANCE] += twist
+    solve_linked(constraints.E, n, constraints.factors, p)
 
 
 @forced_inline

@@ -40,7 +40,7 @@ from walkerlab.physics.mechanics.tree import (
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
 
-SWING, STANCE, SHANK = 0, 1, 2
+SWING, STANCE = 0, 1
 # indices into E: swing knee bent, swing leg straight, heel strike
 BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
 NO_SHANK = -1
@@ -198,12 +198,12 @@ def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_ang
 def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
     """Evaluate the equations of motion as a first-order system, and the variational equations for the columns."""
     model = system.model
-    like, phase = model.arm_x, system.phase
+    like, E = model.arm_x, model.E[system.phase]
     n = len(like)
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model, phase, M)
-    solve_linked(model, phase, M, alpha)
+    factor_linked(E, n, M)
+    solve_linked(E, n, M, alpha)
     for k in range(n):
         f[k], f[n + k] = y[n + k], alpha[k]
     if len(y) > 2 * n:
@@ -216,7 +216,7 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
                 for l in range(n):
                     total += by_angle[k, l] * y[at + l] + by_rate[k, l] * y[at + n + l]
                 alpha[k] = total
-            solve_linked(model, phase, M, alpha)
+            solve_linked(E, n, M, alpha)
             for k in range(n):
                 f[at + k], f[at + n + k] = y[at + n + k], alpha[k]
 
@@ -248,19 +248,19 @@ def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_a
 def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     """Compute the Jacobian (2 n, 2 n) of the equations of motion, column by column."""
     model = system.model
-    like, phase = model.arm_x, system.phase
+    like, E = model.arm_x, model.E[system.phase]
     n = len(like)
     s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
     by_angle, by_rate = matrix(like), matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
-    factor_linked(model, phase, M)
-    solve_linked(model, phase, M, alpha)
+    factor_linked(E, n, M)
+    solve_linked(E, n, M, alpha)
     torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
     for j in range(2 * n):
         for k in range(n):
             J[k, j] = 1.0 if j == n + k else 0.0
             alpha[k] = by_angle[k, j] if j < n else by_rate[k, j - n]
-        solve_linked(model, phase, M, alpha)
+        solve_linked(E, n, M, alpha)
         for k in range(n):
             J[n + k, j] = alpha[k]
 
@@ -270,13 +270,8 @@ def ground_reaction(system: Mode, y: Any) -> tuple[float, float]:
     """Compute the ground force (N) on the stance foot, along the slope (in walking direction) and normal to it."""
     model = system.model
     n = len(model.arm_x)
-    s, c, F, U, f = (
-        vector(model.arm_x),
-        vector(model.arm_x),
-        vector(model.arm_x),
-        vector(model.arm_x),
-        vector(model.zero_state),
-    )
+    s, c, F, U = vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x)
+    f = vector(model.zero_state)
     sines_cosines(model, n, y, s, c)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)
     derivative(system, 0.0, y, f)
@@ -304,10 +299,8 @@ def energies(model: RigidModel, y: Any) -> tuple[float, float]:
     """Compute the kinetic energy, and the potential energy of gravity and of the springs at the hinges (J)."""
     # Heights are measured from the contact point of a stance leg that is normal to the slope.
     n = len(model.arm_x)
-    s, c, F, U, r, M = (
-        vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x),
-        matrix(model.arm_x),
-    )  # fmt: skip
+    s, c, F, U = vector(model.arm_x), vector(model.arm_x), vector(model.arm_x), vector(model.arm_x)
+    r, M = vector(model.arm_x), matrix(model.arm_x)
     equations(model, y, s, c, F, U, M, r)
     rolled = -model.radius * (y[STANCE] + model.slope)
     potential = tree.potential_energy(model, n, rolled, model.radius, F, U)
@@ -380,5 +373,5 @@ def kinetic_energy(model: RigidModel, y: Any) -> float:
 def apply_couplings(model: RigidModel, phase: int, values: Any) -> Floats:
     """Return a copy of `values` (n,) in which each follower's value is computed from those of the bodies it follows."""
     every = np.array(values, float)
-    expand(model, phase, every)
+    expand(model.E[phase], every.size, every)
     return every

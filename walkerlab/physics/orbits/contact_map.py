@@ -39,7 +39,7 @@ from walkerlab.physics.hybrid.contact_loop import NO_LIMIT
 from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, in_walk, new_observer, walk_on
 from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state
 from walkerlab.physics.hybrid.walk_record import DrivenWork
-from walkerlab.physics.mechanics.links import CountedModel, factor_linked, solve_linked
+from walkerlab.physics.mechanics.links import factor_linked, solve_linked
 from walkerlab.physics.mechanics.tree import add_inertia
 from walkerlab.physics.orbits.step_map import (
     CACHE_SIZE,
@@ -282,9 +282,8 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
-    links = CountedModel(form.E, form.arm_x[:n])
-    factor_linked(links, 0, M)
-    solve_linked(links, 0, M, r)
+    factor_linked(form.E[0], n, M)
+    solve_linked(form.E[0], n, M, r)
     y[half] += impulse / form.mass
     y[half + 2 :] += r
     return tuple(to_full(form, y, walker.size).tolist())

@@ -20,8 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.mechanics.impact import heel_strike
+from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import (
+    AT_STRIKE,
     STRAIGHT,
     RigidModel,
     apply_couplings,
@@ -138,7 +139,7 @@ def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
 @np.errstate(divide="raise", invalid="raise")
 def apply_strike(walker: RigidModel, state: State) -> Floats:
     after = np.zeros(len(state))
-    heel_strike(walker, np.array(state), after)
+    strike(walker, AT_STRIKE, np.array(state), after)
     return after
 
 
