@@ -25,12 +25,12 @@ class Feet:
         self.y = np.array(start_state(self.scene, (0.0, 0.0, 0.0, 0.0)))
         self.y[1] += height
         self.y[5] += 0.1 if rising else -0.1
-        self.known = new_walk_state(self.scene.walker, self.scene.ground.terrain, STANCE_FOOT, 1, tuple(self.y))
+        self.known = new_walk_state(self.scene.walker, self.scene.ground, STANCE_FOOT, 1, tuple(self.y))
         self.known.sides[[HEIGHT, PER_FOOT + HEIGHT]] = 1 if (height > 0.0 if in_air is None else in_air) else -1
 
     def event(self, event):
         system = on_ground(self.scene.walker, self.known.has_ground)
-        assert apply_event(system, self.scene.ground.terrain, None, self.known, event, 0.0, tuple(self.y)) == GOES_ON
+        assert apply_event(system, None, self.known, event, 0.0, tuple(self.y)) == GOES_ON
         return self
 
     def passing(self, forward, carried):

@@ -84,12 +84,12 @@ def run_until(
     """Simulate for `duration_s`, with evenly spaced samples; raises ArithmeticError if the run ends early."""
     frame = Frame(-UNBOUNDED_M, 2.0 * duration_s / LONGEST_FLIGHT, True)
     ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
-    walk_state = new_walk_state(walker, ground.terrain, 1, 1, start)
+    walk_state = new_walk_state(walker, ground, 1, 1, start)
     walk_state.at_zero[:] = 0
     walk_state.progress.last_touch = duration_s - LONGEST_STEP * frame.pendulum_time
     times = np.arange(SAMPLE_COUNT, dtype=np.float64) * duration_s / SAMPLE_COUNT
     observer = new_observer(walker, walk_state, start, times)
-    stopped = walk_on(walker, ground, Tolerances("radau5", rtol, atol, PROBLEM_BUDGET), walk_state, observer, start)
+    stopped = walk_on(walker, Tolerances("radau5", rtol, atol, PROBLEM_BUDGET), walk_state, observer, start)
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     recorded = int(observer.tally.recorded)

@@ -31,13 +31,13 @@ from walkerlab.physics.hybrid.contact_events import (
     HEIGHT,
     LEFT_EDGE,
     MATERIAL,
+    NO_EVENT,
     PASSING,
     PER_FOOT,
     RELEASE,
     RIGHT_EDGE,
     SLIDE,
     VERTICAL_VELOCITY,
-    JudgedGround,
     farthest_slide,
 )
 from walkerlab.physics.hybrid.contact_state import AT_COMPRESSION, WalkState, material_along
@@ -45,7 +45,7 @@ from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.kernels import kernel_part, vector
 from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_crossing, way_from_zero
 
-NO_SIDE = 0  # side of an event function that may cross zero in either direction
+NO_SIDE = 0  # in `WalkState.sides`, for an event function that may cross zero in either direction
 ZERO_ROUNDING = 1e-14  # m, rad or their rates; smaller values of event functions count as zero
 CLEARLY_MOVED = 1e-12  # m, rad or their rates; larger changes over a step are not rounding
 
@@ -60,22 +60,20 @@ def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
 
 
 @kernel_part
-def sample_event_functions(
-    system: OnGround, ground: JudgedGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder
-) -> None:
-    form, terrain, values = system.form, ground.terrain, finder.values
+def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder) -> None:
+    form, ground, values = system.form, walk_state.ground, finder.values
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     values[PASSING, node] = 0.0
     for foot in range(2):
         first, motion = foot * PER_FOOT, over_ground(system, foot, foot_motion(form, foot, s, c, y))
-        sample_foot(system, motion, cell_edges(terrain, foot, walk_state.cells[foot]), first, node, finder)
+        sample_foot(system, motion, cell_edges(ground.terrain, foot, walk_state.cells[foot]), first, node, finder)
         values[first + MATERIAL, node] = material_along(form, foot, motion.along, y)
         values[PASSING, node] += motion.along if foot == 1 else -motion.along
     stance = walk_state.progress.stance
     values[FALL, node] = hip_height(form, s, c, y) - walk_state.level[stance] - FALLEN_HIP * ground.frame.leg_length
     away = values[stance * PER_FOOT + MATERIAL, node] - walk_state.touched[stance]
-    values[SLIDE, node] = farthest_slide(terrain) ** 2 - away**2
+    values[SLIDE, node] = farthest_slide(ground.terrain) ** 2 - away**2
     for knee in range(2):
         values[EXTENSION + knee, node] = extension(form, knee, y)
         values[EXTENSION_RATE + knee, node] = extension_rate(form, knee, y)
@@ -96,64 +94,43 @@ def sample_foot(
 
 
 @kernel_part
-def knee_crossing(walk_state: WalkState, finder: CrossingFinder) -> tuple[float, int]:
-    """Return the fraction of the step at which the first knee event occurs (or NO_CROSSING), and the event's number."""
-    # a bent knee straightens, a knee in its stop turns back, or the stance foot stops sinking in and releases a knee
-    best, event = NO_CROSSING, -1
-    for knee in range(2):
-        fraction, index = NO_CROSSING, EXTENSION + knee
-        if walk_state.knee[knee] == BENT:
-            fraction = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
-        elif walk_state.knee[knee] == STOPPING:
-            index = EXTENSION_RATE + knee
-            fraction = leaves_side(finder, index, 1, walk_state.at_zero[index] != 0)
-        if fraction < best:
-            best, event = fraction, index
-    if walk_state.progress.release == AT_COMPRESSION:
-        index = walk_state.progress.stance * PER_FOOT + VERTICAL_VELOCITY
-        fraction = leaves_side(finder, index, -1, walk_state.at_zero[index] != 0)
-        if fraction < best:
-            best, event = fraction, index
-    return best, event
-
-
-@kernel_part
 def earliest_crossing(
-    system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
+    system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
     """Return the fraction of the step at which the first event occurs (or NO_CROSSING), and the event's number."""
-    sides, at_zero, has_ground = walk_state.sides, walk_state.at_zero, walk_state.has_ground
-    best, event = NO_CROSSING, -1
+    ground, progress = walk_state.ground, walk_state.progress
+    first = NO_CROSSING, NO_EVENT
     for foot in range(2):
         if foot == system.form.hinged:
             continue
-        first = foot * PER_FOOT
+        row = foot * PER_FOOT
         # a foot in the air has no force to switch; switching after a touch belongs to the next step
-        inside = has_ground[foot] != 0 and sides[first + HEIGHT] < 0
-        last = RELEASE
-        if inside and ground.frame.locate_switching and not walk_state.progress.passes_switching:
-            last = FRICTION_SWITCHES + switching_count(system.friction)
-        for index in range(first, first + last):
-            if not ground.terrain.has_pads and (index == first + LEFT_EDGE or index == first + RIGHT_EDGE):
-                continue
-            fraction = leaves_side(finder, index, sides[index], at_zero[index] != 0)
-            if fraction < best:
-                best, event = fraction, index
-        if foot == walk_state.progress.stance and sides[first + HEIGHT] < 0 and has_ground[foot] != 0:
-            fraction = leaves_side(finder, SLIDE, sides[SLIDE], at_zero[SLIDE] != 0)
-            if fraction < best:
-                best, event = fraction, SLIDE
+        inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + HEIGHT] < 0
+        end = row + RELEASE
+        if inside and ground.frame.locate_switching and not progress.passes_switching:
+            end = row + FRICTION_SWITCHES + switching_count(system.friction)
+        for event in range(row, end):
+            if ground.terrain.has_pads or (event != row + LEFT_EDGE and event != row + RIGHT_EDGE):
+                first = earlier(first, walk_state, finder, event)
+        if inside and foot == progress.stance:
+            first = earlier(first, walk_state, finder, SLIDE)
     if watch_order:  # PASSING is an event only if the order of the feet matters
-        fraction = leaves_side(finder, PASSING, sides[PASSING], at_zero[PASSING] != 0)
-        if fraction < best:
-            best, event = fraction, PASSING
-    fraction, index = knee_crossing(walk_state, finder)
-    if fraction < best:
-        best, event = fraction, index
-    fraction = leaves_side(finder, FALL, sides[FALL], at_zero[FALL] != 0)
-    if fraction < best:
-        best, event = fraction, FALL
-    return best, event
+        first = earlier(first, walk_state, finder, PASSING)
+    for knee in range(2):
+        if walk_state.knee[knee] == BENT:
+            first = earlier(first, walk_state, finder, EXTENSION + knee)
+        elif walk_state.knee[knee] == STOPPING:
+            first = earlier(first, walk_state, finder, EXTENSION_RATE + knee)
+    if progress.release == AT_COMPRESSION:
+        first = earlier(first, walk_state, finder, progress.stance * PER_FOOT + VERTICAL_VELOCITY)
+    return earlier(first, walk_state, finder, FALL)
+
+
+@kernel_part
+def earlier(first: tuple[float, int], walk_state: WalkState, finder: CrossingFinder, event: int) -> tuple[float, int]:
+    """Return the fraction of the step and the number of the earlier event: `first`, or `event` if it is earlier."""
+    fraction = leaves_side(finder, event, walk_state.sides[event], walk_state.at_zero[event] != 0)
+    return (fraction, event) if fraction < first[0] else first
 
 
 @kernel_part

@@ -3,10 +3,10 @@
 from typing import Any, NamedTuple
 
 from walkerlab.physics.ground.pulse import pulse_left
-from walkerlab.physics.ground.terrain import Terrain, is_uneven
+from walkerlab.physics.ground.terrain import is_uneven
 from walkerlab.physics.ground.walker import OnGround, locked_knees
 from walkerlab.physics.hybrid.contact_crossings import earliest_crossing, sample_event_functions
-from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END, Frame, JudgedGround, is_switching
+from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END, is_switching
 from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
 from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, is_above, is_to_lift
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
@@ -41,37 +41,36 @@ LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-REWINDS = 24  # maximum per step; then the step's end counts as the event, because rounding moves the event each time
-DOUBTS = 12  # maximum number of rewinds for a doubtful event; then it is dropped unless it occurs at the step's end
+# maximum per solver step; then the step's end counts as the event, because rounding moves the event each time
+REWINDS = 24
+# maximum number of rewinds for a doubtful event; then it is dropped unless it occurs at the solver step's end
+DOUBTS = 12
 
 
 @callable_kernel
-def scan(
-    system: OnGround, ground: JudgedGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
-) -> tuple[float, int]:
-    """Sample all event functions on a step into `finder.values`, and return the result of `earliest_crossing`."""
+def scan(system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder) -> tuple[float, int]:
+    """Sample all event functions on a solver step into `finder.values`; returns the result of `earliest_crossing`."""
     for node in range(finder.nodes.size):
-        sample_event_functions(system, ground, walk_state, finder.states[node], node, finder)
-    return earliest_crossing(system, ground, walk_state, watch_order, finder)
+        sample_event_functions(system, walk_state, finder.states[node], node, finder)
+    return earliest_crossing(system, walk_state, watch_order, finder)
 
 
 class EventSearch(NamedTuple):
-    """State of the search for an event's time, which repeats steps until one of them ends at the event."""
+    """State of the search for an event's time, which repeats solver steps until one of them ends at the event."""
 
-    target: float  # s, latest end of the next step
+    target: float  # s, latest end of the next solver step
     event: int  # event that is being located, or the last event
-    latest: float  # s, end of the step in which the event first appeared, an upper bound of its time
+    latest: float  # s, end of the solver step in which the event first appeared, an upper bound of its time
     arriving: bool  # whether the target is the event's expected time
     refinements: int  # number of corrections of the expected time
-    rewinds: int  # number of rewinds of the present step
-    stands: bool  # whether the last step is valid; if not, it is repeated up to the new target
-    happens: bool  # whether the event happens at the end of the step
+    rewinds: int  # number of rewinds of the present solver step
+    stands: bool  # whether the last solver step is valid; if not, it is repeated up to the new target
+    happens: bool  # whether the event happens at the end of the solver step
 
 
 @kernel
 def walk_in_form(
     system: OnGround,
-    ground: JudgedGround,
     method: Any,
     finder: CrossingFinder,
     observer: ContactObserver,
@@ -87,15 +86,16 @@ def walk_in_form(
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
     begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
-    search = seek(deadline(system, ground.frame, walk_state, method.clock[T]), NO_EVENT)
-    watch_order = ground.terrain.order_matters or until >= 0 or is_uneven(ground.terrain)
+    search = seek(deadline(system, walk_state, method.clock[T]), NO_EVENT)
+    terrain = walk_state.ground.terrain
+    watch_order = terrain.order_matters or until >= 0 or is_uneven(terrain)
     while steps_are_left(walk_state, until):
         status = advance(method, system, search.target)
         if status != STEP_DONE:
             return (BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED), search.event
         prepare_dense(method, system)
         sample(method, system, finder.nodes, finder.states)
-        fraction, event = scan(system, ground, walk_state, watch_order, finder)
+        fraction, event = scan(system, walk_state, watch_order, finder)
         search = aim(search, walk_state, method, finder, fraction, event)
         if not search.stands:
             rewind(method, system)
@@ -103,17 +103,17 @@ def walk_in_form(
         walk_state.progress.passes_switching = False
         observe(observer, method, system, finder, walk_state)
         note_flexion(system.form, walk_state, method.y)
-        outcome = judge(system, ground.frame, method.clock[T], walk_state)
+        outcome = judge(system, walk_state, method.clock[T])
         if outcome == GOES_ON:
             forget_zeros(walk_state, method.clock[T] - method.clock[T_OLD])
             if search.happens:
-                outcome = react(system, ground.terrain, observer, walk_state, method, search.event, until)
+                outcome = react(system, observer, walk_state, method, search.event, until)
         if outcome != GOES_ON:
             return outcome, search.event
         if walk_state.progress.release == AT_PULSE_END and pulse_left(system, method.clock[T]) <= EVENT_TIME:
             release(walk_state, 1 - walk_state.progress.stance)
             return CHANGES_FORM, PULSE_END
-        search = seek(deadline(system, ground.frame, walk_state, method.clock[T]), search.event)
+        search = seek(deadline(system, walk_state, method.clock[T]), search.event)
     return WALKED, search.event
 
 
@@ -124,7 +124,7 @@ def steps_are_left(walk_state: WalkState, until: int) -> bool:
 
 @kernel_part
 def seek(target: float, event: int) -> EventSearch:
-    """Start the search for the next event, with steps up to time `target` (s); `event` was the last event."""
+    """Start the search for the next event, with solver steps up to time `target` (s); `event` was the last event."""
     return EventSearch(target, event, target, False, 0, 0, False, False)
 
 
@@ -132,7 +132,7 @@ def seek(target: float, event: int) -> EventSearch:
 def aim(
     search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
 ) -> EventSearch:
-    """Decide whether the last step is valid and when the next must end; a `fraction` above 1 means no event."""
+    """Decide whether the last solver step is valid, and when the next must end; a `fraction` above 1 means no event."""
     start, end = method.clock[T_OLD], method.clock[T]
     if fraction <= 1.0:
         return approach(search, walk_state, start, end, fraction, event)
@@ -145,7 +145,7 @@ def aim(
 def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
-    """Shorten the step from `start` to `end` (s) so that it ends at its event, or accept it if it already does."""
+    """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already does."""
     latest = search.latest if search.arriving else end
     refinements = search.refinements if search.arriving and event == search.event else 0
     wait = max(fraction * (end - start), EVENT_TIME)
@@ -153,10 +153,10 @@ def approach(
     if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
         return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
     if early and is_switching(event):
-        # the event function is too far from a polynomial on this step: try half the step
+        # the event function is too far from a polynomial on this solver step: try half the step
         if search.rewinds < REWINDS:
             return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
-        # a short step does not help either: ignore this event, but no other event of the step
+        # a short solver step does not help either: ignore this event, but no other event of the step
         walk_state.progress.passes_switching = True
         return EventSearch(end, event, latest, False, 0, 0, False, False)
     return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
@@ -164,7 +164,7 @@ def approach(
 
 @kernel_part
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
-    """Decide after a step that just missed its event: accept the event, extend the step by `wait` (s), or drop it."""
+    """Accept the event that a solver step just missed, extend the step by `wait` (s), or drop the event."""
     happens = abs(wait) <= EVENT_TIME
     doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
     target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
@@ -175,7 +175,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
 
 @kernel_part
 def forget_zeros(walk_state: WalkState, h: float) -> None:
-    """Clear `at_zero`, the guard against finding an event twice; keep it if the last step h (s) was too short."""
+    """Clear `at_zero`, the guard against finding an event twice, unless the last solver step h (s) was too short."""
     if h > 2.0 * EVENT_TIME:
         for i in range(walk_state.at_zero.size):
             walk_state.at_zero[i] = 0
@@ -183,17 +183,11 @@ def forget_zeros(walk_state: WalkState, h: float) -> None:
 
 @kernel_part
 def react(
-    system: OnGround,
-    terrain: Terrain,
-    observer: ContactObserver,
-    walk_state: WalkState,
-    method: Any,
-    event: int,
-    until: int,
+    system: OnGround, observer: ContactObserver, walk_state: WalkState, method: Any, event: int, until: int
 ) -> int:
-    """Apply the event at the end of the last step; returns the outcome, GOES_ON or CHANGES_FORM."""
+    """Apply the event at the end of the last solver step; returns the outcome, GOES_ON or CHANGES_FORM."""
     steps, locked = walk_state.progress.steps, locked_knees(walk_state.knee)
-    outcome = apply_event(system, terrain, observer, walk_state, event, method.clock[T], method.y)
+    outcome = apply_event(system, observer, walk_state, event, method.clock[T], method.y)
     if outcome != GOES_ON:
         return outcome
     stepped = walk_state.progress.steps > steps
@@ -221,17 +215,23 @@ def jumps_at_touch(system: OnGround) -> bool:
 
 
 @kernel_part
-def deadline(system: OnGround, frame: Frame, walk_state: WalkState, t: float) -> float:
+def deadline(system: OnGround, walk_state: WalkState, t: float) -> float:
     """Compute the time (s) at which the step or a flight gets too long or the push-off ends, whichever is first."""
-    by_step = walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time
-    by_flight = walk_state.progress.airborne_since + LONGEST_FLIGHT * frame.pendulum_time
+    by_step, by_flight = time_limits(walk_state)
     left = pulse_left(system, t)
     return min(by_step, by_flight, t + left) if left > EVENT_TIME else min(by_step, by_flight)
 
 
 @kernel_part
+def time_limits(walk_state: WalkState) -> tuple[float, float]:
+    """Return the times (s) at which the step and the flight get too long."""
+    progress, pendulum_time = walk_state.progress, walk_state.ground.frame.pendulum_time
+    return progress.last_touch + LONGEST_STEP * pendulum_time, progress.airborne_since + LONGEST_FLIGHT * pendulum_time
+
+
+@kernel_part
 def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
-    """Estimate the time (s) from the end of the last step to the zero of an event function, from its final slope."""
+    """Estimate the time (s) from the end of the last solver step to an event function's zero, from its final slope."""
     last = finder.nodes.size - 1
     h = method.clock[T] - method.clock[T_OLD]
     change = finder.values[event, last] - finder.values[event, last - 1]
@@ -243,16 +243,15 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 
 @kernel_part
-def judge(system: OnGround, frame: Frame, t: float, walk_state: WalkState) -> int:
+def judge(system: OnGround, walk_state: WalkState, t: float) -> int:
     """Return the outcome if the flight or the step is too long at t (s), else GOES_ON; updates `airborne_since`."""
-    # A foot that lifts at t still counts as on the ground, because the event at the step's end is applied later.
+    # A foot that lifts at t still counts as on the ground, because the event at the solver step's end is applied later.
     grounded = is_hinged(system)
     for foot in range(2):
         grounded = grounded or (walk_state.has_ground[foot] != 0 and not is_above(walk_state, foot))
     if grounded:
         walk_state.progress.airborne_since = t
-    if t >= walk_state.progress.last_touch + LONGEST_STEP * frame.pendulum_time:
+    by_step, by_flight = time_limits(walk_state)
+    if t >= by_step:
         return NO_HEEL_STRIKE
-    if t >= walk_state.progress.airborne_since + LONGEST_FLIGHT * frame.pendulum_time:
-        return LIFTED_OFF
-    return GOES_ON
+    return LIFTED_OFF if t >= by_flight else GOES_ON

@@ -10,7 +10,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import ENTRIES, KNEE_STRIKES, LOSS_ENTRIES, LOSSES, PUSH_OFF, TORQUE
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy, total_energy
 from walkerlab.physics.ground.hinges import hinge_energies
-from walkerlab.physics.ground.terrain import Terrain, is_uneven
+from walkerlab.physics.ground.terrain import is_uneven
 from walkerlab.physics.ground.walker import (
     OF_BODIES,
     ContactWalker,
@@ -36,7 +36,7 @@ from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWor
 from walkerlab.physics.kernels import kernel, uncompiled, vector
 from walkerlab.physics.mechanics.tree import new_record
 from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_named, sharing
-from walkerlab.physics.solvers.stepping import ACCEPTED, JACOBIANS, REJECTED, RHS, T
+from walkerlab.physics.solvers.stepping import BUDGET, RHS, T
 from walkerlab.physics.solvers.system import Floats, State
 
 USUAL_STEP = 3.0  # pendulum times; most steps are shorter
@@ -159,13 +159,11 @@ def new_observer(
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
     """Return the walker in its present form; it shares memory with the walk state."""
-    memory = walk_state
-    return on_ground(walker, memory.has_ground, memory.knee, hinged, memory.level, memory.progress)
+    return on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.level, walk_state.progress)
 
 
 def walk_on(
     walker: ContactWalker,
-    ground: JudgedGround,
     tolerances: Tolerances,
     walk_state: WalkState,
     observer: ContactObserver,
@@ -193,7 +191,7 @@ def walk_on(
             by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
         method = by_size[y.size]
         method.y[:] = y
-        ended, event = walk(system, ground, method, finder, observer, walk_state, until)
+        ended, event = walk(system, method, finder, observer, walk_state, until)
         if ended != CHANGES_FORM:
             break
         before, system = system, in_walk(walker, walk_state, hinged)
@@ -202,7 +200,7 @@ def walk_on(
         tangent[:] = to_full(system.form, tangent[: method.y.size], walker.size)
     end = floating_state(system.form, method.y, walker.size)
     walk_state.progress.stopped_at = lead.clock[T]
-    return Stopped(check_balance(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:4].copy())
+    return Stopped(check_balance(ended, observer, tolerances), float(lead.clock[T]), end, lead.counts[:BUDGET].copy())
 
 
 def walk_contact(
@@ -225,23 +223,22 @@ def walk_contact(
     frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(walker.whole, start, s, c)
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
-        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+        walk_state = new_walk_state(walker, ground, stance, steps, start)
         stopped = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
-        return gather(stopped, walk_state, new_observer(walker, walk_state, start), walker, ground.terrain, tolerances)
+        return gather(stopped, walk_state, new_observer(walker, walk_state, start), walker, tolerances)
     room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
     while True:
-        walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+        walk_state = new_walk_state(walker, ground, stance, steps, start)
         times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
         observer = new_observer(walker, walk_state, start, times, tolerances.track_energy)
-        stopped = run_parts(walker, ground, hinged, start, tolerances, observer, walk_state)
+        stopped = run_parts(walker, hinged, start, tolerances, observer, walk_state)
         if room == 0 or observer.tally.recorded < room:
-            return gather(stopped, walk_state, observer, walker, ground.terrain, tolerances)
+            return gather(stopped, walk_state, observer, walker, tolerances)
         room *= 2
 
 
 def run_parts(
     walker: ContactWalker,
-    ground: JudgedGround,
     hinged: bool,
     start: State,
     tolerances: Tolerances,
@@ -252,17 +249,17 @@ def run_parts(
     # A walk that completed all steps continues, unobserved, until the last stance foot lifts: its slip is then known.
     y, spent = start, np.zeros(4, np.int64)
     if hinged:
-        first = walk_on(walker, ground, tolerances, walk_state, observer, start, hinged=True)
+        first = walk_on(walker, tolerances, walk_state, observer, start, hinged=True)
         y, spent = first.state, first.work
         release_hinge(walker, walk_state, y)
         if first.outcome is not Outcome.WALKED:
             return first
         walk_state.progress.airborne_since = first.time_s
-    stopped = walk_on(walker, ground, tolerances, walk_state, observer, y)
+    stopped = walk_on(walker, tolerances, walk_state, observer, y)
     if stopped.outcome is Outcome.WALKED:
         unseen = new_observer(walker, walk_state, stopped.state, track_energy=False)
         left = replace(tolerances, budget=tolerances.budget - int(stopped.work[RHS]))
-        walk_on(walker, ground, left, walk_state, unseen, stopped.state, AT_LIFT)
+        walk_on(walker, left, walk_state, unseen, stopped.state, AT_LIFT)
     return replace(stopped, work=spent + stopped.work)
 
 
@@ -301,12 +298,7 @@ def driven_work(walker: ContactWalker, along: float, up: float, account: Floats)
 
 
 def gather(
-    stopped: Stopped,
-    walk_state: WalkState,
-    observer: ContactObserver,
-    walker: ContactWalker,
-    terrain: Terrain,
-    tolerances: Tolerances,
+    stopped: Stopped, walk_state: WalkState, observer: ContactObserver, walker: ContactWalker, tolerances: Tolerances
 ) -> ContactWalkResult:
     done, lifted, seen = int(walk_state.progress.steps), steps_with_lift(walk_state), int(observer.tally.recorded)
     samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
@@ -316,13 +308,13 @@ def gather(
     )
     strike_times = np.where(strikes < 0.0, np.nan, strikes)
     return ContactWalkResult(
-        foothold_height_m=walk_state.touch_height[:done] if is_uneven(terrain) else None,
+        foothold_height_m=walk_state.touch_height[:done] if is_uneven(walk_state.ground.terrain) else None,
         outcome=stopped.outcome,
         touch_time_s=walk_state.touch_time[:done],
         touch_along_m=walk_state.touch_along[:done],
         knee_strike_time_s=strike_times if walker.kneed else None,
         end_time_s=stopped.time_s,
-        work=WalkWork(*(int(stopped.work[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
+        work=WalkWork(*stopped.work.tolist()),
         slip_m=walk_state.slip[:lifted],
         rolling_m=walk_state.rolling[:lifted],
         end_state=stopped.state,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.physics.ground.knees import FLEXED, extension
-from walkerlab.physics.ground.terrain import Terrain, cell_at, has_ground_in_cell, starts_with_ground
+from walkerlab.physics.ground.terrain import cell_at, has_ground_in_cell, starts_with_ground
 from walkerlab.physics.ground.walker import (
     BENT,
     LOCKED,
@@ -20,6 +20,8 @@ from walkerlab.physics.ground.walker import (
 )
 from walkerlab.physics.hybrid.contact_events import (
     EVENT_FUNCTIONS,
+    EXTENSION,
+    EXTENSION_RATE,
     FALL,
     HEIGHT,
     LEFT_EDGE,
@@ -27,6 +29,8 @@ from walkerlab.physics.hybrid.contact_events import (
     PER_FOOT,
     RIGHT_EDGE,
     SLIDE,
+    VERTICAL_VELOCITY,
+    JudgedGround,
 )
 from walkerlab.physics.kernels import by_reference, kernel_part
 from walkerlab.physics.solvers.system import State
@@ -40,6 +44,7 @@ START_ROUNDING = 1e-14  # relative rounding error of a start's coordinates and v
 class WalkState(NamedTuple):
     """State of a walk apart from its coordinates; events change it, and the result is gathered from it."""
 
+    ground: JudgedGround
     touch_time: Any  # (steps,) s
     touch_along: Any  # (steps,) m
     touch_height: Any  # (steps,) m, height of the foothold above the slope
@@ -58,13 +63,13 @@ class WalkState(NamedTuple):
     leaving: Any  # (2,) whether a foot is the former stance foot and has not lifted yet
     knee: Any  # (2,) state of each knee
     knee_strike: Any  # (steps + 1,) s, time at which the swing leg's knee locked in each step; -1 if it did not
-    sides: Any  # (event functions,) side of zero on which each event function is: 1, -1, or 0 if not stored
+    sides: Any  # (event functions,) side of zero that each event function leaves at its event: 1, -1, or 0 for either
     at_zero: Any  # (event functions,) whether the last event left each event function at zero
     progress: WalkProgress
 
 
-def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: int, y: State) -> WalkState:
-    feet = feet_motion(walker.whole, y)
+def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, steps: int, y: State) -> WalkState:
+    feet, terrain = feet_motion(walker.whole, y), ground.terrain
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
     for foot in range(2):
@@ -72,6 +77,7 @@ def new_walk_state(walker: ContactWalker, terrain: Terrain, stance: int, steps: 
         has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
     sides, at_zero = initial_sides(walker, feet, stance, y)
     return WalkState(
+        ground=ground,
         touch_time=np.zeros(steps),
         touch_along=np.zeros(steps),
         touch_height=np.zeros(steps),
@@ -111,13 +117,14 @@ def initial_sides(
     # A function that is zero takes the side towards which its rate points. If the rate is also zero, a foot on the
     # ground counts as below it, and the stance foot counts as ahead of a foot beside it.
     sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
-    sides[[FALL, SLIDE]] = 1
+    sides[[FALL, SLIDE, EXTENSION_RATE, EXTENSION_RATE + 1]] = 1
+    sides[[EXTENSION, EXTENSION + 1]] = -1
     n, whole = int(walker.whole.bodies), walker.whole
     size = float(max(np.abs(whole.foot_x[0]).max(), np.abs(whole.foot_y[0]).max()))
     speed = max(abs(float(x)) for x in y[2 + n :])
     for foot in range(2):
         first = foot * PER_FOOT
-        sides[[first + LEFT_EDGE, first + RIGHT_EDGE]] = 1
+        sides[[first + LEFT_EDGE, first + RIGHT_EDGE]], sides[first + VERTICAL_VELOCITY] = 1, -1
         signs = (feet[foot].height, feet[foot].vertical_velocity)
         sides[first + HEIGHT], at_zero[first + HEIGHT] = zero_side(signs, (size, speed), -1)
     rates = [feet[k].slip - float(whole.rolling[k, :n] @ np.array(y[4 + n :])) for k in range(2)]

@@ -5,7 +5,6 @@ from typing import Any
 from walkerlab.physics.ground.knees import FLEXED, IdealLock, extension
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import (
-    Terrain,
     foothold_height,
     has_ground_in_air,
     has_ground_in_cell,
@@ -56,7 +55,7 @@ TRIP = 0.25  # fraction of the pitch; a foot that touches its old pad this far f
 
 @kernel_part
 def apply_event(
-    system: OnGround, terrain: Terrain, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
+    system: OnGround, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
     """Apply an event to the walk state; returns an outcome if the event ends the walk, otherwise GOES_ON."""
     if event == FALL:
@@ -76,20 +75,20 @@ def apply_event(
             # in a hinged step, equal legs pass with both feet at the surface; rounding must not decide which is above
             at_surface = abs(feet[foot].height) < AT_SURFACE
             above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
-            find_ground(terrain, walk_state, foot, above)
-            if (above or walk_state.has_ground[foot] == 0) and next_foothold_counts(terrain, walk_state, foot):
-                outcome = set_foothold(system, terrain, observer, walk_state, feet[foot], foot, y)
+            find_ground(walk_state, foot, above)
+            if (above or walk_state.has_ground[foot] == 0) and next_foothold_counts(walk_state, foot):
+                outcome = set_foothold(system, observer, walk_state, feet[foot].height, foot, y)
         return outcome
     foot = event // PER_FOOT
     kind = event % PER_FOOT
     if kind == HEIGHT:
         walk_state.sides[event] = -walk_state.sides[event]
         if is_above(walk_state, foot):
-            lift(system.form, terrain, walk_state, feet, foot, y)
-            if next_foothold_counts(terrain, walk_state, foot):
-                return set_foothold(system, terrain, observer, walk_state, feet[foot], foot, y)
+            lift(system.form, walk_state, feet, foot, y)
+            if next_foothold_counts(walk_state, foot):
+                return set_foothold(system, observer, walk_state, feet[foot].height, foot, y)
         else:
-            return touch(system.form, terrain, walk_state, feet, foot, t, y)
+            return touch(system.form, walk_state, feet, foot, t, y)
     elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
         walk_state.at_zero[event] = 0
         walk_state.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
@@ -98,8 +97,8 @@ def apply_event(
             observe_edge(observer, system, foot, y)
             walk_state.has_ground[foot] = 0
             return GOES_ON
-        pad = height_of_pad(terrain, foot, walk_state.cells[foot])
-        set_level(system, observer, walk_state, feet[foot], foot, pad, y)
+        pad = height_of_pad(walk_state.ground.terrain, foot, walk_state.cells[foot])
+        set_level(system, observer, walk_state, feet[foot].height, foot, pad, y)
         if is_above(walk_state, foot):
             walk_state.has_ground[foot] = 1
         else:
@@ -115,18 +114,12 @@ def apply_event(
 
 @kernel_part
 def set_level(
-    system: OnGround,
-    observer: ContactObserver,
-    walk_state: WalkState,
-    motion: FootMotion,
-    foot: int,
-    level: float,
-    y: Any,
+    system: OnGround, observer: ContactObserver, walk_state: WalkState, height: float, foot: int, level: float, y: Any
 ) -> None:
-    """Set the ground height (m) for a foot; the energy in the ground's spring under it is lost."""
+    """Set the level (m) of the ground `height` (m) below a foot; the energy in the ground's spring is lost."""
     if level == walk_state.level[foot]:
         return
-    height = motion.height + walk_state.level[foot] - level
+    height = height + walk_state.level[foot] - level
     if not is_above(walk_state, foot):
         observe_edge(observer, system, foot, y)
     walk_state.level[foot] = level
@@ -135,8 +128,9 @@ def set_level(
 
 
 @kernel_part
-def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> bool:
+def next_foothold_counts(walk_state: WalkState, foot: int) -> bool:
     """Whether the ground under a swing foot must still be set to the height of its next foothold."""
+    terrain = walk_state.ground.terrain
     if terrain.has_pads or not is_uneven(terrain) or foot == walk_state.progress.stance:
         return False
     level = foothold_height(terrain, walk_state.progress.steps + 1)
@@ -145,38 +139,26 @@ def next_foothold_counts(terrain: Terrain, walk_state: WalkState, foot: int) -> 
 
 @kernel_part
 def set_foothold(
-    system: OnGround,
-    terrain: Terrain,
-    observer: ContactObserver,
-    walk_state: WalkState,
-    motion: FootMotion,
-    foot: int,
-    y: Any,
+    system: OnGround, observer: ContactObserver, walk_state: WalkState, height: float, foot: int, y: Any
 ) -> int:
     """Set the ground under a swing foot to its next foothold's height; on an ordinary plane, a foot below it stubs."""
-    set_level(system, observer, walk_state, motion, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
+    terrain = walk_state.ground.terrain
+    set_level(system, observer, walk_state, height, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
     return GOES_ON if is_above(walk_state, foot) or terrain.order_matters else STUBBED
 
 
 @kernel_part
-def find_ground(terrain: Terrain, walk_state: WalkState, foot: int, above: bool) -> None:
+def find_ground(walk_state: WalkState, foot: int, above: bool) -> None:
     """Update whether there is ground below a foot in the air, after the feet have changed places or roles."""
     if above:
-        stands = foot == walk_state.progress.stance
+        terrain, stands = walk_state.ground.terrain, foot == walk_state.progress.stance
         has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
         walk_state.has_ground[foot] = 1 if has_ground else 0
 
 
 @kernel_part
-def lift(
-    form: GroundModel,
-    terrain: Terrain,
-    walk_state: WalkState,
-    feet: tuple[FootMotion, FootMotion],
-    foot: int,
-    y: Any,
-) -> None:
+def lift(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
     """Handle a foot that rises above the ground, at the end of its stance or of a scuff."""
     stands = foot == walk_state.progress.stance
     if stands or walk_state.leaving[foot] != 0:
@@ -185,7 +167,7 @@ def lift(
             step = walk_state.progress.steps - 1
             walk_state.slip[step], walk_state.rolling[step] = walk_state.slipped[foot], walk_state.rolled[foot]
         walk_state.leaving[foot] = 0
-    find_ground(terrain, walk_state, foot, True)
+    find_ground(walk_state, foot, True)
 
 
 @kernel_part
@@ -197,18 +179,12 @@ def note_slip(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, 
 
 @kernel_part
 def touch(
-    form: GroundModel,
-    terrain: Terrain,
-    walk_state: WalkState,
-    feet: tuple[FootMotion, FootMotion],
-    foot: int,
-    t: float,
-    y: Any,
+    form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, t: float, y: Any
 ) -> int:
     """Decide whether a touch ends the step; returns an outcome if the walk ends, otherwise GOES_ON."""
     # The step ends if the swing foot comes down far enough ahead, on a pad other than the one it left. A swing foot
     # that comes down on the pad it left, but far from where it stood, scuffs: it has tripped over the pad.
-    stance = walk_state.progress.stance
+    stance, terrain = walk_state.progress.stance, walk_state.ground.terrain
     if walk_state.has_ground[foot] == 0:
         return GOES_ON
     material = material_along(form, foot, feet[foot].along, y)
@@ -237,7 +213,7 @@ def touch(
     walk_state.progress.last_touch = t
     walk_state.progress.stance = foot
     walk_state.progress.steps = step + 1
-    find_ground(terrain, walk_state, stance, is_above(walk_state, stance))
+    find_ground(walk_state, stance, is_above(walk_state, stance))
     follow_strike(form, walk_state, stance)
     return GOES_ON
 

@@ -35,7 +35,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     swing_foot,
 )
 from walkerlab.physics.solvers.registry import Tolerances, finder_for
-from walkerlab.physics.solvers.stepping import ACCEPTED, BUDGET, JACOBIANS, REJECTED, RHS, clear_counts
+from walkerlab.physics.solvers.stepping import BUDGET, RHS, clear_counts
 from walkerlab.physics.solvers.system import State
 
 STEPS_AT_ONCE = 64
@@ -256,7 +256,7 @@ class Recorder:
             touch_along_m=np.cumsum(lengths),
             knee_strike_time_s=np.concatenate(self.knees) if self.kneed else None,
             end_time_s=end_time,
-            work=WalkWork(*(int(self.counts[count]) for count in (RHS, ACCEPTED, REJECTED, JACOBIANS))),
+            work=WalkWork(*self.counts[:BUDGET].tolist()),
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             driven=driven,
             energy_balance_residual=residual,

@@ -81,10 +81,10 @@ def section_points(
 ) -> Iterator[tuple[int, Floats]]:
     """Walk from the start and yield points of the section, each with the number of steps walked."""
     for steps in WARM_UP_STEPS:
-        walk_state = new_walk_state(walker, ground.terrain, STANCE_FOOT, steps + 1, start)
+        walk_state = new_walk_state(walker, ground, STANCE_FOOT, steps + 1, start)
         observer = new_observer(walker, walk_state, start)
         enough = replace(tolerances, budget=(steps + 1) * tolerances.budget)
-        stopped = walk_on(walker, ground, enough, walk_state, observer, start, steps)
+        stopped = walk_on(walker, enough, walk_state, observer, start, steps)
         if stopped.outcome is Outcome.WALKED and walk_state.at_zero[PASSING]:
             yield steps, coordinates_of(walker, np.array(stopped.state), int(walk_state.progress.stance))
         elif walk_state.progress.steps > steps:

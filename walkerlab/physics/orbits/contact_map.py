@@ -179,7 +179,7 @@ def step_from_section(
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
         observer.tangent.Phi[:, :] = section_tangents(walker, start, stance)
-    stopped = walk_on(walker, laid, tolerances, walk_state, observer, start, 1)
+    stopped = walk_on(walker, tolerances, walk_state, observer, start, 1)
     end, landed = np.array(stopped.state), 1 - stance
     along = feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
@@ -219,11 +219,10 @@ def walk_from_section(
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
     start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
-    laid = over_footholds(ground, heights)
-    walk_state = walk_state_on_section(walker, laid, start, steps + 1)
+    walk_state = walk_state_on_section(walker, over_footholds(ground, heights), start, steps + 1)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
-        return walk_on(walker, laid, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
+        return walk_on(walker, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
@@ -254,10 +253,9 @@ def legs_sampled_from_section(
 ) -> Floats:
     """Sample angles (times, 2) in `walk_from_section`, first stance leg first; times (s) count from the section."""
     start = state_on_section(walker, z, STANCE_FOOT)
-    laid = over_footholds(ground, heights)
-    walk_state = walk_state_on_section(walker, laid, start, heights.size)
+    walk_state = walk_state_on_section(walker, over_footholds(ground, heights), start, heights.size)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
-    walk_on(walker, laid, tolerances, walk_state, observer, start, NO_LIMIT)
+    walk_on(walker, tolerances, walk_state, observer, start, NO_LIMIT)
     legs = [ANGLES + walker.legs[foot][0] for foot in (STANCE_FOOT, 1 - STANCE_FOOT)]
     return np.asarray(observer.samples.states[:, legs])
 
@@ -292,7 +290,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
 def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:
     """Return the walk state that belongs to a start on the section, with room for `steps` touchdowns."""
     stance, swing = STANCE_FOOT, 1 - STANCE_FOOT
-    walk_state = new_walk_state(walker, ground.terrain, stance, steps, start)
+    walk_state = new_walk_state(walker, ground, stance, steps, start)
     feet = feet_motion(walker.whole, start)
     walk_state.at_zero[:] = 0
     walk_state.at_zero[PASSING] = 1

@@ -52,7 +52,7 @@ class RuleFollower:
 
         carries  whether our contact law acts; if not, the engine uses its own contact, and we apply only the drives
         """
-        self.walk_state = new_walk_state(scene.ours, scene.ground.terrain, STANCE_FOOT, steps, scene.start)
+        self.walk_state = new_walk_state(scene.ours, scene.ground, STANCE_FOOT, steps, scene.start)
         self._ground = self.walk_state.has_ground if carries else np.zeros(2, np.int8)
         self.time_s = self.grounded_s = 0.0
         self.outcome: Outcome | None = None
@@ -136,7 +136,7 @@ class RuleFollower:
         if (before[0].along < before[1].along) != (now[0].along < now[1].along):
             walk_state.sides[contact_events.PASSING] = 1 if now[1].along > now[0].along else -1
             for foot in range(2):
-                contact_transitions.find_ground(terrain, walk_state, foot, contact_state.is_above(walk_state, foot))
+                contact_transitions.find_ground(walk_state, foot, contact_state.is_above(walk_state, foot))
         h = time_s - self.time_s
         for foot in range(2):
             above = now[foot].height >= 0.0
@@ -147,7 +147,7 @@ class RuleFollower:
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
             feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
-            event = form, terrain, walk_state, feet_at_event, foot
+            event = form, walk_state, feet_at_event, foot
             if above:
                 contact_transitions.lift(*event, y)
             else:
