@@ -220,14 +220,18 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
             numba.config.LOOP_VECTORIZE = vectorize
 
 
-class _Refreshed:
-    """Numba context that ignores `refresh`, because the kernel's compiler has already refreshed it."""
+class _Standin:
+    """Stand-in for an object of numba, with the same attributes except for those that a subclass changes."""
 
-    def __init__(self, context: Any) -> None:
-        self._context = context
+    def __init__(self, original: Any) -> None:
+        self._original = original
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._context, name)
+        return getattr(self._original, name)
+
+
+class _Refreshed(_Standin):
+    """Numba context that ignores `refresh`, because the kernel's compiler has already refreshed it."""
 
     def refresh(self) -> None:
         """Do nothing."""
@@ -242,23 +246,17 @@ class _NumberTyping(_Refreshed):
 
     def resolve_function_type(self, function: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
         if keywords or not all(isinstance(argument, types.Number) for argument in arguments):
-            return self._context.resolve_function_type(function, arguments, keywords)
+            return self._original.resolve_function_type(function, arguments, keywords)
         if (function, arguments) not in self.signatures:
-            resolved = self._context.resolve_function_type(function, arguments, keywords)
+            resolved = self._original.resolve_function_type(function, arguments, keywords)
             if resolved is None:
                 return None
             self.signatures[function, arguments] = resolved
         return self.signatures[function, arguments]
 
 
-class _WithoutEnvironment:
+class _WithoutEnvironment(_Standin):
     """Code generator whose `set_env` does nothing: kernel parts have no machine code that could use an environment."""
-
-    def __init__(self, codegen: Any) -> None:
-        self._codegen = codegen
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._codegen, name)
 
     def set_env(self, name: str, environment: Any) -> None:
         """Do nothing."""

@@ -109,7 +109,7 @@ class ByType:
         functools.update_wrapper(self, declaration)
         self._bodies: dict[type, Callable[..., Any]] = {}
         self._forced_inline: set[type] = set()
-        self._default: Callable[..., Any] | None = None
+        self.default: Callable[..., Any] | None = None
 
     def __call__(self, chooser: Any, *rest: Any) -> Any:
         return self._body_for(type(chooser), str(type(chooser)))(chooser, *rest)
@@ -128,16 +128,12 @@ class ByType:
 
         return register
 
-    def default(self, body: F) -> F:
-        self._default = body
-        return body
-
     def compiled_body(self, kind: Any, *_: Any) -> tuple[Callable[..., Any], dict[str, Any]]:
         chosen = getattr(kind, "instance_class", type(None))
         return self._body_for(chosen, str(kind)), ALWAYS_INLINE_FLAGS if chosen in self._forced_inline else PART_FLAGS
 
     def _body_for(self, chosen: type, label: str) -> Callable[..., Any]:
-        body = self._bodies.get(chosen, self._default)
+        body = self._bodies.get(chosen, self.default)
         if body is None:
             name = chosen.__name__ if hasattr(chosen, "_fields") else label
             # numba passes on errors unchanged unless they are of its own classes
@@ -149,7 +145,6 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
     """Declare a function with one body per type of its first argument (a NamedTuple class)."""
     # The choice is made while compiling, so variants that a scene does not use cost nothing.
     chosen = ByType(declaration)
-
     compile_as(chosen, chosen.compiled_body)
     return chosen
 
@@ -157,7 +152,7 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
 def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
     """Declare a function as `by_type` does; types without a registered body use the body of the declaration."""
     chosen = by_type(declaration)
-    chosen.default(declaration)
+    chosen.default = declaration
     return chosen
 
 

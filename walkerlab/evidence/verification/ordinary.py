@@ -30,7 +30,7 @@ from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.scipy_methods import OutOfBudgetError, counting_rhs
 from walkerlab.physics.solvers.semi_implicit_euler import DIVERGED, semi_implicit_euler
-from walkerlab.physics.solvers.stepping import BUDGET, COUNTS, RHS
+from walkerlab.physics.solvers.stepping import RHS, new_counts
 from walkerlab.physics.solvers.system import Floats
 
 MAX_ORDINARY_EVALUATIONS: Final = 20_000  # right-hand sides
@@ -146,8 +146,7 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
     system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     start = np.array(ready.start)
-    counts = np.zeros(COUNTS, np.int64)
-    counts[BUDGET] = MAX_ORDINARY_EVALUATIONS
+    counts = new_counts(MAX_ORDINARY_EVALUATIONS)
     right_hand_side = counting_rhs(counts, system, start.size)
     began = time.perf_counter()
     y = None

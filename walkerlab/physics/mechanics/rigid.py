@@ -45,17 +45,17 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
     )
     to_hip = places.members.T @ levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
     hanging = -to_hip[STANCE]  # from the hip to the centre of the foot's arc in a straight leg
-    torso, knees = torso_rows(assembly, places), knee_rows(places)
-    n = len(places.names)
-    free = () if knee_locked_at_strike else tuple(shank for shank, _ in places.knees)
-    tree, members = tree_about(assembly, root), places.members
+    n, members = len(places.names), places.members
+    torso = {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
+    knees = {shank: np.eye(n)[thigh] for shank, thigh in places.knees}
+    free = () if knee_locked_at_strike else tuple(knees)
     section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
     in_line = {**torso, **knees}
     reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
     shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
     return new_rigid_model(
         n,
-        **tree.merged(members),
+        **tree_about(assembly, root).merged(members),
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],
         E=reductions,
@@ -96,15 +96,6 @@ def group_bodies(assembly: Assembly) -> BodyPlaces:
 
 def group_index(groups: list[tuple[str, ...]], name: str) -> int:
     return next(place for place, group in enumerate(groups) if name in group)
-
-
-def torso_rows(assembly: Assembly, places: BodyPlaces) -> dict[int, Floats]:
-    members = places.members
-    return {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
-
-
-def knee_rows(places: BodyPlaces) -> dict[int, Floats]:
-    return {shank: np.eye(len(places.names))[thigh] for shank, thigh in places.knees}
 
 
 def find_hip(assembly: Assembly) -> Revolute:

@@ -11,11 +11,11 @@ import numpy as np
 
 from walkerlab.physics.kernels import by_reference, kernel_part, vector
 from walkerlab.physics.solvers import dop853_tableau as tableau
+from walkerlab.physics.solvers import stepping
 from walkerlab.physics.solvers.fused import fused
 from walkerlab.physics.solvers.stepping import (
     ACCEPTED,
     BUDGET,
-    COUNTS,
     H_NEXT,
     OUT_OF_BUDGET,
     REJECTED,
@@ -25,11 +25,7 @@ from walkerlab.physics.solvers.stepping import (
     STEP_TOO_SMALL,
     T_OLD,
     T,
-    advance,
-    begin,
-    interpolate,
-    prepare_dense,
-    rewind,
+    new_counts,
 )
 from walkerlab.physics.solvers.system import Floats, block, derivative
 
@@ -70,10 +66,9 @@ class Dop853(NamedTuple):
 
 
 def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
-    counts = np.zeros(COUNTS, np.int64)
-    counts[BUDGET] = budget
     y_old, y, at = np.zeros((3, n))
-    return Dop853(rtol, atol, np.zeros(3), y_old, y, counts, at, np.zeros((ALL_STAGES, n)), np.zeros((7, n)))
+    stages, dense = np.zeros((ALL_STAGES, n)), np.zeros((7, n))
+    return Dop853(rtol, atol, np.zeros(3), y_old, y, new_counts(budget), at, stages, dense)
 
 
 @kernel_part
@@ -141,7 +136,7 @@ def change_of_step(error: float) -> float:
     return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))
 
 
-@begin.case(Dop853)
+@stepping.begin.case(Dop853)
 def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> None:
     """Evaluate the derivative and, for h = 0, choose the first step as Hairer's hinit does."""
     clock, at, slope, ahead = method.clock, method.at, method.stages[LAST_STAGE], method.stages[0]
@@ -166,7 +161,7 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
     clock[H_NEXT] = min(100.0 * guess, h_curvature)
 
 
-@advance.case(Dop853)
+@stepping.advance.case(Dop853)
 def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     """Advance by one step, with Hairer's step control and a smaller safety factor."""
     clock, counts, y_old, y, K = method.clock, method.counts, method.y_old, method.y, method.stages
@@ -200,14 +195,14 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     return outcome
 
 
-@rewind.case(Dop853)
+@stepping.rewind.case(Dop853)
 def rewind_dop853(method: Dop853, system: Any) -> None:
     for i in range(method.y.size):
         method.y[i], method.stages[LAST_STAGE, i] = method.y_old[i], method.stages[0, i]
     method.clock[T] = method.clock[T_OLD]
 
 
-@prepare_dense.case(Dop853)
+@stepping.prepare_dense.case(Dop853)
 def prepare_dense_dop853(method: Dop853, system: Any) -> None:
     """Evaluate three more stages and the coefficients of the dense output."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
@@ -224,7 +219,7 @@ def prepare_dense_dop853(method: Dop853, system: Any) -> None:
             dense[3 + row, i] = h * total
 
 
-@interpolate.case(Dop853)
+@stepping.interpolate.case(Dop853)
 def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> None:
     """Evaluate Hairer's contd8, with nested products expanded into one weight per row."""
     s, r, d = fraction, 1.0 - fraction, method.dense

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.physics.kernels import by_reference, kernel_part
+from walkerlab.physics.solvers import stepping
 from walkerlab.physics.solvers.fused import fused
 from walkerlab.physics.solvers.shifted_system import factor_shifted, solve_shifted, unknowns
 from walkerlab.physics.solvers.stepping import (
     ACCEPTED,
     BUDGET,
-    COUNTS,
     H_NEXT,
     JACOBIANS,
     OUT_OF_BUDGET,
@@ -25,11 +25,7 @@ from walkerlab.physics.solvers.stepping import (
     STEP_TOO_SMALL,
     T_OLD,
     T,
-    advance,
-    begin,
-    interpolate,
-    prepare_dense,
-    rewind,
+    new_counts,
 )
 from walkerlab.physics.solvers.system import derivative, jacobian
 
@@ -87,11 +83,9 @@ class Radau5(NamedTuple):
 
 
 def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
-    counts = np.zeros(COUNTS, np.int64)
-    counts[BUDGET] = budget
     three, square = (3, n), (n, n)
     return Radau5(
-        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), counts, np.zeros(n), np.zeros((2, n)),
+        rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), new_counts(budget), np.zeros(n), np.zeros((2, n)),
         np.zeros(three), np.zeros(three), np.zeros(three), np.zeros(three),
         np.zeros(square), np.zeros(square), np.zeros(square, np.complex128), np.zeros((2, n), np.int64),
         np.zeros(n), np.zeros(n, np.complex128), np.zeros(7),
@@ -193,7 +187,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
     return 0
 
 
-@begin.case(Radau5)
+@stepping.begin.case(Radau5)
 def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
     """Evaluate derivative and Jacobian at the start, and discard the history of step control."""
     clock, control = method.clock, method.control
@@ -238,7 +232,7 @@ def error_size(method: Radau5, error: Any) -> float:
     return max(1e-10, math.sqrt(total / y.size))
 
 
-@advance.case(Radau5)
+@stepping.advance.case(Radau5)
 def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
     """Advance by one step, with Hairer's predictive step control."""
     clock, control = method.clock, method.control
@@ -320,7 +314,7 @@ def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
         refresh(method, system)
 
 
-@rewind.case(Radau5)
+@stepping.rewind.case(Radau5)
 def rewind_radau5(method: Radau5, system: Any) -> None:
     """Go back to the step's start; the next step's first guess does not use the polynomial."""
     clock, control = method.clock, method.control
@@ -331,12 +325,12 @@ def rewind_radau5(method: Radau5, system: Any) -> None:
     control[SMOOTH], control[H_OLD] = 0.0, 0.0
 
 
-@prepare_dense.case(Radau5)
+@stepping.prepare_dense.case(Radau5)
 def prepare_dense_radau5(method: Radau5, system: Any) -> None:
     """Do nothing: `accept` has stored the polynomial."""
 
 
-@interpolate.case(Radau5)
+@stepping.interpolate.case(Radau5)
 def interpolate_radau5(method: Radau5, system: Any, fraction: float, y: Any) -> None:
     s, dense = fraction, method.dense
     for i in range(y.size):

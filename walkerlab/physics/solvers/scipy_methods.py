@@ -10,10 +10,10 @@ import numba
 import numpy as np
 
 from walkerlab.physics.kernels import kernel
+from walkerlab.physics.solvers import stepping
 from walkerlab.physics.solvers.stepping import (
     ACCEPTED,
     BUDGET,
-    COUNTS,
     H_NEXT,
     JACOBIANS,
     OUT_OF_BUDGET,
@@ -22,12 +22,7 @@ from walkerlab.physics.solvers.stepping import (
     STEP_TOO_SMALL,
     T_OLD,
     T,
-    advance,
-    begin,
-    interpolate,
-    prepare_dense,
-    rewind,
-    sample,
+    new_counts,
 )
 from walkerlab.physics.solvers.system import Integers, derivative, jacobian
 
@@ -66,8 +61,7 @@ class ScipyMethod:
         self.rtol, self.atol = rtol, atol
         self.clock = np.zeros(3)
         self.y_old, self.y = np.zeros(n), np.zeros(n)
-        self.counts = np.zeros(COUNTS, np.int64)
-        self.counts[BUDGET] = budget
+        self.counts = new_counts(budget)
         self.solver: Any = None
         self.dense: Any = None
 
@@ -100,7 +94,7 @@ def counting_jacobian(method: ScipyMethod, system: Any, n: int) -> Callable[[flo
     return jac
 
 
-@begin.case(ScipyMethod)
+@stepping.begin.case(ScipyMethod)
 def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) -> None:
     n = method.y.size
     method.y[:] = y
@@ -115,7 +109,7 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) ->
         method.solver = None
 
 
-@advance.case(ScipyMethod)
+@stepping.advance.case(ScipyMethod)
 def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
     """Take the rest of the solver's last step if it was cut short or rewound, otherwise its next step."""
     clock = method.clock
@@ -149,25 +143,25 @@ def step_solver(method: ScipyMethod) -> int:
     return STEP_DONE
 
 
-@rewind.case(ScipyMethod)
+@stepping.rewind.case(ScipyMethod)
 def rewind_scipy(method: ScipyMethod, system: Any) -> None:
     """Go back to the start of the step, but keep its dense output, which `advance` evaluates at the event."""
     method.clock[T] = method.clock[T_OLD]
     method.y[:] = method.y_old
 
 
-@prepare_dense.case(ScipyMethod)
+@stepping.prepare_dense.case(ScipyMethod)
 def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
     """Do nothing: `step_solver` has stored the dense output."""
 
 
-@interpolate.case(ScipyMethod)
+@stepping.interpolate.case(ScipyMethod)
 def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
     t_old, t = method.clock[T_OLD], method.clock[T]
     y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
 
 
-@sample.case(ScipyMethod)
+@stepping.sample.case(ScipyMethod)
 def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
     t_old, t = method.clock[T_OLD], method.clock[T]
     columns = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]

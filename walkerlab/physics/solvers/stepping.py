@@ -11,13 +11,15 @@ dense        (d, n) coefficients of the dense output of degree d; for a library'
 
 from typing import Any
 
+import numpy as np
+
 from walkerlab.physics.kernels import by_type, by_type_or_default, kernel_part
+from walkerlab.physics.solvers.system import Integers
 
 # indices into `clock`
 T_OLD, T, H_NEXT = 0, 1, 2
 # indices into `counts`
 RHS, ACCEPTED, REJECTED, JACOBIANS, BUDGET = 0, 1, 2, 3, 4
-COUNTS = 5
 # results of `advance`
 STEP_DONE, OUT_OF_BUDGET, STEP_TOO_SMALL = 0, 1, 2
 SMALLEST_STEP = 1e-15
@@ -53,6 +55,10 @@ def sample(method: Any, system: Any, fractions: Any, states: Any) -> None:
     """Write the states at fractions (m,) of the last step, or their first components, into the rows of `states`."""
     for k in range(len(fractions)):
         interpolate(method, system, fractions[k], states[k, : method.y.size])
+
+
+def new_counts(budget: int) -> Integers:
+    return np.array([0, 0, 0, 0, budget])
 
 
 @kernel_part
