@@ -1,8 +1,8 @@
-"""Event functions of a walk on compliant ground, sampled along a step, and their first crossing.
+"""Event functions of a walk on compliant ground, sampled along a solver step, and their first crossing.
 
 For touch, lift, pad edges, passing feet, slide and fall, the walk state stores the sign of the event function. A change
 of that sign is the event, so simultaneous events cannot hide one another. Switching points of the force law are events
-because its derivatives jump at them: steps that end at these points preserve the method's order.
+because its derivatives jump at them: solver steps that end at these points preserve the method's order.
 """
 
 from typing import Any
@@ -47,7 +47,7 @@ from walkerlab.physics.solvers.events import NO_CROSSING, CrossingFinder, first_
 
 NO_SIDE = 0  # in `WalkState.sides`, for an event function that may cross zero in either direction
 ZERO_ROUNDING = 1e-14  # m, rad or their rates; smaller values of event functions count as zero
-CLEARLY_MOVED = 1e-12  # m, rad or their rates; larger changes over a step are not rounding
+CLEARLY_MOVED = 1e-12  # m, rad or their rates; larger changes over a solver step are not rounding
 
 
 @kernel_part
@@ -97,14 +97,14 @@ def sample_foot(
 def earliest_crossing(
     system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
-    """Return the fraction of the step at which the first event occurs (or NO_CROSSING), and the event's number."""
+    """Return the fraction of the solver step at which the first event occurs (or NO_CROSSING), and its number."""
     ground, progress = walk_state.ground, walk_state.progress
     first = NO_CROSSING, NO_EVENT
     for foot in range(2):
         if foot == system.form.hinged:
             continue
         row = foot * PER_FOOT
-        # a foot in the air has no force to switch; switching after a touch belongs to the next step
+        # a foot in the air has no force to switch; switching after a touch belongs to the next solver step
         inside = walk_state.has_ground[foot] != 0 and walk_state.sides[row + HEIGHT] < 0
         end = row + RELEASE
         if inside and ground.frame.locate_switching and not progress.passes_switching:
@@ -128,15 +128,15 @@ def earliest_crossing(
 
 @kernel_part
 def earlier(first: tuple[float, int], walk_state: WalkState, finder: CrossingFinder, event: int) -> tuple[float, int]:
-    """Return the fraction of the step and the number of the earlier event: `first`, or `event` if it is earlier."""
+    """Return the fraction of the solver step and number of an event: `event` if it is earlier, otherwise `first`."""
     fraction = leaves_side(finder, event, walk_state.sides[event], walk_state.at_zero[event] != 0)
     return (fraction, event) if fraction < first[0] else first
 
 
 @kernel_part
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
-    """Find the fraction of the step at which an event function leaves its side of zero, or NO_CROSSING."""
-    # The result is 0 if the function starts on the other side: another event ended the previous step beyond this zero
+    """Find the fraction of the solver step at which an event function leaves its side of zero, or NO_CROSSING."""
+    # The result is 0 if the function starts on the other side: another event ended the step before beyond this zero
     # or on it. If the function starts at zero, the direction of its change decides, unless that change is rounding: a
     # foot just released from its hinge may still sink in. If the function is at zero because of its own event, its side
     # has already changed, and the result is 0 only if the function is on the other side at all nodes.

@@ -32,7 +32,7 @@ class Frame(NamedTuple):
 
     leg_length: float  # m
     pendulum_time: float  # s, sqrt(L/g)
-    locate_switching: bool  # whether steps end at the switching points of the force law
+    locate_switching: bool  # whether solver steps end at the switching points of the force law
 
 
 @by_reference

@@ -36,37 +36,32 @@ def change_form(
     # Locks and latches are plastic impacts, a latch also loses the elastic energy of its stop, and a release changes no
     # velocity. The tangent jumps at all of these, and at a step's touch if the hip's torque then acts on the other leg.
     # A push-off starts at that touch, so with a push-off the tangent compares walks at equal times since the touch.
-    y, t = method.y, float(method.clock[T])
-    whole = walker.forms[int(before.form.places == 0), 0]
+    y, t, whole = method.y, float(method.clock[T]), walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
-    x = to_full(before.form, y, size)
-    if event < EXTENSION and event % PER_FOOT == HEIGHT:  # a step's touch, before which the other leg stood
-        before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
-    locks = EXTENSION <= event < PULSE_END
-    new = x
-    if locks:
-        new, lost, _ = lock_knee(whole, after.form, x)
-        observer.account[KNEE_STRIKES] += lost
-        if event >= EXTENSION_RATE:
-            stopping = before.knee.copy()
-            stopping[(event - EXTENSION) % 2] = STOPPING
-            before = before._replace(knee=stopping)
-            observer.account[KNEE_STOP] += hinge_energies(before, y)[1]
-    z = to_form(after.form, new)
     Phi = observer.tangent.Phi
-    if Phi.shape[1] > 0:
-        rate, rate_after = state_rate(before, y, size, t), state_rate(after, z, size, t)
-        columns = to_full(before.form, Phi[: y.size], size)
-        waits = np.zeros(Phi.shape[1])
+    x, columns = to_full(before.form, y, size), to_full(before.form, Phi[: y.size], size)
+    waits, ends_step = np.zeros(Phi.shape[1]), event < EXTENSION and event % PER_FOOT == HEIGHT
+    if ends_step:  # before the touch the other leg stood
+        before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
+    if EXTENSION_RATE <= event < PULSE_END:
+        stopping = before.knee.copy()
+        stopping[(event - EXTENSION) % 2] = STOPPING
+        before = before._replace(knee=stopping)
+        observer.account[KNEE_STOP] += hinge_energies(before, y)[1]
+    if waits.size > 0:
+        rate = state_rate(before, y, size, t)
         if event != PULSE_END:
             gradient = event_gradient(whole, event, x)
             waits = -(gradient @ columns) / (gradient @ rate)
-        if event < EXTENSION and before.form.push_off != 0.0 and event % PER_FOOT == HEIGHT:
-            rate_after = np.zeros(size)
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate, wait)
-        if locks:
-            columns = lock_knee(whole, after.form, x, columns).columns
+    if EXTENSION <= event < PULSE_END:
+        x, lost, columns = lock_knee(whole, after.form, x, columns)
+        observer.account[KNEE_STRIKES] += lost
+    z = to_form(after.form, x)
+    if waits.size > 0:
+        starts_push = ends_step and before.form.push_off != 0.0
+        rate_after = np.zeros(size) if starts_push else state_rate(after, z, size, t)
         for column, wait in zip(columns.T, waits, strict=True):
             shift_column(column, 0, rate_after, -wait)
         Phi[: z.size] = to_form(after.form, columns)

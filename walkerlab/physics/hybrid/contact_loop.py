@@ -5,20 +5,12 @@ from typing import Any, NamedTuple
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import is_uneven
 from walkerlab.physics.ground.walker import OnGround, locked_knees
+from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.contact_crossings import earliest_crossing, sample_event_functions
 from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END, is_switching
 from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
 from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, is_above, is_to_lift
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
-from walkerlab.physics.hybrid.endings import (
-    BUDGET_EXHAUSTED,
-    CHANGES_FORM,
-    GOES_ON,
-    LIFTED_OFF,
-    NO_HEEL_STRIKE,
-    SOLVER_FAILED,
-    WALKED,
-)
 from walkerlab.physics.kernels import callable_kernel, kernel, kernel_part
 from walkerlab.physics.mechanics.hinges import HIP_ROW, is_sprung
 from walkerlab.physics.solvers.events import CrossingFinder
@@ -41,7 +33,7 @@ LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-# maximum per solver step; then the step's end counts as the event, because rounding moves the event each time
+# maximum per solver step; then that step's end counts as the event, because rounding moves the event each time
 REWINDS = 24
 # maximum number of rewinds for a doubtful event; then it is dropped unless it occurs at the solver step's end
 DOUBTS = 12
@@ -92,7 +84,7 @@ def walk_in_form(
     while steps_are_left(walk_state, until):
         status = advance(method, system, search.target)
         if status != STEP_DONE:
-            return (BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED), search.event
+            return (endings.BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else endings.SOLVER_FAILED), search.event
         prepare_dense(method, system)
         sample(method, system, finder.nodes, finder.states)
         fraction, event = scan(system, walk_state, watch_order, finder)
@@ -104,17 +96,17 @@ def walk_in_form(
         observe(observer, method, system, finder, walk_state)
         note_flexion(system.form, walk_state, method.y)
         outcome = judge(system, walk_state, method.clock[T])
-        if outcome == GOES_ON:
+        if outcome == endings.GOES_ON:
             forget_zeros(walk_state, method.clock[T] - method.clock[T_OLD])
             if search.happens:
                 outcome = react(system, observer, walk_state, method, search.event, until)
-        if outcome != GOES_ON:
+        if outcome != endings.GOES_ON:
             return outcome, search.event
         if walk_state.progress.release == AT_PULSE_END and pulse_left(system, method.clock[T]) <= EVENT_TIME:
             release(walk_state, 1 - walk_state.progress.stance)
-            return CHANGES_FORM, PULSE_END
+            return endings.CHANGES_FORM, PULSE_END
         search = seek(deadline(system, walk_state, method.clock[T]), search.event)
-    return WALKED, search.event
+    return endings.WALKED, search.event
 
 
 @kernel_part
@@ -153,10 +145,10 @@ def approach(
     if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
         return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
     if early and is_switching(event):
-        # the event function is too far from a polynomial on this solver step: try half the step
+        # the event function is too far from a polynomial on this solver step: try half of it
         if search.rewinds < REWINDS:
             return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
-        # a short solver step does not help either: ignore this event, but no other event of the step
+        # a short solver step does not help either: ignore this event, but no other event in it
         walk_state.progress.passes_switching = True
         return EventSearch(end, event, latest, False, 0, 0, False, False)
     return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
@@ -164,7 +156,7 @@ def approach(
 
 @kernel_part
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
-    """Accept the event that a solver step just missed, extend the step by `wait` (s), or drop the event."""
+    """Accept the event that a solver step just missed, extend that step by `wait` (s), or drop the event."""
     happens = abs(wait) <= EVENT_TIME
     doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
     target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
@@ -188,19 +180,19 @@ def react(
     """Apply the event at the end of the last solver step; returns the outcome, GOES_ON or CHANGES_FORM."""
     steps, locked = walk_state.progress.steps, locked_knees(walk_state.knee)
     outcome = apply_event(system, observer, walk_state, event, method.clock[T], method.y)
-    if outcome != GOES_ON:
+    if outcome != endings.GOES_ON:
         return outcome
     stepped = walk_state.progress.steps > steps
     if stepped:
         note_work(observer, system, method.y)
     if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
-        return WALKED
+        return endings.WALKED
     # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
-        return CHANGES_FORM
+        return endings.CHANGES_FORM
     if not is_switching(event):
         begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
-    return GOES_ON
+    return endings.GOES_ON
 
 
 @kernel_part
@@ -253,5 +245,5 @@ def judge(system: OnGround, walk_state: WalkState, t: float) -> int:
         walk_state.progress.airborne_since = t
     by_step, by_flight = time_limits(walk_state)
     if t >= by_step:
-        return NO_HEEL_STRIKE
-    return LIFTED_OFF if t >= by_flight else GOES_ON
+        return endings.NO_HEEL_STRIKE
+    return endings.LIFTED_OFF if t >= by_flight else endings.GOES_ON

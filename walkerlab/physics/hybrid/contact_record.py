@@ -31,7 +31,7 @@ from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_cross
 from walkerlab.physics.solvers.radau5 import Radau5
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
 
-# nodes of a Radau quadrature on a step, preceded by the start of the step, and their weights
+# nodes of a Radau quadrature on a solver step, preceded by the step's start, and their weights
 Quadrature = tuple[tuple[float, ...], tuple[float, ...]]
 OF_ORDER_5: Quadrature = (
     (0.0, 0.15505102572168219, 0.6449489742783178, 1.0),
@@ -95,7 +95,7 @@ class ContactObserver(NamedTuple):
 def observe(
     observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
 ) -> None:
-    """Record the last integration step; it must be valid, and its event functions must be sampled."""
+    """Record the last solver step; it must be valid, and its event functions must be sampled."""
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
         balance(observer, method, system)
@@ -130,7 +130,7 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
 
 @kernel_part
 def balance(observer: ContactObserver, method: Any, system: OnGround) -> None:
-    """Record work and losses of the last integration step, and the energy residual at its end."""
+    """Record work and losses of the last solver step, and the energy residual at its end."""
     account = observer.account
     add_work_until(method, system, 1.0, account)
     lost = -account[PUSH_OFF] - account[HIP_WORK]
@@ -159,7 +159,7 @@ def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
 
 @kernel_part
 def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, foot: int) -> None:
-    """Record the largest penetration of a foot in the last step: at its end, or where the foot stopped sinking in."""
+    """Record a foot's largest penetration in the last solver step: at its end, or where the foot stopped sinking in."""
     end, first = finder.nodes.size - 1, foot * PER_FOOT
     deepest = -finder.values[first + HEIGHT, end]
     if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
@@ -194,27 +194,21 @@ def collocation_rule(method: Radau5) -> Quadrature:
 
 @kernel_part
 def add_work_until(method: Any, system: OnGround, fraction: float, account: Any) -> None:
-    """Add the work and losses (J) in the first `fraction` of the last integration step to an account (entries,)."""
-    nodes, weights = quadrature(method)
+    """Add the work and losses (J) in the first `fraction` of the last solver step to an account (entries,)."""
+    rule = quadrature(method)
+    nodes, _ = rule
     fractions, states = vector(nodes), matrix(OF_STATES)
     for i in range(len(nodes)):
         fractions[i] = fraction * nodes[i]
     sample(method, system, fractions, states)
     span = fraction * (method.clock[T] - method.clock[T_OLD])
-    add_work(system, states, nodes, weights, method.clock[T_OLD], span, account)
+    add_work(system, states, rule, method.clock[T_OLD], span, account)
 
 
 @callable_kernel
-def add_work(
-    system: OnGround,
-    states: Any,
-    nodes: tuple[float, ...],
-    weights: tuple[float, ...],
-    begin: float,
-    span: float,
-    account: Any,
-) -> None:
+def add_work(system: OnGround, states: Any, rule: Quadrature, begin: float, span: float, account: Any) -> None:
     """Add the work and losses (J) from time `begin` (s) over `span` (s) to an account, from the states at the nodes."""
+    nodes, weights = rule
     for foot in range(2):
         if system.has_ground[foot] != 0:
             damping, friction = foot_work(system, states, weights, foot, span)
@@ -232,7 +226,8 @@ def add_work(
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
     """Compute the energies (J) lost to damping and friction under a foot with ground."""
     # If the force law has released the foot, the damping loss is the energy that the ground's spring loses: quadrature
-    # would be inaccurate for powers of the penetration. Steps end at a release, so the foot stays released in a step.
+    # would be inaccurate for powers of the penetration. Solver steps end at a release, so the foot
+    # stays released within one.
     damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])

@@ -1,8 +1,8 @@
-"""Tangent of a walk on compliant ground: the variational equations along the steps taken.
+"""Tangent of a walk on compliant ground: the variational equations along the solver's steps.
 
-On each step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. This equation is solved by three-stage Radau
-collocation on the same step, with J at the stages: for radau5 this is the exact derivative of the step itself. The
-force law is continuous at its switching points and at touch and lift, so Phi jumps only at the events of
+On each solver step the derivative Phi of the state obeys dPhi/dt = J(t) Phi. This equation is solved by three-stage
+Radau collocation on the same step, with J at the stages: for radau5 this is the exact derivative of the step itself.
+The force law is continuous at its switching points and at touch and lift, so Phi jumps only at the events of
 `contact_jumps`. A foot that leaves its pad under load would also need a jump, but that happens in no gait.
 """
 
@@ -62,7 +62,7 @@ def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
 
 @kernel_part
 def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
-    """Advance Phi over the last step of `method`."""
+    """Advance Phi over the last solver step."""
     n, h = method.y.size, method.clock[T] - method.clock[T_OLD]
     for i in range(2):
         jacobian_at(method, system, RADAU_NODES[i], tangent.stages[i])
@@ -82,8 +82,8 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 
 @kernel_part
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
-    """Compute the Jacobian at the step's end, extrapolated from two states shortly before the end."""
-    # A step that ends at a switching point of the force law may end on either side of it, and the Jacobian jumps there.
+    """Compute the Jacobian at the solver step's end, extrapolated from two states shortly before the end."""
+    # A solver step up to a switching point of the force law may end on either side of it, where the Jacobian jumps.
     near = min(0.25, THIS_SIDE / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
         jacobian_at(method, system, 1.0 - (1 + i) * near, tangent.stages[2 + i])

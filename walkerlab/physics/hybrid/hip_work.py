@@ -1,7 +1,7 @@
 """Work of the constant torque at the hip, for both models.
 
 Between two reversals of the angle between the legs, the work is the torque times the change of that angle, so no power
-is integrated: only the reversals within a step are located, like events.
+is integrated: only the reversals within a solver step are located, like events.
 """
 
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from walkerlab.physics.mechanics.hinges import legs_apart
 from walkerlab.physics.solvers.events import CrossingFinder, first_crossing
 from walkerlab.physics.solvers.stepping import interpolate
 
-BEYOND = 1e-12  # distance between a reversal and the start of the search for the next one, as a fraction of a step
+BEYOND = 1e-12  # fraction of a solver step between a reversal and the start of the search for the next one
 
 
 class TorqueWork(NamedTuple):
@@ -23,7 +23,7 @@ class TorqueWork(NamedTuple):
 
 @kernel_part
 def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder, row: int, until: float) -> TorqueWork:
-    """Compute the work of `torque` (N m) in the last step up to fraction `until`; overwrites `row` of the finder."""
+    """Compute the work of `torque` (N m) in the last solver step up to `until`; overwrites the finder's `row`."""
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)
@@ -39,6 +39,6 @@ def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder,
 
 @callable_kernel
 def sample_rates(system: Any, finder: CrossingFinder, row: int) -> None:
-    """Write the legs' relative angular velocity (rad/s) at the nodes of a step into `row` of the finder."""
+    """Write the legs' relative angular velocity (rad/s) at the nodes of a solver step into `row` of the finder."""
     for node in range(finder.nodes.size):
         _, finder.values[row, node] = legs_apart(system, finder.states[node])

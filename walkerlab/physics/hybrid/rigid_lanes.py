@@ -10,15 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.hybrid.endings import (
-    BUDGET_EXHAUSTED,
-    FALLEN_HIP,
-    FELL,
-    GOES_ON,
-    NO_HEEL_STRIKE,
-    REJECTED,
-    SOLVER_FAILED,
-)
+from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING, hip_above_fall, hull
 from walkerlab.physics.kernels import by_type, kernel, kernel_part, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_law, hinge_torque
@@ -83,7 +75,7 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
     if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y
-    lowest = (FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
+    lowest = (endings.FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)
 
     values: dict[str, Any] = {name: tuple(model[name].ravel().tolist()) for name in ("A", "B", "arm_x", "arm_y")}
     for name in ("unpaired", "mass", "radius", "gravity_along", "gravity_down", "slope", "lean"):
@@ -172,7 +164,7 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
                     continue
                 if memory.rows[HAS_EVENT, lane] > 0.0:
                     outcome = handle_step(walker, memory, observer, lane)
-                    if outcome != GOES_ON:
+                    if outcome != endings.GOES_ON:
                         fates.outcome[slots[SLOT_OF_START, lane]] = outcome
                         fates.steps[slots[SLOT_OF_START, lane]] = slots[STEPS_TAKEN, lane]
                         waiting = refill(walker, memory, starts, fates, lane, waiting)
@@ -189,7 +181,7 @@ def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane:
             memory.slots[SLOT_OF_START, lane], memory.slots[STEPS_TAKEN, lane] = waiting - 1, 0
             begin_swing(walker, memory, lane, 0.0, y, FIRST_LANE_STEP * walker.pendulum_time)
             return waiting
-        fates.outcome[waiting - 1], fates.steps[waiting - 1] = REJECTED, 0
+        fates.outcome[waiting - 1], fates.steps[waiting - 1] = endings.REJECTED, 0
     memory.slots[SLOT_OF_START, lane] = NOBODY
     begin_swing(walker, memory, lane, 0.0, (0.0, 0.0, 0.0, 0.0), 0.0)
     return waiting
@@ -263,22 +255,22 @@ def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -
     """Handle the step of a lane that needs attention; returns GOES_ON, or the outcome's number if its walk is over."""
     rows = memory.rows
     if rows[TRIES, lane] >= MAX_TRIES:
-        return BUDGET_EXHAUSTED
+        return endings.BUDGET_EXHAUSTED
     if abs(rows[TRIED_STEP, lane]) < MIN_LANE_STEP * walker.pendulum_time:
-        return SOLVER_FAILED
+        return endings.SOLVER_FAILED
     if rows[ARRIVALS, lane] > 0.0:
         return arrive(walker, memory, observer, lane)
     strike, fall = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
     if fall < strike:
-        return FELL
+        return endings.FELL
     if strike <= 1.0:
         rows[ARRIVALS, lane], rows[STEP_BEFORE, lane] = 1.0, rows[NEXT_STEP, lane]
         rows[NEXT_STEP, lane] = max(strike * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP * walker.pendulum_time)
-        return GOES_ON
+        return endings.GOES_ON
     if rows[TIME_LEFT, lane] <= rows[TRIED_STEP, lane]:
-        return NO_HEEL_STRIKE
+        return endings.NO_HEEL_STRIKE
     move_on(memory, lane)
-    return GOES_ON
+    return endings.GOES_ON
 
 
 @kernel_part
@@ -304,14 +296,14 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
         rows[ARRIVALS, lane] += 1.0
         step_before = abs(rows[STEP_BEFORE, lane])
         rows[NEXT_STEP, lane] = max(-step_before, min(step_before, wait))
-        return GOES_ON
+        return endings.GOES_ON
     y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
     bridge(rows, lane, wait, y)
     strike(walker.model, AT_STRIKE, y, new)
     step, t = slots[STEPS_TAKEN, lane], rows[LANE_TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
     outcome = record_strike(observer, slots[SLOT_OF_START, lane], step, t, new)
-    if outcome == GOES_ON:
+    if outcome == endings.GOES_ON:
         begin_swing(walker, memory, lane, t, (new[0], new[1], new[2], new[3]), rows[STEP_BEFORE, lane])
     return outcome
 

@@ -56,7 +56,7 @@ class Observer(NamedTuple):
     times: Any  # (samples,) s, rising
     states: Any  # (samples, 2 n), then any tangent columns, which compare walks at equal times since the heel strike
     steps: Any  # (samples,) number of the step of each sample
-    tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a step
+    tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
 
 
 def new_observer(times: Any, state_size: int) -> Observer:
@@ -149,7 +149,7 @@ def vertex(before: float, middle: float, after: float) -> float:
 def ascend_to_worst(
     tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
-    """Record a measure's maximum near fraction `middle` of the step, up to `last`, using ever narrower parabolas."""
+    """Record a measure's maximum near `middle` of the solver step, up to `last`, using ever narrower parabolas."""
     for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
         centre = assumptions_at(method, mode, middle)
@@ -167,7 +167,7 @@ def ascend_to_worst(
 def observe(
     observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
 ) -> None:
-    """Record the last step up to `fraction`: its samples, extremes and energy; `row` of the finder is overwritten."""
+    """Record the last solver step up to `fraction`: its samples, extremes and energy; overwrites the finder's `row`."""
     tally = observer.tally[()]
     torque = hinge_law(mode.model, HIP_ROW).torque
     if torque != 0.0:

@@ -8,16 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.hybrid.endings import (
-    BENT_KNEE,
-    BUDGET_EXHAUSTED,
-    FALLEN_HIP,
-    FELL,
-    KNEE_STRUCK,
-    NO_HEEL_STRIKE,
-    SOLVER_FAILED,
-    WALKED,
-)
+from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.rigid_record import Observer, observe, observe_start, observe_strike
 from walkerlab.physics.kernels import callable_kernel, kernel, kernel_part, vector
 from walkerlab.physics.mechanics.impact import strike
@@ -61,8 +52,8 @@ from walkerlab.physics.solvers.system import derivative
 LONGEST_SWING = 10.0  # pendulum times sqrt(L/g) within which a heel strike must come
 HULL_ROOM = 0.125
 SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground a foot must land at least this far ahead
-# fraction of a swing's first step at which the search for a knee strike starts; before 1e-9, rounding makes a straight
-# knee at rest cross zero
+# fraction of a swing's first solver step at which the search for a knee strike starts; before 1e-9, rounding makes a
+# straight knee at rest cross zero
 SEARCH_START = 1e-6
 # event functions, rows of the finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
@@ -85,12 +76,12 @@ def knee_angle(model: RigidModel, y: Any, first: int) -> float:
 @kernel_part
 def hip_above_fall(model: RigidModel, y: Any) -> float:
     """Compute the height (m) of the hip above the limit below which the walker has fallen."""
-    return hip_height(model, y) - FALLEN_HIP * model.leg_length
+    return hip_height(model, y) - endings.FALLEN_HIP * model.leg_length
 
 
 @kernel_part
 def may_end(system: Mode, method: Any, at_start: bool) -> bool:
-    """Whether the last step may contain an event, judged by values and rates at its ends; usually false in a swing."""
+    """Whether the last solver step may contain an event, judged by values and rates at its ends; usually false."""
     model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
     if hip_above_fall(model, y) < 0.0:
         return True
@@ -121,7 +112,7 @@ def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float,
 
 @kernel_part
 def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_start: bool = False) -> Any:
-    """Return bounds on an event function within a step, from its values and rates (per step) at both ends.
+    """Return bounds on an event function within a solver step, from its values and rates (per step) at both ends.
 
     These are the bounds of the Bernstein coefficients of Hermite's cubic, widened by an eighth of their spread, far
     more than the cubic's error. With `zero_at_start`, the first coefficient is left out, which divides out this zero.
@@ -144,7 +135,7 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
 
 @callable_kernel
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """Find the fractions of a step at which heel strike (foot ahead), fall and knee strike occur, or NO_CROSSING."""
+    """Find the fractions of a solver step at which heel strike, fall and knee strike occur, or NO_CROSSING."""
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
@@ -172,14 +163,14 @@ def take_step(
     while True:
         system = Mode(model, phase, behind, rise)
         status = swing_phase(method, system, finder, observer, t, y, latest, step)
-        if status != WALKED and status != KNEE_STRUCK:
+        if status != endings.WALKED and status != endings.KNEE_STRUCK:
             return status, method.clock[T]
-        if status == WALKED and strikes.nearest > 0.0 and swing_foot(model, method.y)[1] < strikes.nearest:
-            return FELL, method.clock[T]
+        if status == endings.WALKED and strikes.nearest > 0.0 and swing_foot(model, method.y)[1] < strikes.nearest:
+            return endings.FELL, method.clock[T]
         t = pass_event(method, system, y, strikes, step)
-        observe_strike(observer, system, status == WALKED, method.y, y)
-        if status == WALKED:
-            return WALKED, t
+        observe_strike(observer, system, status == endings.WALKED, method.y, y)
+        if status == endings.WALKED:
+            return endings.WALKED, t
         strikes.knee_time[step] = t
         phase = STRAIGHT
 
@@ -197,7 +188,7 @@ def swing_phase(
     while method.clock[T] < limit:
         status = advance(method, system, limit)
         if status != STEP_DONE:
-            return BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else SOLVER_FAILED
+            return endings.BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else endings.SOLVER_FAILED
         if coming:
             continue
         near = may_end(system, method, at_start)
@@ -210,17 +201,17 @@ def swing_phase(
         if observer.watching:
             observe(observer, method, system, finder, LEG_RATE, min(1.0, strike, fall, knee_strike), step)
         if fall < min(strike, knee_strike):
-            return FELL
+            return endings.FELL
         if is_bent(system) and strike < knee_strike:
-            return BENT_KNEE
+            return endings.BENT_KNEE
         if min(strike, knee_strike) <= 1.0:
             coming = True
             limit = method.clock[T_OLD] + min(strike, knee_strike) * (method.clock[T] - method.clock[T_OLD])
             rewind(method, system)
         at_start = False
     if not coming:
-        return NO_HEEL_STRIKE
-    return KNEE_STRUCK if is_bent(system) else WALKED
+        return endings.NO_HEEL_STRIKE
+    return endings.KNEE_STRUCK if is_bent(system) else endings.WALKED
 
 
 @kernel_part
@@ -310,10 +301,10 @@ def walk(
     t = 0.0
     for step in range(strikes.time.size):
         status, t = take_step(model, method, finder, observer, t, y, step, strikes)
-        if status != WALKED:
+        if status != endings.WALKED:
             return status, step
         strikes.time[step] = t
         for i in range(y.size):
             strikes.before[step, i] = method.y[i]
             strikes.after[step, i] = y[i]
-    return WALKED, strikes.time.size
+    return endings.WALKED, strikes.time.size
