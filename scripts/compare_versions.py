@@ -5,7 +5,7 @@
 
 The other version is a checkout beside this one (--other), or what another Python has installed (--python). Some ninety
 cases are asked of both, each command as a process of its own, each version with its own compiled code: every built-in
-config and type of walker, terrain, law of friction, hinged and free stance, many methods, every outcome, families,
+config and type of walker, terrain, law of friction, pinned and free stance, many methods, every outcome, families,
 basins, adjustments, sweeps, and configs that are refused. Compared are exit codes, what `--json` prints, and every
 stored result: names, shapes, units, and values within the tolerances of scripts/differences.py. Left out are times,
 digests, versions and paths. It exits 1 if anything differs. With --reference-results the other version's answers are

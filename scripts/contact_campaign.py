@@ -9,7 +9,7 @@
     python scripts/contact_campaign.py --walker passing  # slow starts on uneven planes: feet pass again, in the ground
     python scripts/contact_campaign.py --walker explicit  # feet that bounce, walked by dop853
 
-Each walk is drawn from a seed of its own: checkerboard, after-mid-swing or plane; a free or a hinged (`pinned`) first
+Each walk is drawn from a seed of its own: checkerboard, after-mid-swing or plane; a free or a pinned first
 stance; ground into which the weight sinks by 1 um to 1 mm, with exponents from 1 to 3 and 0.05 to 3 times critical
 damping, for knees also seven times; friction from 0.05 to 3, none at times, with stiction velocities from 10 to 500
 mm/s; feet from points to balls of 0.3 m; slopes from 0.3 to 4 degrees for straight legs, 2.3 to 4 for knees, whose
@@ -305,13 +305,13 @@ def at_touch(walker: Any) -> bool:
     return isinstance(walker, Kneed) and walker.knee.release == "touch"
 
 
-def plainly(scene: plain_walk.Plain, start: Any, hinged: bool, steps: int, step_s: float) -> plain_walk.Walked:
+def plainly(scene: plain_walk.Plain, start: Any, pinned: bool, steps: int, step_s: float) -> plain_walk.Walked:
     """The plain walk."""
     # the rigid model's stance leg is one body, whose angle and rate come second
     angles, rates = np.array(start).reshape(2, -1)
     straight = [0, 1] if angles.size == 2 else [0, 1, 2, 1]
-    y = plain_walk.start(scene, angles[straight], rates[straight], hinged)
-    return plain_walk.walk(scene, y, steps, step_s, 1 if hinged else -1)
+    y = plain_walk.start(scene, angles[straight], rates[straight], pinned)
+    return plain_walk.walk(scene, y, steps, step_s, 1 if pinned else -1)
 
 
 def of_plain(plain: plain_walk.Plain, walk: plain_walk.Walked) -> Quantities:
@@ -372,8 +372,8 @@ def compare(drawn: Drawn, steps: int) -> Compared:
 def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
     """Walk a drawn walk both ways, plainly with steps of step_s at most and of half of it."""
     (config, scene), start = scene_of(drawn), drawn.start
-    plain, hinged = plain_scene(config, scene.pitch_m, drawn.heights_m), scene.pinned
-    coarse, fine = (plainly(plain, start, hinged, steps, h) for h in (step_s, 0.5 * step_s))
+    plain, pinned = plain_scene(config, scene.pitch_m, drawn.heights_m), scene.pinned
+    coarse, fine = (plainly(plain, start, pinned, steps, h) for h in (step_s, 0.5 * step_s))
     expected = of_plain(plain, fine)
     plain_error = apart(of_plain(plain, coarse), expected)
     floor = rounding(plain, fine.rounds)

@@ -131,9 +131,9 @@ def reductions() -> list[Reduction]:
             imports=(import_stage.format("stages.contact_sim"), walking),
         ),
         Reduction(
-            "floating base and stance contact: first step hinged",
+            "floating base and stance contact: first step pinned",
             "free first step",
-            ("contact", "contact, hinged"),
+            ("contact", "contact, pinned"),
             (contact(strides=1), contact("contact.stance=pinned", strides=1)),
             compile=True,
             note="one compiled walk serves both kinds of step",

@@ -64,7 +64,7 @@ def systems() -> dict[str, tuple[Any, State]]:
         "contact, friction of zero": (on_ground(walker._replace(friction=Coulomb(0.0, 0.0, 0.1, 1.0)), both), FREE),
         "contact, frictionless": (on_ground(walker._replace(friction=Frictionless()), both), FREE),
         "contact, inertia": (on_ground(walker_of(rigid, "walker.leg_inertia_kg_m2=0.1"), both), FREE),
-        "contact, hinged": (on_ground(walker, (False, False), hinged=True), ANGLES),
+        "contact, pinned": (on_ground(walker, (False, False), pinned=True), ANGLES),
     }
 
 

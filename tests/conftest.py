@@ -21,7 +21,7 @@ settings.load_profile("walkerlab")
 LONGEST_FIRST = (  # one of the first three compiles the package's kernels, one the tests' own, one draws
     "test_campaigns", "test_plain_walks", "test_figure_style", "test_tune", "test_same_bits", "test_kneed_contact_walk",
     "test_whole_report", "test_docs", "test_scene_catalogue", "test_rigid_walk", "test_catalogue", "test_continuation",
-    "test_api", "test_sweep_engines", "test_hinged_walks", "test_lean_scenes", "test_exports", "test_engine_adapters",
+    "test_api", "test_sweep_engines", "test_pinned_walks", "test_lean_scenes", "test_exports", "test_engine_adapters",
     "test_page", "test_server", "test_every_key", "test_figures", "test_robustness_stage", "test_robustness",
     "test_fresh_code", "test_sources",
 )  # fmt: skip

@@ -47,14 +47,14 @@ def test_the_walk_starts_with_the_stance_foot_just_touching_and_rolling(radius, 
     )
 
 
-def test_a_point_foot_starts_as_the_hinged_one():
+def test_a_point_foot_starts_as_the_pinned_one():
     """Without a radius rolling and turning about the hinge are one."""
     rigid = (-0.2042, 0.1694, -0.6, -0.86)
-    free, hinged = (
+    free, pinned = (
         start_state(scene_of("walker.foot_radius_m=0", f"contact.stance={stance}"), rigid)
         for stance in ("free", "pinned")
     )
-    assert free == hinged
+    assert free == pinned
 
 
 def test_the_paper_reads_its_contact_in_adams_units():
@@ -94,12 +94,12 @@ def test_pads_are_laid_by_the_step_that_the_config_asks_for():
     assert scene_of("contact.terrain=after-mid-swing").ground.terrain == after_mid_swing(STEP)
 
 
-def test_a_hinged_first_step_is_a_system_of_two_angles():
+def test_a_pinned_first_step_is_a_system_of_two_angles():
     assert not scene_of().pinned
     scene = scene_of("contact.stance=pinned")
-    hinged = scene.walker.forms[1, 0]
+    pinned = scene.walker.forms[1, 0]
     assert scene.pinned
-    assert (hinged.places, hinged.bodies) == (0, 2)
+    assert (pinned.places, pinned.bodies) == (0, 2)
 
 
 @pytest.mark.parametrize("terrain", ["checkerboard", "after-mid-swing", "plane"])

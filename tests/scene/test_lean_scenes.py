@@ -187,8 +187,8 @@ def test_what_a_scene_is_said_to_save_is_what_it_saves():
         f"{MATERIAL - FRICTION_SWITCHES} of a foot's {MATERIAL} event functions"
     )
     scene = contact_scene(load(None, ("contact.stance=pinned",)).config, 0.3714)
-    free, hinged = scene.walker.size, 2 * int(scene.walker.forms[1, 0].bodies)
-    assert saved["floating base and stance contact in the first step"].startswith(f"{free - hinged} of {free} ")
+    free, pinned = scene.walker.size, 2 * int(scene.walker.forms[1, 0].bodies)
+    assert saved["floating base and stance contact in the first step"].startswith(f"{free - pinned} of {free} ")
     config = load(None, ("outputs=[]",)).config
     rigid, angles = (
         omissions.rigid_walk_omissions(config),
@@ -212,7 +212,7 @@ def test_what_would_be_left_out_is_what_is_said_afterwards(tmp_path, sets):
     ("name", "sets", "angles"),
     [("paper", (), 2), ("torso", (), 3), ("kneed", (), 3), ("kneed", ("walker.knee.lock=compliant",), 4)],
 )
-def test_the_angles_of_a_hinged_step_are_those_that_it_is_integrated_in(name, sets, angles):
+def test_the_angles_of_a_pinned_step_are_those_that_it_is_integrated_in(name, sets, angles):
     config = load(Path(name), (*sets, "contact.stance=pinned")).config
     scene = contact_scene(config, 0.4)
     assert scene.walker.forms[1, 2 if scene.walker.kneed else 0].bodies == angles  # the stance knee is locked

@@ -33,7 +33,7 @@ class EngineScene:
     ours: ContactWalker  # the walker in walkerlab's contact model
     walker: ContactWalker  # the same walker, with the levers of feet and hip measured from the base
     ground: JudgedGround  # terrain, and the walker's dimensions by which the walking rules judge a walk
-    start: State  # start of the walk, a state of the free walker (not hinged to the ground)
+    start: State  # start of the walk, a state of the free walker (not pinned to the ground)
     locked: tuple[Knee, ...] = ()  # locked knees, which have no hinge in the engine
 
     @cached_property
@@ -96,7 +96,7 @@ class EngineScene:
 
 
 def engine_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """Build a config's scene, no foot hinged and no knee locked; pad_pitch `own` becomes the rigid step length."""
+    """Build a config's scene, no foot pinned and no knee locked; pad_pitch `own` becomes the rigid step length."""
     scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m)
     return scene_for_engines(replace(scene, pinned=False), rigid_state)
 

@@ -50,7 +50,7 @@ class Exported:
     steps: int  # maximum number of steps of the walk
     walk: ContactWalkResult  # walk of the contact model from that start
     heights: Floats | None  # (footholds,) heights of uneven ground (m); None on even ground
-    pinned: bool  # whether the stance foot is hinged until the first touchdown
+    pinned: bool  # whether a revolute joint holds the stance foot until the first touchdown
 
     @property
     def model(self) -> PlanarModel:

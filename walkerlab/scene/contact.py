@@ -40,7 +40,7 @@ FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reac
 
 @dataclass(frozen=True)
 class ContactScene(WalkerOnGround):
-    pinned: bool  # whether the stance foot of the first step is hinged
+    pinned: bool  # whether a revolute joint holds the stance foot during the first step
     pitch_m: float
     assembly: Assembly
 
@@ -187,12 +187,12 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
-    hinged = floating_state(walker.forms[1, 0], turned.ravel(), walker.size)
+    y = floating_state(walker.forms[1, 0], turned.ravel(), walker.size)
     if scene.pinned:
-        return hinged
+        return y
     n = turned.shape[1]
     rolled = float(walker.whole.rolling[STANCE_FOOT, :n] @ turned[1])
-    return (*hinged[: 2 + n], hinged[2 + n] - rolled, *hinged[3 + n :])
+    return (*y[: 2 + n], y[2 + n] - rolled, *y[3 + n :])
 
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:

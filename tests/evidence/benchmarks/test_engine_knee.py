@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask
-from walkerlab.exchange.planar import HINGED, planar_model
+from walkerlab.exchange.planar import PINNED, planar_model
 from walkerlab.physics.mechanics.assembly import Anchor
 from walkerlab.physics.mechanics.rigid import standing
 from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, Mode
@@ -45,7 +45,7 @@ def test_the_swing_with_a_free_knee_converges_to_the_rigid_models_with_the_order
     pytest.importorskip(engine.module, reason=f"{name} is not installed: {engine.install_line}")
     foot = KNEED.feet[STANCE]
     gravity = float(GRAVITY * np.sin(SLOPE)), float(GRAVITY * np.cos(SLOPE))
-    model = planar_model(KNEED, Anchor(foot.body, foot.centre_m), HINGED, gravity, KNEED.knees[STANCE:])
+    model = planar_model(KNEED, Anchor(foot.body, foot.centre_m), PINNED, gravity, KNEED.knees[STANCE:])
     for integrator, entry in engine.adapter().INTEGRATORS.items():
         if entry.adapts:
             continue

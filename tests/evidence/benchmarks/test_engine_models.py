@@ -155,7 +155,7 @@ def test_a_torso_and_a_stop_that_gives_are_refused_in_words():
         kneed("walker.torso={mass_kg: 1.0, above_hip_m: 0.1}")
 
 
-def test_a_hinged_walker_hangs_from_its_stance_foot(scene):
+def test_a_pinned_walker_hangs_from_its_stance_foot(scene):
     model = pinned_model(scene)
     assert model.freedoms == ("turn",)
     assert model.links[0].point_m == scene.assembly.feet[STANCE_FOOT].centre_m

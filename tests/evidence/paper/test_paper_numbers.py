@@ -282,7 +282,7 @@ def test_the_adams_start_falls_when_another_integration_says_so(study):
     fall = solve_ivp(rate, (0.0, 1.0), start, "DOP853", events=hip, rtol=1e-11, atol=1e-12).t_events[0][0]
     assert study.adams.end_time == pytest.approx(fall, abs=1e-5)
     told = prose("adams_start.velocities", study.adams)
-    assert "in the rigid model, whose stance foot is hinged to an even slope" in told
+    assert "in the rigid model, whose stance foot is pinned to an even slope" in told
     assert "the walk ends (fell) at 0.347 s" in told
 
 

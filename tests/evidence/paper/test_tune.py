@@ -76,7 +76,7 @@ def test_the_papers_own_start_does_not_walk_and_says_why():
 def test_both_fates_of_the_papers_adams_start_are_told_with_model_and_ground():
     start = small("paper").summary["paper_start"]
     rigid, contact = start["reason"].split("the contact model on ")
-    assert "in the rigid model, whose stance foot is hinged to an even slope" in rigid
+    assert "in the rigid model, whose stance foot is pinned to an even slope" in rigid
     assert "with its foot held down the walk ends (fell) at 0.347 s" in rigid
     assert contact.startswith("its checkerboard of pads, the ground, which cannot pull, carries no more than")
     assert f"and the walk ends at {start['end_time_s']:.3g} s" in contact
@@ -185,7 +185,7 @@ def test_what_is_the_papers_alone_is_left_out_for_another_walker_in_words():
     assert "paper_start" not in content.summary
     assert not {"hinged", "paper_start"} & set(content.groups)
     assert [entry["what"] for entry in content.summary["left_out"]] == [
-        "the first step with a hinged stance foot",
+        "the first step with a pinned stance foot",
         "the paper's start of its ADAMS model",
     ]
     assert set(content.summary["table2"]) == {f"{d}theta_{leg}" for d in ("", "d") for leg in ("1", "2", "1_shank")}

@@ -21,9 +21,9 @@ def parts(radius=0.001, inertia=0.0):
     return CompassParts(1.0, 0.5, 5.0, 10.0, inertia, radius)
 
 
-def compass(friction=COULOMB, normal=ADAMS, radius=0.001, inertia=0.0, slope=SLOPE, hinged_foot=1):
+def compass(friction=COULOMB, normal=ADAMS, radius=0.001, inertia=0.0, slope=SLOPE, pinned_foot=1):
     assembly = compass_assembly(parts(radius, inertia))
-    return contact_walker(assembly, normal, friction, GRAVITY, slope, hinged_foot=hinged_foot)
+    return contact_walker(assembly, normal, friction, GRAVITY, slope, pinned_foot=pinned_foot)
 
 
 def sledge(friction=COULOMB, normal=ADAMS, slope=SLOPE, radius=0.01):

@@ -42,7 +42,7 @@ def test_compiled_walker_on_ground_moves_as_in_python(has_ground):
 
 
 @pytest.mark.parametrize("has_ground", [False, True])
-def test_compiled_hinged_walker_moves_as_in_python(has_ground):
+def test_compiled_pinned_walker_moves_as_in_python(has_ground):
     walker = ground.compass()
     for state in states_on_ground(walker, 20):
-        check(on_ground(walker, (has_ground, True), hinged=True), (*state[2:4], *state[6:]))
+        check(on_ground(walker, (has_ground, True), pinned=True), (*state[2:4], *state[6:]))

@@ -57,13 +57,13 @@ def test_one_body_accelerates_as_the_two_that_are_held_together(assembly, knee):
 
 @pytest.mark.parametrize("knee", [(RELEASED, RELEASED), *KNEES])
 @pytest.mark.parametrize("assembly", [LEGS, WITH_TORSO], ids=["legs", "torso"])
-def test_energies_of_a_hinged_form_are_those_of_the_same_motion_afloat(assembly, knee):
+def test_energies_of_a_pinned_form_are_those_of_the_same_motion_afloat(assembly, knee):
     walker = walker_of(assembly)
     y, n = state_in_line(walker, knee), int(walker.whole.bodies)
-    hinged = on_ground(walker, BOTH, knee, hinged=True)
-    z = to_form(hinged.form, [*y[2 : 2 + n], *y[4 + n :]])
-    afloat = floating_state(hinged.form, z, y.size)
-    assert total_energy(hinged, z) == pytest.approx(total_energy(on_ground(walker, BOTH), afloat), rel=1e-12)
+    pinned = on_ground(walker, BOTH, knee, pinned=True)
+    z = to_form(pinned.form, [*y[2 : 2 + n], *y[4 + n :]])
+    afloat = floating_state(pinned.form, z, y.size)
+    assert total_energy(pinned, z) == pytest.approx(total_energy(on_ground(walker, BOTH), afloat), rel=1e-12)
 
 
 def test_a_state_of_bodies_that_are_one_is_found_in_that_of_all_bodies():

@@ -29,14 +29,14 @@ rates = st.tuples(*(st.floats(-3.0, 3.0),) * 2)
 
 
 @given(theta=angles, omega=rates)
-def test_a_hinged_walker_moves_as_the_rigid_one(theta, omega):
+def test_a_pinned_walker_moves_as_the_rigid_one(theta, omega):
     """Written for the rigid model's own equations; the roles of the feet decide whose torque is whose."""
     config = loader.load(Path("paper"), [*SETTINGS, "walker.foot_radius_m=0"]).config
     rigid, y = rigid_walker(config, "corrected"), np.array((*theta, *omega))
     expected = np.zeros(4)
     derivative(Mode(rigid, STRAIGHT), 0.0, y, expected)
     walker = contact_scene(config, RIGID_STEP).walker
-    assert rate_of(on_ground(walker, IN_THE_AIR, hinged=True), tuple(y)) == pytest.approx(tuple(expected), rel=1e-9)
+    assert rate_of(on_ground(walker, IN_THE_AIR, pinned=True), tuple(y)) == pytest.approx(tuple(expected), rel=1e-9)
 
 
 @settings(max_examples=20)

@@ -1,4 +1,4 @@
-"""The walker hinged at its stance foot: the rigid swing on a leg that ends at the ball's centre."""
+"""The walker pinned at its stance foot: the rigid swing on a leg that ends at the ball's centre."""
 
 import math
 
@@ -17,31 +17,31 @@ radii = st.floats(0.0, 0.2)
 inertias = st.floats(0.0, 1.0)
 
 
-def hinged(radius=0.001, inertia=0.0, foot=1, has_ground=False):
-    walker = ground.compass(radius=radius, inertia=inertia, hinged_foot=foot)
-    return on_ground(walker, (has_ground, has_ground), hinged=True)
+def pinned(radius=0.001, inertia=0.0, foot=1, has_ground=False):
+    walker = ground.compass(radius=radius, inertia=inertia, pinned_foot=foot)
+    return on_ground(walker, (has_ground, has_ground), pinned=True)
 
 
 @given(state=states, radius=radii, inertia=inertias)
-def test_hinged_walker_is_the_rigid_swing_with_a_leg_shorter_by_the_radius(state, radius, inertia):
+def test_pinned_walker_is_the_rigid_swing_with_a_leg_shorter_by_the_radius(state, radius, inertia):
     """The hinge is the centre of the ball: L - r from the hip, a - r from the leg's mass."""
     rigid = RigidWalker(1.0 - radius, 0.5 - radius, 5.0, 10.0, inertia, ground.GRAVITY, ground.SLOPE, CORRECTED)
-    found = rate_of(hinged(radius, inertia), state)
+    found = rate_of(pinned(radius, inertia), state)
     expected = (*state[2:], *accelerations(rigid, *state))
     np.testing.assert_allclose(found, expected, atol=1e-11 * (1.0 + np.abs(expected).max()))
 
 
 @given(state=states)
-def test_hinged_on_the_other_foot_the_legs_change_roles(state):
+def test_pinned_on_the_other_foot_the_legs_change_roles(state):
     t_1, t_2, w_1, w_2 = state
-    one = rate_of(hinged(), state)
-    other = rate_of(hinged(foot=0), (t_2, t_1, w_2, w_1))
+    one = rate_of(pinned(), state)
+    other = rate_of(pinned(foot=0), (t_2, t_1, w_2, w_1))
     np.testing.assert_allclose((other[3], other[2]), one[2:], atol=1e-11 * (1.0 + np.abs(one).max()))
 
 
 @given(state=states, inertia=inertias)
-def test_derivatives_of_the_hinged_walker_are_those_of_differences(state, inertia):
-    check_jacobian(hinged(inertia=inertia), state)
+def test_derivatives_of_the_pinned_walker_are_those_of_differences(state, inertia):
+    check_jacobian(pinned(inertia=inertia), state)
 
 
 def check_jacobian(system, state):
@@ -63,7 +63,7 @@ def check_jacobian(system, state):
     foot=st.sampled_from([0, 1]),
 )
 def test_derivatives_hold_with_the_other_foot_in_the_ground(angle, depth, swing, stance, foot):
-    system = hinged(radius=0.01, inertia=0.1, foot=foot, has_ground=True)
+    system = pinned(radius=0.01, inertia=0.1, foot=foot, has_ground=True)
     # legs that end at the balls' centres: by as much as the swing leg reaches further down
     other = -math.acos(math.cos(angle) + depth / 0.99)
     legs = np.array([[other, angle], [swing, stance]])[:, :: 1 if foot == 1 else -1]
@@ -89,13 +89,13 @@ def test_the_hinge_stays_where_it_is_and_the_ball_just_touches(state, radius):
 
 @given(state=states)
 def test_velocities_of_the_floating_state_are_those_of_its_positions(state):
-    form = hinged().form
+    form = pinned().form
     h = 1e-6
     moved = [tuple(np.array(state) + np.array([s * h * state[2], s * h * state[3], 0.0, 0.0])) for s in (-1, 1)]
     below, above = (np.array(floating_state(form, y, 8)) for y in moved)
     np.testing.assert_allclose((above - below)[:2] / (2 * h), floating_state(form, state, 8)[4:6], atol=1e-8)
 
 
-def test_the_hinged_walker_has_two_angles_only():
-    form = hinged().form
+def test_the_pinned_walker_has_two_angles_only():
+    form = pinned().form
     assert (form.places, form.bodies) == (0, 2)

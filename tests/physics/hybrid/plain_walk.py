@@ -63,7 +63,7 @@ class Now(NamedTuple):
     """What holds the walker and pushes it."""
 
     stance: int
-    hinged: int  # foot, or -1
+    pinned: int  # foot, or -1
     locked: np.ndarray  # (knees,)
     has_ground: np.ndarray  # (2,)
     levels: np.ndarray  # (2,) m, height of the ground for each foot
@@ -179,8 +179,8 @@ def solve(A, b):
 def matrices(walker, now, y):
     """Mass matrix with the rows of what is held, and the forces of weight and turning; room for multipliers."""
     n, knees = walker.inertias.size, walker.knees.shape[0]
-    hinged, locked = now.hinged, now.locked
-    size = 2 + n + (2 if hinged >= 0 else 0) + locked.sum()
+    pinned, locked = now.pinned, now.locked
+    size = 2 + n + (2 if pinned >= 0 else 0) + locked.sum()
     A, b = np.zeros((size, size)), np.zeros(size)
     weight_x, weight_h = walker.gravity * np.sin(walker.slope), -walker.gravity * np.cos(walker.slope)
     J = np.zeros((2, 2 + n))
@@ -198,9 +198,9 @@ def matrices(walker, now, y):
     for k in range(n):
         A[2 + k, 2 + k] += walker.inertias[k]
     row = 2 + n
-    if hinged >= 0:
+    if pinned >= 0:
         for k in range(n):
-            rx, rh = turned(walker.slope, walker.foot_levers, hinged, y, k)
+            rx, rh = turned(walker.slope, walker.foot_levers, pinned, y, k)
             A[row, 2 + k], A[row + 1, 2 + k] = -rh, rx
             b[row] += y[4 + n + k] ** 2 * rx
             b[row + 1] += y[4 + n + k] ** 2 * rh
@@ -254,7 +254,7 @@ def rate(walker, now, t, y):
     for foot in range(2):
         _, h, slip, vertical_velocity, _ = foot_at(walker, foot, y)
         h -= now.levels[foot]
-        if h < 0.0 and now.has_ground[foot] and foot != now.hinged:
+        if h < 0.0 and now.has_ground[foot] and foot != now.pinned:
             c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
             spring = walker.stiffness * (-h) ** walker.exponent
             normal = max(0.0, spring - c * vertical_velocity)
@@ -277,7 +277,7 @@ def reaction(walker, now, y):
     for foot in range(2):
         _, h, _, vertical_velocity, _ = foot_at(walker, foot, y)
         h -= now.levels[foot]
-        if h < 0.0 and now.has_ground[foot] and foot != now.hinged:
+        if h < 0.0 and now.has_ground[foot] and foot != now.pinned:
             c = walker.damping * cubic(-h, 0.0, 0.0, walker.full, 1.0)
             normal = max(0.0, walker.stiffness * (-h) ** walker.exponent - c * vertical_velocity)
             gives, (A, J) = np.zeros(2), matrices(walker, now, y)
@@ -402,8 +402,8 @@ def changes_level(walker, levels, done, foot):
 
 
 @njit
-def take_steps(walker, y, h, hinged, diary):
-    """Walk from y, foot 1 standing, `hinged` or not (-1), until the diary is full or the walk ends.
+def take_steps(walker, y, h, pinned, diary):
+    """Walk from y, foot 1 standing, `pinned` or not (-1), until the diary is full or the walk ends.
 
     Then walk on until the last step's foot lifts, if it does: a slip is from touch to lift. Returns outcome, time and
     state at the end, and whether each foot had ground there and at which level.
@@ -437,7 +437,7 @@ def take_steps(walker, y, h, hinged, diary):
     while done < steps or leaving[0] or leaving[1]:
         counts[ROUNDS] += 1
         deadline = min(grounded_at + 0.25 * tau, last + 10.0 * tau) - t
-        now = Now(stance, hinged, locked, has_ground, levels, pushed_at)
+        now = Now(stance, pinned, locked, has_ground, levels, pushed_at)
         left_of_push = pushed_at + walker.push_off_duration - t
         pushes = walker.push_off != 0.0 and ROUNDING < left_of_push < np.inf
         if pushes:
@@ -452,9 +452,9 @@ def take_steps(walker, y, h, hinged, diary):
             found = -1
             for i in range(EVENTS):
                 if side[i] * g[i] < 0.0 and i != SINKING:
-                    if i < 6 and i // 3 == hinged:
+                    if i < 6 and i // 3 == pinned:
                         continue
-                    if i == SLIDE and (side[3 * stance] > 0.0 or not has_ground[stance] or hinged == stance):
+                    if i == SLIDE and (side[3 * stance] > 0.0 or not has_ground[stance] or pinned == stance):
                         continue
                     if KNEES <= i < KNEES + 2 and (i - KNEES >= knees or locked[i - KNEES] or not armed[i - KNEES]):
                         continue
@@ -481,7 +481,7 @@ def take_steps(walker, y, h, hinged, diary):
             flexion = y[2 + walker.knees[knee, 0]] - y[2 + walker.knees[knee, 1]]
             armed[knee] = (armed[knee] or flexion > ARMED) and not locked[knee]
             side[KNEES + knee] = -1.0
-        if hinged >= 0:
+        if pinned >= 0:
             grounded_at = t
         for foot in range(2):
             if side[3 * foot] < 0.0 and has_ground[foot]:
@@ -524,7 +524,7 @@ def take_steps(walker, y, h, hinged, diary):
             for foot in range(2):
                 _, height, _, vertical_velocity, _ = foot_at(walker, foot, y)
                 height -= levels[foot]
-                # equal legs of a hinged step pass each other on the ground: rounding neither lifts a foot nor holds one
+                # equal legs of a pinned step pass each other on the ground: rounding neither lifts a foot nor holds one
                 above = height > ROUNDING or (height > -ROUNDING and vertical_velocity > 0.0)
                 if foot == swing:
                     swing_above = above
@@ -592,10 +592,10 @@ def take_steps(walker, y, h, hinged, diary):
         if knees and not locked[foot]:
             outcome = BENT_KNEE
             break
-        if hinged >= 0:
+        if pinned >= 0:
             touched[other], stood[other, 0], stood[other, 1] = material(walker, other, y), 0.0, 0.0
             side[3 * other] = -1.0
-            hinged = -1
+            pinned = -1
         leaving[other], leaving[foot] = side[3 * other] < 0.0, False
         times[done], places[done] = t, along[foot]
         if not leaving[other]:
@@ -620,11 +620,11 @@ def take_steps(walker, y, h, hinged, diary):
     return WALKED, end_s, end, ground, end_levels
 
 
-def walk(walker, y, steps, h, hinged=-1):
-    """Walk up to `steps` steps from y in steps of the method of h (s) at most, foot `hinged` hinged until the first."""
+def walk(walker, y, steps, h, pinned=-1):
+    """Walk up to `steps` steps from y in steps of the method of h (s) at most, foot `pinned` pinned until the first."""
     locks, counts = np.zeros(2 * steps + 2), np.zeros(4, np.int64)
     diary = Diary(*np.zeros((4, steps)), locks, counts, np.zeros(4))
-    outcome, end_s, end, ground, levels = take_steps(walker, y, h, hinged, diary)
+    outcome, end_s, end, ground, levels = take_steps(walker, y, h, pinned, diary)
     done, known = counts[STEPS], counts[SLIPS]
     diary.lost[[DAMPING, FRICTION]] = end[-2:]
     return Walked(
@@ -645,11 +645,11 @@ def of_centre(walker, y):
     return moved
 
 
-def start(walker, angles, rates, hinged=False):
-    """The state with foot 1 just touching at the origin, at rest and rolling, or hinged at its centre."""
+def start(walker, angles, rates, pinned=False):
+    """The state with foot 1 just touching at the origin, at rest and rolling, or pinned at its centre."""
     n = walker.inertias.size
     y = np.concatenate([[0.0, 0.0], angles, [0.0, 0.0], rates, [0.0, 0.0]]).astype(float)
     x, height, slip, vertical_velocity, centre = foot_at(walker, 1, y)
     y[0], y[1] = -x, -height
-    y[2 + n], y[3 + n] = -(centre if hinged else slip), -vertical_velocity
+    y[2 + n], y[3 + n] = -(centre if pinned else slip), -vertical_velocity
     return y

@@ -239,7 +239,7 @@ def test_smooth_ground_cannot_be_walked_on():
     assert walk.dissipated_J[1] == 0.0
 
 
-def test_a_hinged_first_step_is_the_rigid_one_until_the_hinge_is_released():
+def test_a_pinned_first_step_is_the_rigid_one_until_the_hinge_is_released():
     """The ball's centre is the hinge: the rigid walk of a walker whose legs are shorter by the radius."""
     walk = walked("contact.stance=pinned", "walker.foot_radius_m=0", method="scipy-radau", steps=2)
     assert walk.outcome is Outcome.WALKED

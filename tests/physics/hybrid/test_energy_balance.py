@@ -29,7 +29,7 @@ def nothing_explained(monkeypatch):
 
 
 def test_a_walk_by_equations_of_another_walker_is_refused_with_its_residual_in_words():
-    """The hinged walker moves as one with a heavier hip would; its energy is its own."""
+    """The pinned walker moves as one with a heavier hip would; its energy is its own."""
     scene, heavier = scene_of("contact.stance=pinned"), scene_of("contact.stance=pinned", "walker.hip_mass_kg=20")
     forms = scene.walker.forms.copy()
     forms[1] = heavier.walker.forms[1]

@@ -189,7 +189,7 @@ def test_a_twin_of_another_size_walks_the_same_steps():
     np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)
 
 
-def test_one_compiled_walk_serves_straight_legs_knees_and_a_hinged_step():
+def test_one_compiled_walk_serves_straight_legs_knees_and_a_pinned_step():
     contact_walks.walked(steps=1)
     compiled = set(walk_in_form.signatures)
     contact_walks.walked("contact.stance=pinned", steps=1)

@@ -35,7 +35,7 @@ def test_a_round_foot_on_ground_like_glue_rolls_and_walks():
     assert np.all(np.abs(walk.slip_m) < 1e-3 * walk.rolling_m)
 
 
-def test_a_hinged_foot_slips_and_rolls_from_its_release_to_its_lift_alone():
+def test_a_pinned_foot_slips_and_rolls_from_its_release_to_its_lift_alone():
     """The same foot free slips and rolls by half a millimetre."""
     walk = walked("contact.stance=pinned", steps=1)
     assert 0.0 < abs(walk.slip_m[0]) < 1e-6
@@ -43,7 +43,7 @@ def test_a_hinged_foot_slips_and_rolls_from_its_release_to_its_lift_alone():
 
 
 @pytest.mark.parametrize("walked_of", [walked, partial(walked, "contact.stance=pinned"), kneed_walks.walked],
-                         ids=["compass", "hinged", "kneed"])  # fmt: skip
+                         ids=["compass", "pinned", "kneed"])  # fmt: skip
 @pytest.mark.parametrize("steps", [1, 2])
 def test_the_last_step_slips_and_rolls_as_it_does_in_a_longer_walk(walked_of, steps):
     short, longer = walked_of(steps=steps), walked_of(steps=3)

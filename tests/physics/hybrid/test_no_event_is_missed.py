@@ -18,7 +18,7 @@ from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_walker
 
 AFTER_MID_SWING = "contact.terrain=after-mid-swing"
-HINGED = ("contact.stance=pinned", "walker.foot_radius_m=0", "slope_deg=0.7")
+PINNED = ("contact.stance=pinned", "walker.foot_radius_m=0", "slope_deg=0.7")
 BOUNCING = ("contact.damping=10", "contact.exponent=1.3")
 SWITCHING = ("slope_deg=2.8", "contact.exponent=1.3", "contact.full_damping_penetration=0.26")
 
@@ -81,7 +81,7 @@ def from_the_gait(*sets, steps=4, base=None, tolerance=TOLERANCE, method="radau5
 @pytest.mark.parametrize(
     ("sets", "periods"),
     [
-        (HINGED, (0.698474, 0.705916)),
+        (PINNED, (0.698474, 0.705916)),
         (BOUNCING, (0.711005, 0.723931, 0.718791, 0.711621)),
         (SWITCHING, (0.739270, 0.744060, 0.733988, 0.737583)),
     ],

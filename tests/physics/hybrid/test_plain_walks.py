@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).parents[3] / "scripts" / "contact_campaign.py"
-# straight legs, free and hinged, on every terrain; knees, free and hinged
+# straight legs, free and pinned, on every terrain; knees, free and pinned
 SEEDS = (18, 3, 19, 1, 0, 40, 8, 2, 29, 117, 69)
 
 

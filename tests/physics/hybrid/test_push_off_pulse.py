@@ -156,7 +156,7 @@ def test_a_trailing_knee_is_released_as_its_push_ends():
     assert walk.samples.knees[3, trailing] != LOCKED
 
 
-def test_a_hinged_foot_pushes_off_once_its_hinge_is_gone():
+def test_a_pinned_foot_pushes_off_once_its_hinge_is_gone():
     walk = at("level", [-1e-3, 1e-5, 6e-3], "contact.stance=pinned")
     before, _, after = walk.samples.driven_J[:, 0]
     assert before == 0.0

@@ -94,9 +94,9 @@ def test_assembled_compass_equals_appendix_a(parts, state, g):
 @given(parts=compasses(), state=states)
 def test_compass_pinned_at_a_point_foot_moves_as_the_swing_phase_of_appendix_a(parts, state):
     g = 9.81
-    hinged = on_ground(walker_of(parts, 0.0, g), (False, False), hinged=True)
+    pinned = on_ground(walker_of(parts, 0.0, g), (False, False), pinned=True)
     D, bias, G = printed_swing(parts, *state, g)
-    found = np.array(rate_of(hinged, state)[2:])
+    found = np.array(rate_of(pinned, state)[2:])
     # the residual of D ddq + C dq + G = 0, free of the matrix' condition
     size = np.abs(D).max() * np.abs(found).max() + np.abs(bias).max() + np.abs(G).max()
     close(D @ found, -bias - G, scale=10.0 * size)
@@ -106,8 +106,8 @@ def test_compass_pinned_at_a_point_foot_moves_as_the_swing_phase_of_appendix_a(p
 def test_slope_only_turns_the_frame(parts, state, slope):
     """Absolute angles: the swing phase does not know the slope; the floating base knows it by its axes alone."""
     level, tilted = walker_of(parts, 0.0, 9.81), walker_of(parts, slope, 9.81)
-    hinged = [rate_of(on_ground(w, (False, False), hinged=True), state) for w in (level, tilted)]
-    close(hinged[1], hinged[0], scale=1e3 * (1.0 + np.abs(hinged[0]).max()))
+    pinned = [rate_of(on_ground(w, (False, False), pinned=True), state) for w in (level, tilted)]
+    close(pinned[1], pinned[0], scale=1e3 * (1.0 + np.abs(pinned[0]).max()))
     falling = rate_of(on_ground(tilted, (False, False)), (0.3, 9.0, *state[:2], 0.1, 0.2, *state[2:]))
     close(np.hypot(falling[4], falling[5]), 9.81)
     assert math.isclose(math.atan2(falling[4], -falling[5]), slope, abs_tol=1e-12)

@@ -72,11 +72,11 @@ def test_walker_with_torso_and_knee_obeys_lagranges_equations(lagrange, theta, o
 
 
 @given(theta=angles, omega=rates)
-def test_hinged_walker_with_torso_and_knee_obeys_lagranges_equations(lagrange, theta, omega):
+def test_pinned_walker_with_torso_and_knee_obeys_lagranges_equations(lagrange, theta, omega):
     """The hinge is at the ball's centre: the foot point's rows drop out once its matrix is moved there."""
-    hinged = on_ground(flying_walker(slope=0.1), IN_THE_AIR, hinged=True)
+    pinned = on_ground(flying_walker(slope=0.1), IN_THE_AIR, pinned=True)
     at_hinge = Anchor("stance", (0.0, 0.02))
-    alpha = np.array(rate_of(hinged, (*theta, *omega))[4:])
+    alpha = np.array(rate_of(pinned, (*theta, *omega))[4:])
     full = mass_matrix_and_bias(kneed.KNEED, at_hinge, theta, omega, GRAVITY)
     residual = full.mass_matrix[:4, :4] @ alpha + full.bias[:4] + full.weight[:4]
     size = np.abs(full.mass_matrix).max() * np.abs(alpha).max() + np.abs(full.weight).max()

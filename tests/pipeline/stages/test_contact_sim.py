@@ -271,7 +271,7 @@ def test_a_step_whose_foot_did_not_lift_has_a_gap_and_is_not_in_the_mean(monkeyp
     assert np.isfinite(cut["steps"]["touch_time_s"]).all()
 
 
-def test_a_hinged_walk_that_scuffs_feels_the_ground_and_its_energy_balances():
+def test_a_pinned_walk_that_scuffs_feels_the_ground_and_its_energy_balances():
     """The rigid gait on 3 degrees: pulled down by its scuffing foot it falls before its first step."""
     gait = Content({}, {"state": [-0.3233886, 0.2186688, -0.3773739, -1.0923836], "step_length_m": 0.5354454})
     scuffing = ("contact.stance=pinned", "contact.terrain=plane", "slope_deg=3")
@@ -302,7 +302,7 @@ def test_a_budget_that_ends_before_the_first_sample_is_no_answer_either(monkeypa
     assert caught.value.partial["trajectory"]["time"].size == 0
 
 
-def test_a_hinged_first_step_says_what_it_does_without():
+def test_a_pinned_first_step_says_what_it_does_without():
     content = run("contact.stance=pinned", "solver.contact.method=scipy-radau", "strides=1")
     assert content.summary["outcome"] == "walked"
     assert any("pinned" in entry["why"] for entry in content.summary["left_out"])

@@ -1,4 +1,4 @@
-"""Conditions of benchmarks: machine, omission of a hinged first step; and formatting of error levels."""
+"""Conditions of benchmarks: machine, omission of a pinned first step; and formatting of error levels."""
 
 import os
 import platform
@@ -11,7 +11,7 @@ def hinge_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]
     """Return an omission entry if the config hinges the first step, because measured walks have no hinge."""
     if config.contact is None or config.contact.stance != "pinned":
         return []
-    return [{"what": "hinged first step", "why": f"{measured} are measured on a walk without a hinge"}]
+    return [{"what": "pinned first step", "why": f"{measured} are measured on a walk without a hinge"}]
 
 
 def environment() -> dict[str, Any]:

@@ -18,7 +18,7 @@ def adjustment_omissions(config: RigidConfig) -> tuple[Entry, ...]:
     """Return the omissions for a walker other than the paper's compass."""
     entries = []
     if not is_passive_compass(config):
-        entries.append(omission("the first step with a hinged stance foot", COMPASS_ONLY, "two walks"))
+        entries.append(omission("the first step with a pinned stance foot", COMPASS_ONLY, "two walks"))
     if not is_own_walker(config):
         entries.append(omission("the paper's start of its ADAMS model", "only that compass has it", "a walk"))
     return tuple(entries)

@@ -88,7 +88,7 @@ class TuneRun:
 
     names       names of the rigid start's coordinates
     steps       number of steps per walk
-    hinge       whether the first stance foot is hinged in one walk, as in the paper's procedure for its compass
+    hinge       whether the first stance foot is pinned in one walk, as in the paper's procedure for its compass
     walks       walks of the procedure: `hinged`, with a revolute joint at the first stance foot; `released`, without
                 it; and `adjusted`, from the adjusted start, if there is one
     printed     summaries of these walks

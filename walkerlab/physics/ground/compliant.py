@@ -51,11 +51,11 @@ def contact_walker(
     gravity: float,
     slope: float,
     knee_rules: KneeRules | None = None,
-    hinged_foot: int = STANCE_FOOT,
+    pinned_foot: int = STANCE_FOOT,
 ) -> ContactWalker:
     """Assemble a walker on compliant ground; gravity in m/s^2, slope in rad. Foot k and knee k belong to leg k.
 
-    In the hinged forms, the hinge is the centre of the ball of `hinged_foot`, at position 0 along the slope. Raises
+    In the pinned forms, the hinge is the centre of the ball of `pinned_foot`, at position 0 along the slope. Raises
     ValueError, with a message for the user, if the parts cannot walk on compliant ground.
     """
     rules = knee_rules or KneeRules()
@@ -63,10 +63,10 @@ def contact_walker(
     forms = np.zeros((2, 4), FORM)
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
-    for hinged, root in enumerate((about_centre(assembly), about_foot(assembly, hinged_foot))):
+    for pinned, root in enumerate((about_centre(assembly), about_foot(assembly, pinned_foot))):
         for locked in range(4):
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
-            fill(forms[hinged, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
+            fill(forms[pinned, locked], assembly, root, knees, isinstance(rules.stop, IdealLock))
     legs = leg_bodies(assembly)
     forms["hinges"][..., HIP_ROW, :] = np.take_along_axis(forms["onto"], np.broadcast_to(legs[:, 0], (2, 4, 2)), axis=2)
     return ContactWalker(forms, normal, friction, rules.stop, legs)
@@ -86,7 +86,7 @@ def check_walkable(assembly: Assembly) -> None:
 def about_centre(assembly: Assembly) -> Root:
     tree, feet = tree_about_centre(assembly)
     hip = hip_levers(assembly, feet[0])
-    return Root(tree, {"places": 2, "hinged": NO_FOOT}, levers_by_axis(feet, hip))
+    return Root(tree, {"places": 2, "pinned": NO_FOOT}, levers_by_axis(feet, hip))
 
 
 def about_foot(assembly: Assembly, foot: int) -> Root:
@@ -94,7 +94,7 @@ def about_foot(assembly: Assembly, foot: int) -> Root:
     tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
     _, from_centre = tree_about_centre(assembly)
     feet, hip = [d - from_centre[foot] for d in from_centre], hip_levers(assembly, from_centre[0]) - from_centre[foot]
-    return Root(tree, {"places": 0, "hinged": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
+    return Root(tree, {"places": 0, "pinned": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
 
 
 def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:

@@ -57,7 +57,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
 
     Writes sines and cosines of the angles into s and c, and the factors of the mass matrix into M.
     """
-    # r is first the sum of the torques of feet, hinges, stops and centrifugal forces and, in a hinged form, of gravity
+    # r is first the sum of the torques of feet, hinges, stops and centrifugal forces and, in a pinned form, of gravity
     form = system.form
     sines_cosines(form, y, s, c)
     n, half = form.bodies, half_size(form)
@@ -81,7 +81,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
 
 @derivative.case(OnGround)
 def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
-    """Evaluate Newton's law for the centre of mass (unless a foot is hinged) and the tree's equations of motion."""
+    """Evaluate Newton's law for the centre of mass (unless a foot is pinned) and the tree's equations of motion."""
     form = system.form
     n, half, first = form.bodies, half_size(form), form.places
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)

@@ -1,10 +1,10 @@
-"""Walker on compliant ground: a tree with ball feet, whose form depends on locked knees and a hinged foot.
+"""Walker on compliant ground: a tree with ball feet, whose form depends on locked knees and a pinned foot.
 
 The state is (along, height, theta_1 .. theta_n) and their rates: the position (m) of the centre of mass along the slope
 (positive downhill) and above it, and the bodies' absolute angles (rad) from the vertical. While an ideal lock holds a
 knee, thigh and shank are one body: theta = S z with a column of S for each group of bodies that turn together. The
 tree's constants become S^T A S, S^T B S and S^T c, every lever and radius S^T d, and the form is an ordinary walker of
-fewer bodies. While the first stance foot is hinged, the root is the hinge and the state is the angles and their rates.
+fewer bodies. While the first stance foot is pinned, the root is the hinge and the state is the angles and their rates.
 """
 
 import math
@@ -31,15 +31,15 @@ RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 @tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants (SI) of the walker in one form, free or hinged, with certain knees locked; a structured scalar."""
+    """Constants (SI) of the walker in one form, free or pinned, with certain knees locked; a structured scalar."""
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
     # thigh, with equal indices while they are merged into one body). E holds a single reduction.
 
     bodies: int  # [n]
-    places: int  # number of root coordinates before the angles: 2, or 0 for a hinged form
-    hinged: int  # index of the hinged foot; NO_FOOT in a free form
+    places: int  # number of root coordinates before the angles: 2, or 0 for a pinned form
+    pinned: int  # index of the pinned foot; NO_FOOT in a free form
     kneed: bool
     release_at_touch: bool  # release the trailing knee at the touch, not when the leading foot stops sinking in
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
@@ -71,7 +71,7 @@ FORM = tree.record_type(GroundModel, FORM_SHAPES)
 
 
 class ContactWalker(NamedTuple):
-    forms: Any  # (2, 4) records of FORM: row 0 with both feet free, row 1 with a foot hinged; columns by `locked_knees`
+    forms: Any  # (2, 4) records of FORM: row 0 with both feet free, row 1 with a foot pinned; columns by `locked_knees`
     normal: NormalLaw
     friction: Any  # a FrictionLaw
     stop: Any  # stop of both knees: IdealLock, or the NormalLaw (rad, N m) of a compliant stop
@@ -162,13 +162,13 @@ def on_ground(
     walker: ContactWalker,
     has_ground: Any,
     knee: Any = (RELEASED, RELEASED),
-    hinged: bool = False,
+    pinned: bool = False,
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
     """Return the walker in the form for its knees, by default on foot 1; `level` (2,) is the ground height (m)."""
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
-    form = walker.forms[int(hinged), locked_knees(knee)]
+    form = walker.forms[int(pinned), locked_knees(knee)]
     progress = new_progress() if progress is None else progress
     return OnGround(form, walker.normal, walker.friction, walker.stop, *memory, progress)
 

@@ -9,7 +9,7 @@ Rigid model (`rigid_walk`; many walks side by side in `rigid_lanes`)
     other ends    a heel strike with a bent knee, or no heel strike in time
 
 Contact model (`contact_loop`)
-    modes         forms of the walker (`ground/walker`): the first stance foot hinged or free, each knee locked or not;
+    modes         forms of the walker (`ground/walker`): the first stance foot pinned or free, each knee locked or not;
                   in each form a foot has ground below it or not, and a knee is RELEASED, BENT, STOPPING or LOCKED
     each foot     HEIGHT: touch (`touch` decides whether it ends the step) or lift; LEFT_EDGE, RIGHT_EDGE: the
                   foot crosses an edge of a pad; RELEASE, FULL_DAMPING, FRICTION_SWITCHES: switching points of the

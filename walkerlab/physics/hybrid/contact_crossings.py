@@ -101,7 +101,7 @@ def earliest_crossing(
     ground, progress = walk_state.ground, walk_state.progress
     first = NO_CROSSING, NO_EVENT
     for foot in range(2):
-        if foot == system.form.hinged:
+        if foot == system.form.pinned:
             continue
         row = foot * PER_FOOT
         # a foot in the air has no force to switch; switching after a touch belongs to the next solver step

@@ -69,7 +69,7 @@ def walk_in_form(
     walk_state: WalkState,
     until: int,
 ) -> tuple[int, int]:
-    """Walk until the steps fill `walk_state`, the walker changes its form, a hinged step is complete, or the walk ends.
+    """Walk until the steps fill `walk_state`, the walker changes its form, a pinned step is complete, or the walk ends.
 
     method  the start state on entry, the end state on return
     until   NO_LIMIT; or a number of steps, after which the walk also ends when the feet pass each other; or AT_LIFT:
@@ -185,7 +185,7 @@ def react(
     stepped = walk_state.progress.steps > steps
     if stepped:
         note_work(observer, system, method.y)
-    if (stepped and is_hinged(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
+    if (stepped and is_pinned(system)) or (event == PASSING and 0 <= until <= walk_state.progress.steps):
         return endings.WALKED
     # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
@@ -196,7 +196,7 @@ def react(
 
 
 @kernel_part
-def is_hinged(system: OnGround) -> bool:
+def is_pinned(system: OnGround) -> bool:
     return system.form.places == 0
 
 
@@ -238,7 +238,7 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 def judge(system: OnGround, walk_state: WalkState, t: float) -> int:
     """Return the outcome if the flight or the step is too long at t (s), else GOES_ON; updates `airborne_since`."""
     # A foot that lifts at t still counts as on the ground, because the event at the solver step's end is applied later.
-    grounded = is_hinged(system)
+    grounded = is_pinned(system)
     for foot in range(2):
         grounded = grounded or (walk_state.has_ground[foot] != 0 and not is_above(walk_state, foot))
     if grounded:

@@ -1,4 +1,4 @@
-"""A whole walk on compliant ground: an optional hinged first step, then the free walk, and the result of both."""
+"""A whole walk on compliant ground: an optional pinned first step, then the free walk, and the result of both."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -157,9 +157,9 @@ def new_observer(
     return ContactObserver(track_energy, room, np.zeros(ENTRIES), np.zeros(ENTRIES), tally, tangent)
 
 
-def in_walk(walker: ContactWalker, walk_state: WalkState, hinged: bool = False) -> OnGround:
+def in_walk(walker: ContactWalker, walk_state: WalkState, pinned: bool = False) -> OnGround:
     """Return the walker in its present form; it shares memory with the walk state."""
-    return on_ground(walker, walk_state.has_ground, walk_state.knee, hinged, walk_state.level, walk_state.progress)
+    return on_ground(walker, walk_state.has_ground, walk_state.knee, pinned, walk_state.level, walk_state.progress)
 
 
 def walk_on(
@@ -169,17 +169,17 @@ def walk_on(
     observer: ContactObserver,
     start: State,
     until: int = NO_LIMIT,
-    hinged: bool = False,
+    pinned: bool = False,
 ) -> Stopped:
     """Continue a walk from a state of the free walker, changing the form as knees lock and are released.
 
-    A `hinged` walk ends with its first step; `until` as in `walk_in_form`. The outcome is `SOLVER_FAILED` if the energy
+    A `pinned` walk ends with its first step; `until` as in `walk_in_form`. The outcome is `SOLVER_FAILED` if the energy
     balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
-    system = in_walk(walker, walk_state, hinged)
+    system = in_walk(walker, walk_state, pinned)
     tangent = observer.tangent.Phi
-    half, root = len(start) // 2, 2 if hinged else 0
+    half, root = len(start) // 2, 2 if pinned else 0
     y = to_form(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
         tangent[: y.size] = to_form(system.form, tangent)
@@ -194,7 +194,7 @@ def walk_on(
         ended, event = walk(system, method, finder, observer, walk_state, until)
         if ended != CHANGES_FORM:
             break
-        before, system = system, in_walk(walker, walk_state, hinged)
+        before, system = system, in_walk(walker, walk_state, pinned)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
         tangent[:] = to_full(system.form, tangent[: method.y.size], walker.size)
@@ -206,16 +206,16 @@ def walk_on(
 def walk_contact(
     walker: ContactWalker,
     ground: JudgedGround,
-    hinged: bool,
+    pinned: bool,
     stance: int,
     start: State,
     tolerances: Tolerances,
     steps: int,
     sampling: float | Floats | None,
 ) -> ContactWalkResult:
-    """Walk up to `steps` steps, the first on foot `stance`, which is hinged during that step if `hinged`.
+    """Walk up to `steps` steps, the first on foot `stance`, which is pinned during that step if `pinned`.
 
-    start     state (4 + 2 n) of the free walker; a hinged step uses only its angles and angular velocities
+    start     state (4 + 2 n) of the free walker; a pinned step uses only its angles and angular velocities
     sampling  sampling interval (s), rising sample times (samples,) in s, or None for no samples
 
     A start whose hip is already too low is rejected.
@@ -231,7 +231,7 @@ def walk_contact(
         walk_state = new_walk_state(walker, ground, stance, steps, start)
         times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
         observer = new_observer(walker, walk_state, start, times, tolerances.track_energy)
-        stopped = run_parts(walker, hinged, start, tolerances, observer, walk_state)
+        stopped = run_parts(walker, pinned, start, tolerances, observer, walk_state)
         if room == 0 or observer.tally.recorded < room:
             return gather(stopped, walk_state, observer, walker, tolerances)
         room *= 2
@@ -239,17 +239,17 @@ def walk_contact(
 
 def run_parts(
     walker: ContactWalker,
-    hinged: bool,
+    pinned: bool,
     start: State,
     tolerances: Tolerances,
     observer: ContactObserver,
     walk_state: WalkState,
 ) -> Stopped:
-    """Walk the hinged step, if there is one, and then the free steps."""
+    """Walk the pinned step, if there is one, and then the free steps."""
     # A walk that completed all steps continues, unobserved, until the last stance foot lifts: its slip is then known.
     y, spent = start, np.zeros(4, np.int64)
-    if hinged:
-        first = walk_on(walker, tolerances, walk_state, observer, start, hinged=True)
+    if pinned:
+        first = walk_on(walker, tolerances, walk_state, observer, start, pinned=True)
         y, spent = first.state, first.work
         release_hinge(walker, walk_state, y)
         if first.outcome is not Outcome.WALKED:
@@ -270,8 +270,8 @@ def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
 
 
 def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
-    """Update the walk state for the release of a hinged foot: it has not slipped or rolled, and is at the surface."""
-    foot, steps = int(walker.forms[1, 0]["hinged"]), walk_state.progress.steps
+    """Update the walk state for the release of a pinned foot: it has not slipped or rolled, and is at the surface."""
+    foot, steps = int(walker.forms[1, 0]["pinned"]), walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
     walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0

@@ -72,7 +72,7 @@ def apply_event(
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
         outcome = GOES_ON
         for foot in range(2):
-            # in a hinged step, equal legs pass with both feet at the surface; rounding must not decide which is above
+            # in a pinned step, equal legs pass with both feet at the surface; rounding must not decide which is above
             at_surface = abs(feet[foot].height) < AT_SURFACE
             above = feet[foot].vertical_velocity > 0.0 if at_surface else is_above(walk_state, foot)
             find_ground(walk_state, foot, above)

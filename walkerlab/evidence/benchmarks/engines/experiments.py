@@ -238,7 +238,7 @@ class EngineOnScene:
             yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in START_FACTORS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
-        """Simulate the hinged walker's passive swing with each integrator; returns results and lost runs."""
+        """Simulate the pinned walker's passive swing with each integrator; returns results and lost runs."""
         scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
         n = len(model.chain)
         start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
@@ -274,7 +274,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
     passive = changed_forms(scene.ours, push_off=0.0, laws=0.0)
-    system = on_ground(passive, (False, False), knee, hinged=True)
+    system = on_ground(passive, (False, False), knee, pinned=True)
     free_form = passive.forms[1, 0]
 
     def rate(t: float, y: Floats) -> Any:

@@ -135,7 +135,7 @@ class SwingAnswer:
 
 @dataclass(frozen=True)
 class SwingTask:
-    """Free swing of the walker hinged to the ground at its stance foot."""
+    """Free swing of the walker, pinned to the ground at its stance foot."""
 
     engine: str
     stepping: Stepping
@@ -178,10 +178,10 @@ def record_motion(engine: Simulation, steps: int, until_s: float) -> EngineMotio
 
 
 def pinned_model(scene: EngineScene) -> planar.PlanarModel:
-    """Return the model of the scene's walker, hinged at the centre of its stance foot."""
+    """Return the model of the scene's walker, pinned at the centre of its stance foot."""
     foot = scene.assembly.feet[STANCE_FOOT]
     base = Anchor(foot.body, foot.centre_m)
-    return planar.planar_model(scene.assembly, base, planar.HINGED, scene.gravity, scene.locked)
+    return planar.planar_model(scene.assembly, base, planar.PINNED, scene.gravity, scene.locked)
 
 
 @dataclass(frozen=True)

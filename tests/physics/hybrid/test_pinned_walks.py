@@ -20,7 +20,7 @@ TERRAINS = {
 
 
 class Walk(NamedTuple):
-    """A hinged start of the paper's walker on its contact."""
+    """A pinned start of the paper's walker on its contact."""
 
     terrain: str
     slope_deg: float
@@ -58,7 +58,7 @@ def plainly(walk, step_s=1e-5):
         *plain_walk.straight_legs(1.0, 0.5, 5.0, 10.0, walk.radius), 1.0, 9.81, np.radians(walk.slope_deg),
         1e5 * 1000.0**2.2, 2.2, 9e4, 1e-4, 0.9, 0.7, 0.1, 1.0, TERRAINS[walk.terrain], MEASURE, False,
     )  # fmt: skip
-    start = plain_walk.start(ground, np.array(walk.state[:2]), np.array(walk.state[2:]), hinged=True)
+    start = plain_walk.start(ground, np.array(walk.state[:2]), np.array(walk.state[2:]), pinned=True)
     other = plain_walk.walk(ground, start, walk.steps, step_s, STANCE_FOOT)
     return Outcome(other.outcome), other.times, other.end_s
 
@@ -66,7 +66,7 @@ def plainly(walk, step_s=1e-5):
 @pytest.mark.parametrize(
     "walk", [SCUFFS_AND_FALLS, PUSHED_OFF_ITS_PAD, COMES_DOWN_IN_PASSING], ids=["scuffs", "pad", "passing"]
 )
-def test_a_hinged_walk_goes_as_a_plain_integration_says(walk):
+def test_a_pinned_walk_goes_as_a_plain_integration_says(walk):
     found = walked(walk, tolerance=1e-9)
     outcome, touches, end = plainly(walk)
     assert found.outcome is outcome
@@ -74,7 +74,7 @@ def test_a_hinged_walk_goes_as_a_plain_integration_says(walk):
 
 
 @pytest.mark.parametrize("walk", [SCUFFS_AND_FALLS, PUSHED_OFF_ITS_PAD], ids=["scuffs", "pad"])
-def test_what_the_ground_takes_from_a_hinged_walk_is_what_the_walker_loses(walk):
+def test_what_the_ground_takes_from_a_pinned_walk_is_what_the_walker_loses(walk):
     found = walked(walk)
     assert found.dissipated_J[:2].sum() > 1e-3
     assert found.energy_balance_residual_J < 1e-6
