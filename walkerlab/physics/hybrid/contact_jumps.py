@@ -19,7 +19,7 @@ from walkerlab.physics.ground.walker import (
     to_form,
     to_full,
 )
-from walkerlab.physics.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PER_FOOT, PULSE_END
+from walkerlab.physics.hybrid.contact_events import EXTENSION, EXTENSION_RATE, HEIGHT, PASSING, PER_FOOT, PULSE_END
 from walkerlab.physics.hybrid.contact_record import ContactObserver
 from walkerlab.physics.kernels import vector
 from walkerlab.physics.mechanics.tree import projections
@@ -40,7 +40,7 @@ def change_form(
     size = int(2 * (whole.places + whole.bodies))
     Phi = observer.tangent.Phi
     x, columns = to_full(before.form, y, size), to_full(before.form, Phi[: y.size], size)
-    waits, ends_step = np.zeros(Phi.shape[1]), event < EXTENSION and event % PER_FOOT == HEIGHT
+    waits, ends_step = np.zeros(Phi.shape[1]), event < PASSING and event % PER_FOOT == HEIGHT
     if ends_step:  # before the touch the other leg stood
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     if EXTENSION_RATE <= event < PULSE_END:
