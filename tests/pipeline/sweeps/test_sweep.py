@@ -181,7 +181,7 @@ def test_a_point_of_any_stage_has_the_key_of_its_single_run(name, tmp_path):
 
 def test_another_version_of_an_engine_computes_old_points_again(monkeypatch):
     config = load().config
-    monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent", "absent"),))
+    monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent"),))
     keys = []
     for version in ("1.0", "1.1"):
         monkeypatch.setattr(registry.Engine, "version", version)

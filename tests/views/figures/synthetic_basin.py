@@ -1,5 +1,7 @@
 """A basin of attraction made by hand, laid out by the stage itself."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from synthetic_walks import stored
 
@@ -20,6 +22,6 @@ def basin(attractor, aperiodic=False, config=CONFIG, steps=7):
     found = WalkEnds(
         np.where(walks, Outcome.WALKED, Outcome.FELL), np.maximum(attractor, UNREACHED), np.where(walks, steps, 1)
     )
-    attractors = [{"period": 1}, {"period": 2}]
-    said = summary(config.basin, window, found, walks.astype(float).reshape(window.cells), attractors, aperiodic)
+    question = SimpleNamespace(attractor_rows=lambda: [{"period": 1}, {"period": 2}], aperiodic=aperiodic)
+    said = summary(config.basin, window, found, walks.astype(float).reshape(window.cells), question)
     return {"basin": stored("basin", {"basin": group_of(config.basin, window, found, walks)}, said)}

@@ -17,6 +17,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.evidence.verification import references
 from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
+from walkerlab.physics.energy_channels import LOSS_ENTRIES
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import NormalLaw
@@ -46,11 +47,12 @@ PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 
 @dataclass(frozen=True)
 class ParticleRun:
-    """Samples and end state of a rig's run."""
+    """Result of a rig's run: samples, end state and dissipated energy."""
 
     times: Floats  # (samples,) s
     states: Floats  # (samples, 8) states of both bodies
     end: State
+    dissipated: Floats  # (5,) J, in the order of `energy_channels.LOSSES`
 
 
 def rig(
@@ -93,7 +95,8 @@ def run_until(
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     recorded = int(observer.tally.recorded)
-    return ParticleRun(observer.samples.time_s[:recorded], observer.samples.states[:recorded], stopped.state)
+    times, states = observer.samples.time_s[:recorded], observer.samples.states[:recorded]
+    return ParticleRun(times, states, stopped.state, observer.account[LOSS_ENTRIES])
 
 
 @dataclass(frozen=True)
