@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import hashlib
+import itertools
 import os
 import secrets
 import stat
@@ -62,6 +63,21 @@ def write_atomically(path: Path, *parts: bytes) -> None:
     """
     with replacing(path) as temporary, temporary.open("xb") as file:
         file.writelines(parts)
+
+
+def write_numbered(path: Path, text: str) -> Path:
+    """Write a text under a path or, if another text is there, under the next free `name-2`, `name-3`, ...; return it.
+
+    A file that holds the same text is kept. Raises StorageError if the file cannot be written.
+    """
+    for number in itertools.count(1):
+        place = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
+        with storing(place):
+            if not place.exists():
+                place.write_text(text, encoding="utf-8")
+            if place.read_text(encoding="utf-8") == text:
+                return place
+    raise AssertionError("there is always another name")
 
 
 def as_text(name: str) -> str:

@@ -1,6 +1,5 @@
 """A stage's command: run the stage or show what would be computed, then print the result."""
 
-import itertools
 import os
 import shlex
 from collections.abc import Mapping
@@ -17,7 +16,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.executor import short_reason
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.runner import Options, StageReport, execute
-from walkerlab.pipeline.store.files import storing
+from walkerlab.pipeline.store.files import write_numbered
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 from walkerlab.views.report.answers import answer, verdict
@@ -41,12 +40,12 @@ def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
 def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     """Run a stage as requested and print its result; a ConfigError does not give the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
-    config, folder = request.resolved, request.folder
+    console = None if options.dry else request.console
+    report = execute(request.resolved, stage.name, request.folder, options, console, graph)
     if options.dry:
-        report = execute(config, stage.name, folder, options, graph=graph)
         print_result(request, report.as_json() | {"dry_run": True}, plan_lines(report))
         return
-    report = with_nearby_gaits(execute(config, stage.name, folder, options, request.console, graph), request)
+    report = with_nearby_gaits(report, request)
     if stage.name in WRITES_CONFIG and report.no_answer is None:
         report.summary["config"] = str(write_config(request, report, WRITES_CONFIG[stage.name]))
     lines = report_lines(request, report)
@@ -63,7 +62,8 @@ def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
     # Imported here: most commands find a gait.
     from walkerlab.scene.gait_suggestions import suggest_gaits
 
-    suggestions = suggest_gaits(request.resolved, request.typed_for("fixedpoint"))
+    typed = request.typed_for("fixedpoint")
+    suggestions = suggest_gaits(request.resolved, typed)
     return replace(report, no_answer=NoAnswer(error.message, f"{suggestions} {error.advice}".strip()))
 
 
@@ -75,20 +75,14 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
 
 def write_config(request: Request, report: StageReport, name: str) -> Path:
     """Write a config that extends the request's by the parameters that a stage found; StorageError if writing fails."""
+    found = values_of(report.summary)
     start = config_to_extend(request.config)
     base = load(Path(start)).config
     typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
-    settings = [parse_setting(f"{key}={value!r}") for key, value in values_of(report.summary).items()]
+    settings = [parse_setting(f"{key}={value!r}") for key, value in found.items()]
     changed = request.loaded.variant(settings).model_copy(update={report.stage: getattr(base, report.stage)})
     text = to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
-    for number in itertools.count(1):
-        path = report.run_dir / (f"{name}.yaml" if number == 1 else f"{name}-{number}.yaml")
-        with storing(path):
-            if not path.exists():
-                path.write_text(text, encoding="utf-8")
-            if path.read_text(encoding="utf-8") == text:
-                return path
-    raise AssertionError("there is always another name")
+    return write_numbered(report.run_dir / f"{name}.yaml", text)
 
 
 def report_lines(request: Request, report: StageReport) -> list[str]:

@@ -62,9 +62,9 @@ def draw(
 
 def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
     """Draw the figures that need only `stage`, redrawing existing ones if `anew`; return the paths of all SVG files."""
+    make_folder(folder / FOLDER)
     results = {stage: artifact.read(folder / f"{stage}.h5")}
     figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]
-    make_folder(folder / FOLDER)
     for figure in figures:
         if anew or not all((folder / path).is_file() for path in paths_of(figure.name).values()):
             draw(figure, results, folder)
