@@ -40,8 +40,8 @@ def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
 def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     """Run a stage as requested and print its result; a ConfigError does not give the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
-    console = None if options.dry else request.console
-    report = execute(request.resolved, stage.name, request.folder, options, console, graph)
+    config, folder = request.resolved, request.folder
+    report = execute(config, stage.name, folder, options, None if options.dry else request.console, graph)
     if options.dry:
         print_result(request, report.as_json() | {"dry_run": True}, plan_lines(report))
         return
