@@ -1,5 +1,6 @@
 import importlib
 import inspect
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -127,6 +128,11 @@ def test_pads_at_the_rigid_step_length_need_the_gait_whatever_the_start():
 def test_two_stages_of_one_name_are_refused():
     with pytest.raises(ValueError, match="the same name"):
         Graph(Stage("a", "m", "", object), Stage("a", "n", "", object))
+
+
+def test_a_graph_without_an_import_path_cannot_be_sent_to_another_process():
+    with pytest.raises(TypeError, match="import path"):
+        pickle.dumps(Graph(Stage("a", "m", "", object)))
 
 
 def test_results_of_names_them_whatever_the_config():

@@ -23,7 +23,7 @@ from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
 
 
 @dataclass(frozen=True)
-class Begun:
+class RunningStage:
     """A running stage."""
 
     step: Step
@@ -41,7 +41,7 @@ class Executor:
     again     whether to repeat walks at tighter tolerances to measure their numerical error
     answers   results so far, by stage
     left_out  reasons why stages are left out, by stage
-    done      steps that have ended so far
+    done      steps that have ended so far, without their results, which would otherwise stay in memory
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Executor:
         self.done: list[Step] = []
         self._keys: dict[str, str] = {}
         self._waiting: list[Stage] = []
-        self._running: dict[Future[Any] | None, Begun] = {}
+        self._running: dict[Future[Any] | None, RunningStage] = {}
         self._working: set[Future[Any]] = set()
         self._events: SimpleQueue[Callable[[], bool]] = SimpleQueue()
         self._left: list[str] = []
@@ -98,7 +98,7 @@ class Executor:
 
     def skip(self, step: Step) -> None:
         """Record a stage that does not run."""
-        self.done.append(step)
+        self.done.append(replace(step, found=None))
         self.reporter.note(outcome_line(step))
 
     def inputs(self, stage: Stage) -> dict[str, Content]:
@@ -170,10 +170,10 @@ class Executor:
     def _start_ready_stages(self, pool: WorkerPool | None, precompiler: Precompiler) -> None:
         """Start all ready stages in `pool`, or run the next one in this process if `pool` is None."""
         for stage in list(self._waiting):
-            timing = any(begun.step.stage.work == "times" for begun in self._running.values())
+            timing = any(running_stage.step.stage.work == "times" for running_stage in self._running.values())
             if timing or len(self._working) == self.jobs:
                 return
-            if not self._unsettled().isdisjoint(stage.results(self.config)):  # it is not ready
+            if not self._is_ready(stage):
                 if stage.name in self._left and (compiling := precompiler.begin(stage, only_first=True)) is not None:
                     self._watch(compiling)
                 continue
@@ -223,10 +223,14 @@ class Executor:
             self._finish(future, future.result())
         return True
 
-    def _unsettled(self) -> set[str]:
-        return {stage.name for stage in (*self._waiting, *(begun.step.stage for begun in self._running.values()))}
+    def _is_ready(self, stage: Stage) -> bool:
+        return self._unsettled().isdisjoint(stage.results(self.config))
 
-    def _begin(self, step: Step) -> Begun:
+    def _unsettled(self) -> set[str]:
+        running = (running_stage.step.stage for running_stage in self._running.values())
+        return {stage.name for stage in (*self._waiting, *running)}
+
+    def _begin(self, step: Step) -> RunningStage:
         if step.damaged is not None:
             self.reporter.warn(f"{step.damaged} is {step.reason}; recomputing it")
         stage, inputs = step.stage, self.inputs(step.stage)
@@ -239,7 +243,7 @@ class Executor:
         why = [step.reason] if step.reason != NOT_THERE else []
         expected = step.found.provenance.took_s if isinstance(step.found, Stored) else None
         reporter = self.reporter.begin(stage.name, ", ".join(place + why), expected)
-        return Begun(step, task, reporter, time.perf_counter())
+        return RunningStage(step, task, reporter, time.perf_counter())
 
     def _finish(self, future: Future[Any] | None, answer: Content) -> None:
         """Store a stage's result (partial if the stage found no answer) and report that the stage has ended."""
@@ -250,7 +254,7 @@ class Executor:
         del self._running[future]
         self._settle(step, stored)
         reason = step.reason if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
-        done = replace(step, reason=reason, wall_s=time.perf_counter() - running_stage.started)
+        done = replace(step, reason=reason, found=None, wall_s=time.perf_counter() - running_stage.started)
         self.done.append(done)
         self._left = [stage_left for stage_left in self._left if stage_left != name]
         answered = [] if stored.complete else ["no answer"]

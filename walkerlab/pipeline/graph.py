@@ -181,6 +181,8 @@ class Graph:
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
         """Pickle the import path alone: stages hold functions that cannot be pickled."""
+        if not self.at:
+            raise TypeError("a graph needs `at`, its import path, to be sent to other processes")
         return registered, tuple(self.at.split(":"))
 
     def __getitem__(self, name: str) -> Stage:

@@ -139,6 +139,12 @@ def test_a_passive_gaits_cost_of_transport_is_the_slopes_sine(name):
     assert gait.work["gravity"] > gait.work["push_off"] == gait.work["hip"] == 0.0
 
 
+def test_a_value_without_a_walker_has_no_cost_of_transport():
+    walker = walker_of("paper")
+    step_map = RigidMap(lambda _: None, 1.0, walker)
+    assert step_map.cost_of_transport(np.array(find_gaits(walker).gait.z), 0.0) is None
+
+
 def test_kuos_walker_spends_half_the_square_of_its_push_off_over_its_mass():
     """Kuo (2002): the push-off comes before the strike, and legs without mass move the hip alone."""
     config = loader.load(Path("kuo")).config

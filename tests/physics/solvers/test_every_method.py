@@ -212,6 +212,11 @@ def test_a_budget_ends_the_run(name):
 
 
 @every_method
+def test_counts_are_integers_for_any_budget(name):
+    assert method_named(name).new(4, 1e-6, 1e-8, 1e4).counts.dtype == np.int64
+
+
+@every_method
 def test_dense_output_agrees_with_a_run_that_ends_there(name):
     rtol = 1e-8
     method, _ = driven(name, rtol, 0.05 * PERIOD)

@@ -394,8 +394,10 @@ class RigidMap(StepMap):
         )
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        walker = valid(self._unit_at(p)).walker
-        walk = take_walk(walker, EXACT_STEPS, state_on_section(walker, z), 1)
+        unit = self._unit_at(p)
+        if unit is None:
+            return None
+        walk = take_walk(unit.walker, EXACT_STEPS, state_on_section(unit.walker, z), 1)
         return float(walk.driven.cost_of_transport(walk.lengths_m[0])) if walk.steps else None
 
     def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:

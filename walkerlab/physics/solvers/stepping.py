@@ -58,7 +58,7 @@ def sample(method: Any, system: Any, fractions: Any, states: Any) -> None:
 
 
 def new_counts(budget: int) -> Integers:
-    return np.array([0, 0, 0, 0, budget])
+    return np.array([0, 0, 0, 0, budget], np.int64)
 
 
 @kernel_part
