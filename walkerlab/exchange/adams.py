@@ -16,12 +16,10 @@ def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
 
 def statements(model: AdamsModel) -> Iterator[str]:
     """Yield the lines of all statements; objects of each kind are numbered from 1, and part 1 is the ground."""
-    hinges, primitives = (
-        [name for name, joint in model.joints.items() if (joint.kind == "INLINE") == primitive]
-        for primitive in (False, True)
-    )
+    primitives = [name for name, joint in model.joints.items() if joint.kind == "INLINE"]
+    joints = [name for name in model.joints if name not in primitives]
     kinds = (
-        model.markers, [*model.shapes, *model.outlines], hinges, primitives, model.couplers, model.contacts,
+        model.markers, [*model.shapes, *model.outlines], joints, primitives, model.couplers, model.contacts,
         model.variables, model.forces, model.torques,
     )  # fmt: skip
     ids = {name: number for kind in kinds for number, name in enumerate(kind, start=1)}

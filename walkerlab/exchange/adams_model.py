@@ -177,7 +177,7 @@ def marker_at(part: str, point_m: Position, across_m: float = 0.0) -> Marker:
 def add_bodies(model: AdamsModel, export: Exported) -> None:
     """Add parts, markers, hinges, feet and couplers; a planar joint keeps the base in the plane of the walk."""
     planar, names = export.model, export.names
-    q, v = ([float(value) for value in values] for values in export.start)
+    q, v = ([float(x) for x in part] for part in export.start)
     frames: list[Frame] = []
     for k, (name, link) in enumerate(zip(names, planar.links, strict=True)):
         hinge = Frame((q[0], q[1]), q[2], (v[0], v[1]), v[2])

@@ -155,8 +155,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.nuisance)
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
-    known = enumerate(map(question.prior.get, question.keys))
-    priors = {place: pair for place, pair in known if pair is not None}
+    priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
     return FitProblem(forecast, subject.config.walker.leg_length_m, family.start, bounds, priors, question.loss)
 
 
@@ -289,7 +288,7 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
         return {}
     slopes, names = np.zeros((forecast.scales.size, centre.size)), GAIT_NAMES[: centre.size]
     for place, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
-        # the derivatives of the walk take the same step, so the walkers exist already
+        # for measured steps, the derivatives of the walk take the same step, so these walkers are cached
         slope = derivative(lambda share, unit=unit: quantities(share * unit), EXACT_STEP)  # type: ignore[misc]
         if slope is None:
             return {name: Uncertain(float(v), None) for name, v in zip(names, centre, strict=True)}

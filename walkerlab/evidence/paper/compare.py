@@ -129,7 +129,7 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
             "gait": {
                 "period_s": gait.get("period_s"),
                 "length_m": gait.get("step_length_m"),
-                **{key: gait[key] for key in ("knee_strike_s",) if key in gait},
+                **({"knee_strike_s": gait["knee_strike_s"]} if "knee_strike_s" in gait else {}),
             },
         },
         "outcomes": {"rigid": rigid["outcome"], "contact": contact["outcome"]},

@@ -12,14 +12,7 @@ from walkerlab.config.stability import Case
 from walkerlab.evidence.verification.catalogue import config_of
 from walkerlab.evidence.verification.ordinary import Choice, choices
 from walkerlab.evidence.verification.scaling import scaled, to_twin
-from walkerlab.evidence.verification.starts import (
-    ContactStart,
-    JudgedWalk,
-    RigidStart,
-    Start,
-    case_tolerances,
-    prepare_start,
-)
+from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, Start, case_tolerances, prepare_start
 from walkerlab.evidence.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS, Method, method_named
@@ -80,9 +73,7 @@ def judge(case: Case, config: Config) -> CaseResult:
     remarks: list[str] = []
     second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
     if walk.outcome.answered:
-        short = case
-        if isinstance(start, RigidStart):  # compares only the times of its steps, and no outcome
-            short = case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
+        short = start.again(case)
         second = second_walk(
             methods.method,
             case.budget,

@@ -33,7 +33,7 @@ QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
 # the same for sampled angles, which have kinks at heel strikes: parameters move these past samples
 SAMPLED_STEP: Final = 1e-5
-PREDICTIONS_AT_ONCE: Final = 16  # predictions kept: searches, derivatives and checks ask for the same walks
+KEPT_PREDICTIONS: Final = 16  # search, derivatives and checks ask for the same walks
 
 
 class WalkMap(Protocol):
@@ -134,8 +134,12 @@ class Forecast:
 
     @cached_property
     def _recent(self) -> Callable[[bytes, bytes], Prediction | None]:
-        recent = lru_cache(PREDICTIONS_AT_ONCE)
-        return recent(lambda u, heights_m: self._predict(np.frombuffer(u), np.frombuffer(heights_m)))
+        # arrays cannot be keys, so their bytes are
+        @lru_cache(KEPT_PREDICTIONS)
+        def predict(u: bytes, heights_m: bytes) -> Prediction | None:
+            return self._predict(np.frombuffer(u), np.frombuffer(heights_m))
+
+        return predict
 
     def _predict(self, u: Floats, heights_m: Floats) -> Prediction | None:
         p = self.parameters(u)
@@ -154,7 +158,7 @@ class Forecast:
         """Return derivatives for the unknowns, (values, unknowns), and for heights along `lifts`, (values, lifts).
 
         lifts  (heights, lifts) changes of the heights
-        exact  whether differences over parameters are of 4th order
+        exact  whether differences over parameters are of 4th order, one-sided where a walk on one side fails
         """
         # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
         prediction, starts = self.predict(u, heights_m), self.directions.shape[1]

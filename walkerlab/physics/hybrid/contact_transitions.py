@@ -116,14 +116,17 @@ def apply_event(
 def set_level(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, height: float, foot: int, level: float, y: Any
 ) -> None:
-    """Set the level (m) of the ground `height` (m) below a foot; the energy in the ground's spring is lost."""
+    """Change the ground under a foot to `level` (m); the energy in the ground's spring is lost.
+
+    height  of the foot above its present ground (m)
+    """
     if level == walk_state.level[foot]:
         return
-    height = height + walk_state.level[foot] - level
+    above = height + walk_state.level[foot] - level
     if not is_above(walk_state, foot):
         observe_edge(observer, system, foot, y)
     walk_state.level[foot] = level
-    walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if height > 0.0 else -1
+    walk_state.sides[foot * PER_FOOT + HEIGHT] = 1 if above > 0.0 else -1
     walk_state.at_zero[foot * PER_FOOT + HEIGHT] = 0
 
 

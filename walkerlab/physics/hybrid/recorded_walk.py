@@ -90,9 +90,17 @@ class RigidWalkResult(WalkRecord):
 
 
 def describe_pulls(min_force: float, min_impulse: float) -> list[str]:
-    """Describe a negative normal force (N) and a negative normal impulse in a strike (N s) of the ground."""
-    pulls = {f"{-min_force:.3g} N": min_force, f"{-min_impulse:.3g} N s in a strike": min_impulse}
-    return [f"the ground would have to pull with {pull}" for pull, least in pulls.items() if least < 0.0]
+    """Describe how the ground would have to pull; empty if it never would.
+
+    min_force    minimum normal force (N)
+    min_impulse  minimum normal impulse in a strike (N s)
+    """
+    pulls = []
+    if min_force < 0.0:
+        pulls.append(f"the ground would have to pull with {-min_force:.3g} N")
+    if min_impulse < 0.0:
+        pulls.append(f"the ground would have to pull with {-min_impulse:.3g} N s in a strike")
+    return pulls
 
 
 def as_state(values: Any) -> State:

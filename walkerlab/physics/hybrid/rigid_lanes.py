@@ -1,8 +1,9 @@
 """Walks of the rigid model in parallel lanes, each with its own step size; a lane whose walk ends takes the next start.
 
-All lanes take a Runge-Kutta step together. A lane whose step may contain a heel strike or a fall is then handled alone:
-the event is located on the quintic Hermite interpolant of its event function, the step is repeated up to the event, and
-a last Newton correction completes it. The result of a walk does not depend on the walks in other lanes.
+All lanes take a solver step of a Runge-Kutta method together. A lane whose solver step may contain a heel strike or a
+fall is then handled alone: the event is located on the quintic Hermite interpolant of its event function, the solver
+step is repeated up to the event, and a last Newton correction completes it. The result of a walk does not depend on the
+walks in other lanes.
 """
 
 import math
@@ -34,7 +35,7 @@ from walkerlab.physics.solvers.system import State
 
 # rows of a batch's memory, with one value per lane
 START_STATE, START_RATE, END_STATE, END_RATE = 0, 4, 8, 12  # state and derivative at the ends of the last attempt
-# s: next step, last attempted step, time, time left for a heel strike
+# s: next solver step, last attempted solver step, time, time left for a heel strike
 NEXT_STEP, TRIED_STEP, LANE_TIME, TIME_LEFT = range(16, 20)
 ARRIVALS, FIRST_TRY, TRIES, HAS_EVENT, STEP_BEFORE = range(20, 25)
 LANE_ROWS = 25
@@ -44,7 +45,7 @@ NOBODY = -1
 FIRST_LANE_STEP = 0.1  # pendulum times
 ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion bridges the time to a heel strike that is closer than this
 STRIKE_REFINEMENTS = 6
-MAX_TRIES = 20_000  # attempted steps in one swing
+MAX_TRIES = 20_000  # attempted solver steps in one swing
 MIN_LANE_STEP = 1e-13  # pendulum times
 TINY_ERROR = 1e-300
 
@@ -205,9 +206,10 @@ def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 
 @kernel_part
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
-    """Try a step in every lane and accept it where no event is possible; return whether some lane needs attention.
+    """Try a solver step in every lane, accept it where no event is possible; return whether a lane needs attention.
 
-    Attention is due if the step may contain an event or ends at one, time is over, or steps are too many or too small.
+    Attention is due if the solver step may contain an event or ends at one, time is over, or solver steps are too many
+    or too small.
     """
     rows = memory.rows
     y, k1 = load_state(rows, START_STATE), load_state(rows, START_RATE)
@@ -243,7 +245,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
 
 @kernel_part
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
-    """Compute a value that is positive where a step of h (s) from y to `end` may contain a heel strike or a fall."""
+    """Compute a value, positive where a solver step of h (s) from y to `end` may contain a heel strike or a fall."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
     start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
     guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
@@ -252,7 +254,10 @@ def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
 
 @kernel_part
 def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Handle the step of a lane that needs attention; returns GOES_ON, or the outcome's number if its walk is over."""
+    """Handle the solver step of a lane that needs attention.
+
+    Returns GOES_ON, or the outcome's number if the lane's walk is over.
+    """
     rows = memory.rows
     if rows[TRIES, lane] >= MAX_TRIES:
         return endings.BUDGET_EXHAUSTED
@@ -260,12 +265,12 @@ def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -
         return endings.SOLVER_FAILED
     if rows[ARRIVALS, lane] > 0.0:
         return arrive(walker, memory, observer, lane)
-    strike, fall = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
-    if fall < strike:
+    strike_at, fall_at = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
+    if fall_at < strike_at:
         return endings.FELL
-    if strike <= 1.0:
+    if strike_at <= 1.0:
         rows[ARRIVALS, lane], rows[STEP_BEFORE, lane] = 1.0, rows[NEXT_STEP, lane]
-        rows[NEXT_STEP, lane] = max(strike * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP * walker.pendulum_time)
+        rows[NEXT_STEP, lane] = max(strike_at * rows[TRIED_STEP, lane], 2.0 * MIN_LANE_STEP * walker.pendulum_time)
         return endings.GOES_ON
     if rows[TIME_LEFT, lane] <= rows[TRIED_STEP, lane]:
         return endings.NO_HEEL_STRIKE
@@ -285,7 +290,7 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Apply the heel strike if the step has reached it; otherwise set the next step to the remaining time."""
+    """Apply the heel strike if the solver step has reached it; otherwise set the next one to the remaining time."""
     rows, slots = memory.rows, memory.slots
     move_on(memory, lane)
     pendulum_time = walker.pendulum_time
@@ -319,7 +324,7 @@ def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
 
 @kernel_part
 def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) -> Jet:
-    """Compute swing * theta_1 + stance * theta_2 and its first two time derivatives at the start or end of a step."""
+    """Compute swing * theta_1 + stance * theta_2 and its first two time derivatives at an end of a solver step."""
     return (
         swing * rows[row, lane] + stance * rows[row + 1, lane],
         swing * rows[row + 2, lane] + stance * rows[row + 3, lane],
@@ -329,7 +334,7 @@ def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) 
 
 @kernel_part
 def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
-    """Interpolate swing * theta_1 + stance * theta_2 + constant over a lane's step by a quintic."""
+    """Interpolate swing * theta_1 + stance * theta_2 + constant over a lane's solver step by a quintic."""
     rows = memory.rows
     a = event_function(rows, START_STATE, lane, swing, stance)
     b = event_function(rows, END_STATE, lane, swing, stance)
@@ -338,21 +343,21 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
 
 @kernel_part
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Find the fraction of a lane's step at which the heel strikes with the swing leg ahead, or NO_CROSSING."""
+    """Find the fraction of a lane's solver step at which the heel strikes with the swing leg ahead, or NO_CROSSING."""
     guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
     at_start = memory.rows[FIRST_TRY, lane] > 0.0
-    strike = first_fall(memory.finder, guard, at_start, 0.0)
-    if strike > 1.0:
+    strike_at = first_fall(memory.finder, guard, at_start, 0.0)
+    if strike_at > 1.0:
         return NO_CROSSING
     ahead = in_step(memory, lane, 1.0, -1.0, 0.0)
-    while strike <= 1.0 and evaluate_quintic(ahead, strike) <= 0.0:
-        strike = first_fall(memory.finder, guard, at_start, strike + 1e-12)
-    return strike
+    while strike_at <= 1.0 and evaluate_quintic(ahead, strike_at) <= 0.0:
+        strike_at = first_fall(memory.finder, guard, at_start, strike_at + 1e-12)
+    return strike_at
 
 
 @kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Find the fraction of a lane's step at which the hip gets too low, or NO_CROSSING if the hip ends high enough."""
+    """Find the fraction of a lane's solver step at which the hip gets too low; NO_CROSSING if it ends high enough."""
     from_upright = walker.slope - walker.upright
     angle = memory.rows[END_STATE + 1, lane] + from_upright
     if abs(angle) <= walker.fallen:
