@@ -56,7 +56,7 @@ class Identify(Block):
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of all parameters that are estimated, fitted or known beforehand."""
+        """Keys of all parameters to estimate: fitted ones, and those with a prior."""
         return tuple(dict.fromkeys((*self.fit, *self.prior)))
 
     @property

@@ -17,7 +17,7 @@ Naming = Callable[[str], str]
 def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until_s: float | None = None) -> str:
     """Write the commands that build a model, with a header comment and a script that simulates it up to an end time.
 
-    pinned_until_s  time (s) at which to remove the hinge at the first stance foot; None if there is no hinge
+    pinned_until_s  time (s) at which to remove the pin at the first stance foot; None if there is no pin
     """
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
     lines += [line for each in (*building(model), script(model, end_s, pinned_until_s)) for line in each]

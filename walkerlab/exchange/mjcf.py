@@ -126,7 +126,7 @@ def walker_text(export: Exported, head: Iterable[str]) -> str:
             "MuJoCo's contact cannot be tuned to ground without friction.", "Set contact.friction=coulomb."
         )
     if export.pinned:
-        raise ConfigError("MJCF has no hinge that opens at the first touch.", "Set contact.stance=free.")
+        raise ConfigError("MJCF has no pin that opens at the first touch.", "Set contact.stance=free.")
     contact = contact_settings(target)
     links = tuple(replace(link, name=name) for link, name in zip(export.model.links, export.names, strict=True))
     model = replace(export.model, links=links)

@@ -34,7 +34,7 @@ def call_stage(
 ) -> Content:
     """Call the `run` of a stage's module with the optional arguments that it declares.
 
-    config   the config slice that it takes
+    config   slice of the config that the stage takes
     inputs   results of other stages, by name
     offered  optional arguments, by name:
                jobs        maximum number of processes for independent work units

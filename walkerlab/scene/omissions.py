@@ -42,7 +42,7 @@ def stance_omission(config: RigidConfig) -> Entry:
     if config.walker.type == "compass":
         return omission(
             "floating base, stance contact and foot radius of the rigid walk",
-            "its stance foot is a hinge, its feet are points",
+            "its stance foot is pinned, its feet are points",
             "4 of 8 equations, all contact code",
         )
     return omission(

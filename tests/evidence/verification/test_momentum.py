@@ -56,7 +56,7 @@ def test_a_ground_that_pushes_a_little_more_does_not_balance():
 
 def test_beside_a_hinge_that_pushes_too_it_is_not_measured():
     case = Case(name="x", expected=("walked",), reason="r", config={"contact": {"stance": "pinned"}})
-    assert momentum_finding(*prepared_for(case)) == NotMeasured(MEASURE, "the hinge transmits forces as well")
+    assert momentum_finding(*prepared_for(case)) == NotMeasured(MEASURE, "the pin transmits forces as well")
 
 
 def test_where_friction_hangs_on_slips_below_the_tolerance_it_is_not_measured():

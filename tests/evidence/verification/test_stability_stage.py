@@ -214,8 +214,8 @@ def test_own_pads_on_ground_without_pads_are_walked_as_contact_sim_walks_them():
 
 
 def test_what_could_not_be_measured_is_told_with_the_reason():
-    missed = replace(GOOD, not_measured=(NotMeasured("momentum", "the hinge transmits forces as well"),))
+    missed = replace(GOOD, not_measured=(NotMeasured("momentum", "the pin transmits forces as well"),))
     summary = summarise([missed], [], [])
-    assert summary["cases"][0]["not_measured"] == [{"measure": "momentum", "why": "the hinge transmits forces as well"}]
+    assert summary["cases"][0]["not_measured"] == [{"measure": "momentum", "why": "the pin transmits forces as well"}]
     table = next(block for block in report_of(summary).blocks if isinstance(block, Table))
-    assert "Not measured: momentum: the hinge transmits forces as well (good)." in table.note
+    assert "Not measured: momentum: the pin transmits forces as well (good)." in table.note

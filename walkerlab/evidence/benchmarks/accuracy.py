@@ -6,7 +6,7 @@ from typing import Any
 
 from walkerlab.config.reads import SceneConfig
 from walkerlab.config.walkers import is_passive_compass
-from walkerlab.evidence.benchmarks.conditions import environment, hinge_left_out, plain_power
+from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
 from walkerlab.evidence.benchmarks.ladder import (
     MAX_REPEATS,
     RUN_BUDGET,
@@ -46,7 +46,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     second_ends: list[End] = []
     ascents: list[Ascent] = []
     compass = is_passive_compass(config)
-    left_out = hinge_left_out(config, "methods") + (
+    left_out = pinning_left_out(config, "methods") + (
         [] if compass or config.contact is None else list(OMISSIONS_OFF_COMPASS)
     )
     for trial in trials_of_scene(config, inputs):

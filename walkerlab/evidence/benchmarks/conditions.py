@@ -7,11 +7,11 @@ from typing import Any
 from walkerlab.config.reads import ContactConfig
 
 
-def hinge_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]:
-    """Return an omission entry if the config hinges the first step, because measured walks have no hinge."""
+def pinning_left_out(config: ContactConfig, measured: str) -> list[dict[str, str]]:
+    """Return an omission entry if the config pins the first stance foot; measured walks start with both feet free."""
     if config.contact is None or config.contact.stance != "pinned":
         return []
-    return [{"what": "pinned first step", "why": f"{measured} are measured on a walk without a hinge"}]
+    return [{"what": "pinned first step", "why": f"{measured} are measured on a walk whose first stance foot is free"}]
 
 
 def environment() -> dict[str, Any]:

@@ -88,9 +88,9 @@ class TuneRun:
 
     names       names of the rigid start's coordinates
     steps       number of steps per walk
-    hinge       whether the first stance foot is pinned in one walk, as in the paper's procedure for its compass
-    walks       walks of the procedure: `hinged`, with a revolute joint at the first stance foot; `released`, without
-                it; and `adjusted`, from the adjusted start, if there is one
+    pins_foot   whether the first stance foot is pinned in one walk, as in the paper's procedure for its compass
+    walks       walks of the procedure: `hinged`, with the first stance foot pinned; `released`, with both feet free;
+                and `adjusted`, from the adjusted start, if there is one
     printed     summaries of these walks
     adjustment  smallest change of the velocities with which the contact model walks; None if it never walks
     """
@@ -100,7 +100,7 @@ class TuneRun:
         self.names, self.steps = state_names(config), 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: RigidModel = rigid_walker(config)
-        self.hinge = is_passive_compass(config)
+        self.pins_foot = is_passive_compass(config)
         self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
         self.printed: dict[str, dict[str, Any]] = {}
@@ -111,11 +111,11 @@ class TuneRun:
     def find(self, progress: Progress, jobs: int) -> None:
         """Run the procedure: its walks, the map, the adjusted start, its margins, and a walk from the paper's start."""
         settings = self.config.tune
-        cells = settings.cells or (COMPASS_CELLS if self.hinge else OTHER_CELLS)
+        cells = settings.cells or (COMPASS_CELLS if self.pins_foot else OTHER_CELLS)
         swing, stance = (np.linspace(*ends, cells) for ends in (settings.swing_factors, settings.stance_factors))
         progress.start("tune: procedure")
         self.rigid_walk = take_walk(self.rigid, RIGID_SETTINGS, self.rigid_state, self.steps, sampled=True)
-        if self.hinge:
+        if self.pins_foot:
             self.take("hinged", self.rigid_state)
         self.take("released", self.rigid_state)
         self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
@@ -128,7 +128,7 @@ class TuneRun:
         self.adjustment = self.adjusted(quick)
         if self.adjustment is not None:
             factors = self.adjustment.swing, self.adjustment.stance
-            self.margins = scaled_starts.margins(self.starts, factors, **({} if self.hinge else COARSE_MARGINS))
+            self.margins = scaled_starts.margins(self.starts, factors, **({} if self.pins_foot else COARSE_MARGINS))
             self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_own_walker(self.config):

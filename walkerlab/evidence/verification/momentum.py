@@ -48,7 +48,7 @@ class Balance:
 def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Measure | NotMeasured:
     """Measure the momentum balance of a case's walk, or state why it cannot be judged."""
     if scene.pinned:
-        return NotMeasured(MEASURE, "the hinge transmits forces as well")
+        return NotMeasured(MEASURE, "the pin transmits forces as well")
     balance = momentum_balance(config, scene, start, case)
     unknown = balance.unsure + balance.unresolved
     if unknown > MAX_UNKNOWN:

@@ -61,7 +61,7 @@ def choices(case: Case, config: WalksConfig) -> tuple[Choice, ...]:
     """Walk a case by every ordinary method.
 
     The result is empty for a walker other than a passive compass, for a case without a start or without motion, and for
-    ground that needs events (a hinge, or `after-mid-swing`).
+    ground that needs events (a pinned foot, or `after-mid-swing`).
     """
     # knees need an event to lock, and the script for rigid scenes covers only the walker of Appendix A
     if not is_passive_compass(config):

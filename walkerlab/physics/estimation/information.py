@@ -22,7 +22,8 @@ NOISE_DRAWS: Final = 200
 NOISE_LOG_STEP: Final = 0.05
 # largest distance below and above the most likely value, in the logarithm of a standard deviation
 FARTHEST_NOISE: Final = (3.0, 1.5)
-# a parameter is named if its component in an undetermined direction is at least this, or moves it beyond its error
+# a parameter is named if its component in an undetermined direction is at least this, or if the direction moves it by
+# more than its standard error
 LOADED: Final = 0.1
 
 
@@ -138,7 +139,7 @@ def reason_in_words(value: float, largest: float) -> str:
 
 
 def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
-    """Return the fraction of information along `basis` (directions, count) that is lost without each quantity."""
+    """Return the fraction of information along `basis` (directions, parameters) that is lost without each quantity."""
     count, quantities = basis.shape[1], fitted.forecast.quantities
     if not len(basis):
         return dict.fromkeys(quantities, 0.0)

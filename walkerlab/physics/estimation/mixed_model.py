@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from walkerlab.physics.solvers.system import Floats
 
 NOISE_STARTS: Final = tuple(product((1e-4, 1e-3, 1e-2, 0.1, 1.0), (1e-5, 1e-4, 1e-3, 1e-2)))
-"""Where the search may start: fractions of the measurement's noise before the search, and of the leg length."""
+"""Candidate starts of the search: factor on the measurement noise so far, roughness as a fraction of the leg length."""
 ROUGHNESS_BOUNDS: Final = (1e-8, 0.2)  # fractions of the leg length
 NEARLY_EVEN: Final = 1e-5  # fraction of the leg length; a smaller roughness may be no roughness
 NOISE_RATIO: Final = 1.0

@@ -136,10 +136,10 @@ def earlier(first: tuple[float, int], walk_state: WalkState, finder: CrossingFin
 @kernel_part
 def leaves_side(finder: CrossingFinder, event: int, side: int, zero_at_start: bool) -> float:
     """Find the fraction of the solver step at which an event function leaves its side of zero, or NO_CROSSING."""
-    # The result is 0 if the function starts on the other side: another event ended the step before beyond this zero
-    # or on it. If the function starts at zero, the direction of its change decides, unless that change is rounding: a
-    # foot just released from its hinge may still sink in. If the function is at zero because of its own event, its side
-    # has already changed, and the result is 0 only if the function is on the other side at all nodes.
+    # The result is 0 if the function starts on the other side: another event ended the previous solver step beyond this
+    # zero or on it. If the function starts at zero, the direction of its change decides, unless that change is
+    # rounding: a foot whose pin was just released may still sink in. If the function is at zero because of its own
+    # event, its side has already changed, and the result is 0 only if the function is on the other side at all nodes.
     value = finder.values[event, 0]
     at_zero = zero_at_start or abs(value) < ZERO_ROUNDING
     if side != NO_SIDE:

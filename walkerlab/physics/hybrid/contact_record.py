@@ -226,8 +226,8 @@ def add_work(system: OnGround, states: Any, rule: Quadrature, begin: float, span
 def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: int, span: float) -> tuple[float, float]:
     """Compute the energies (J) lost to damping and friction under a foot with ground."""
     # If the force law has released the foot, the damping loss is the energy that the ground's spring loses: quadrature
-    # would be inaccurate for powers of the penetration. Solver steps end at a release, so the foot
-    # stays released within one.
+    # would be inaccurate for powers of the penetration. Solver steps end at a release, so the foot stays released
+    # within one.
     damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])

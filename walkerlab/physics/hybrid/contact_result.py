@@ -251,7 +251,7 @@ def run_parts(
     if pinned:
         first = walk_on(walker, tolerances, walk_state, observer, start, pinned=True)
         y, spent = first.state, first.work
-        release_hinge(walker, walk_state, y)
+        release_pin(walker, walk_state, y)
         if first.outcome is not Outcome.WALKED:
             return first
         walk_state.progress.airborne_since = first.time_s
@@ -269,7 +269,7 @@ def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
     return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
 
 
-def release_hinge(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
+def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     """Update the walk state for the release of a pinned foot: it has not slipped or rolled, and is at the surface."""
     foot, steps = int(walker.forms[1, 0]["pinned"]), walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0

@@ -33,7 +33,7 @@ RADAU_WEIGHTS = np.array(
 class Tangent(NamedTuple):
     """Derivative Phi of the state, and workspace; n is the size of the free walker's state with all bodies."""
 
-    # If locked knees or a hinge reduce the state, only the first rows are used.
+    # If locked knees or a pinned foot reduce the state, only the first rows are used.
 
     Phi: Any  # (n, directions); no directions unless the tangent is requested
     stages: Any  # (4, n, n) Jacobians at the three stages, and one more for extrapolation

@@ -149,7 +149,7 @@ def vertex(before: float, middle: float, after: float) -> float:
 def ascend_to_worst(
     tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
-    """Record a measure's maximum near `middle` of the solver step, up to `last`, using ever narrower parabolas."""
+    """Record a measure's maximum near fraction `middle` of the solver step, up to `last`, by narrowing parabolas."""
     for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
         centre = assumptions_at(method, mode, middle)

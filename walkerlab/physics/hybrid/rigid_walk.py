@@ -135,7 +135,7 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
 
 @callable_kernel
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
-    """Find the fractions of a solver step at which heel strike, fall and knee strike occur, or NO_CROSSING."""
+    """Find the fractions of a solver step of heel strike (foot ahead), fall and knee strike, or NO_CROSSING."""
     for node in range(finder.nodes.size):
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise

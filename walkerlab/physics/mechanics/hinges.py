@@ -20,7 +20,7 @@ def legs_apart(system: Any, y: Any) -> tuple[float, float]:
 
 
 class HingeTorque(NamedTuple):
-    """Torque at a hinge, and its derivatives with respect to the angle by which the first body is ahead."""
+    """Torque at a hinge, and its derivatives for the angle by which the first body is ahead and for its rate."""
 
     resistance: float  # N m, turns the first body back and the second forward; the opposite of `SpringDamper.torque`
     elastic: float  # N m, the part that stores energy

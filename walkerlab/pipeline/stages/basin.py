@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -239,7 +239,7 @@ class RigidQuestion:
     edges_at_once: int = 1_000
     shared_from: int = 200_000  # minimum number of walks for which starting processes saves time
     tolerances: tuple[float, float] = (RTOL, ATOL)
-    pads = None  # its ground has none
+    pads: ClassVar[None] = None  # its ground has none
 
     @property
     def aperiodic(self) -> bool:
@@ -275,7 +275,7 @@ class ContactQuestion:
     cells_at_once: int = 100
     edges_at_once: int = 10
     shared_from: int = 500
-    aperiodic = False  # no attractor but its gait is looked for
+    aperiodic: ClassVar[bool] = False  # only its gait is considered as an attractor
 
     def attractor_rows(self) -> list[dict[str, Any]]:
         """Describe the attractor by the period and length of its step; empty if the model has no gait."""

@@ -188,7 +188,8 @@ class Request:
     def typed_for(self, command: str) -> str:
         """Return the options, each preceded by a space, with which a command works on this run.
 
-        This command repeats its own options, other stages get those settings that they read, and other commands all.
+        This command repeats its own options; other stages get only those that they read, as settings, and all other
+        commands get every one. Settings by --set go to every command.
         """
         from walkerlab.pipeline.graph import PIPELINE
 

@@ -50,7 +50,10 @@ def run(
 def draw(
     figure: Illustration, results: Mapping[str, Stored], folder: Path, name: str = ""
 ) -> dict[str, str | int | list[str]]:
-    """Draw a figure and store its files, called `name` or as the figure; return texts and paths in the run's folder."""
+    """Draw a figure and store its files under `name`, by default its own.
+
+    Returns its texts, and paths relative to the run's folder.
+    """
     drawing = figure.render(results)
     paths = paths_of(name or figure.name)
     write_atomically(folder / paths["svg"], drawing.svg)

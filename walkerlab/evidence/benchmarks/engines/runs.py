@@ -214,12 +214,12 @@ class TuningTask:
 
     @property
     def omega(self) -> float:
-        """Angular frequency (rad/s) of the undamped ball about rest, by the target."""
+        """Angular frequency (rad/s) of the undamped ball about rest, according to the target."""
         return math.sqrt(self.target.gravity / self.target.penetration)
 
     @property
     def settling_s(self) -> float:
-        """Eight times the slower time constant of the ball, by the target."""
+        """Eight times the slower time constant of the ball, according to the target."""
         ratio = self.target.damping_ratio
         slow = self.omega * (ratio - math.sqrt(ratio * ratio - 1.0)) if ratio > 1.0 else self.omega * ratio
         return 8.0 / slow

@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab import __version__
 from walkerlab.config.reads import SceneConfig
 from walkerlab.errors import NoAnswer
-from walkerlab.evidence.benchmarks.conditions import environment, hinge_left_out, plain_power
+from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
 from walkerlab.evidence.benchmarks.engines import experiments
 from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene
 from walkerlab.evidence.benchmarks.engines.process import OwnProcess, TaskLost
@@ -48,7 +48,7 @@ class EngineFindings:
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
     """Measure all installed engines, `jobs` at a time; raises NoAnswer if no engine or walk exists."""
     engines = installed()
-    findings = EngineFindings(left_out=[*missing_engines(), *hinge_left_out(config, "engines")])
+    findings = EngineFindings(left_out=[*missing_engines(), *pinning_left_out(config, "engines")])
     if not engines:
         raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
