@@ -72,9 +72,9 @@ def alternation_of(residuals: Floats) -> float:
 
 
 def phase_means(fitted: Fitted) -> Floats:
-    """Return the mean residual (phases, 2) of the angles at each phase of the step, the swing leg's first."""
+    """Return the angles' mean residual (phases, 2) at each phase over the most probable floor, swing leg first."""
     measured = fitted.forecast.measured
-    residuals = fitted.data.residuals[-measured.angles_rad.size :].reshape(-1, 2)
+    residuals = fitted.residuals[-measured.angles_rad.size :].reshape(-1, 2)
     swaps = measured.step % 2 == 1
     residuals = np.where(swaps[:, None], residuals[:, ::-1], residuals)
     bins = np.minimum((PHASE_BINS * measured.phase).astype(int), PHASE_BINS - 1)
