@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 Values = tuple[float, ...]
-CONFIGS_AT_ONCE: Final = 512
+KEPT_CONFIGS: Final = 512  # changed configs, and as many walkers of them
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
@@ -53,8 +53,8 @@ class ConfigFamily:
     def __init__(self, config: ContactConfig, keys: Sequence[str]) -> None:
         self.parameters = [parameter_of(key, config) for key in keys]
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
-        self.at = lru_cache(CONFIGS_AT_ONCE)(partial(config_with, config, self.parameters))
-        self.rigid_walker = lru_cache(CONFIGS_AT_ONCE)(self.over(rigid_walker))
+        self.at = lru_cache(KEPT_CONFIGS)(partial(config_with, config, self.parameters))
+        self.rigid_walker = lru_cache(KEPT_CONFIGS)(self.over(rigid_walker))
 
     def admits(self, values: Values) -> bool:
         return self.rigid_walker(values) is not None

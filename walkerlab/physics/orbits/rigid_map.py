@@ -62,7 +62,7 @@ EXACT_STEPS = Tolerances("dop853", 1e-13, 1e-13, 20_000)
 LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # tolerances for attractors
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
-METHODS_AT_ONCE = 4  # solver methods kept, one for each number of tangent columns
+KEPT_METHODS = 4  # one for each number of tangent columns
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
@@ -139,7 +139,7 @@ class RigidStepper(local):
         size, d = len(like.zero_state), int(like.coordinates)
         self.budget = tolerances.budget
         self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
-        self.with_columns = lru_cache(METHODS_AT_ONCE)(lambda columns: tolerances.new(size * (1 + columns)))
+        self.with_columns = lru_cache(KEPT_METHODS)(lambda columns: tolerances.new(size * (1 + columns)))
         finder = finder_for(self.plain, EVENTS, size)
         self.memory = Memory(
             varied,
