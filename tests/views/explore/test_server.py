@@ -247,9 +247,12 @@ def test_gaits_that_nobody_waits_for_any_more_are_dropped_and_their_worker_kept(
 
     ask(**{"continuation.model": "rigid"})
     [worker] = [file for file in workers_of(served.process.pid) if os.getpriority(0, int(file.parts[2])) > 0]
+    before = ticks_of(worker)
     first = threading.Thread(target=ask)
     first.start()
-    time.sleep(1)
+    end = time.monotonic() + 60
+    while ticks_of(worker) - before < SOME_TICKS and time.monotonic() < end:  # until the first question is worked on
+        time.sleep(0.05)
     ask(**{"continuation.model": "rigid"})
     first.join()
     assert sorted(answers) == [200, 200, 409]
@@ -346,6 +349,15 @@ def test_a_question_after_an_idle_worker_died_is_answered(tmp_path):
 def at_work_for(folder):
     """Commands that run for a folder of runs."""
     return [file for file in Path("/proc").glob("[0-9]*/cmdline") if f"{folder / 'runs'}\0--json" in text_of(file)]
+
+
+SOME_TICKS = 30  # of a processor's clock: about 0.3 s of computing
+
+
+def ticks_of(worker):
+    """The processor time of a worker, in ticks of the clock."""
+    fields = (worker.parent / "stat").read_text().rpartition(")")[2].split()
+    return int(fields[11]) + int(fields[12])
 
 
 def workers_of(process):
