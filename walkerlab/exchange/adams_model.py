@@ -153,7 +153,7 @@ def values(*numbers: float) -> str:
     return ", ".join(finite(number) for number in numbers)
 
 
-class Frame(NamedTuple):
+class MovingFrame(NamedTuple):
     """Motion of a frame that is fixed to a body, in SI units or in mm."""
 
     place: Position
@@ -161,12 +161,12 @@ class Frame(NamedTuple):
     velocity: Position
     spin: float
 
-    def moved_to(self, point: Position) -> Frame:
+    def moved_to(self, point: Position) -> MovingFrame:
         """Return the parallel frame at a point of this one."""
         s, c = math.sin(self.angle), math.cos(self.angle)
         x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]
         velocity = self.velocity[0] - self.spin * y, self.velocity[1] + self.spin * x
-        return Frame((self.place[0] + x, self.place[1] + y), self.angle, velocity, self.spin)
+        return MovingFrame((self.place[0] + x, self.place[1] + y), self.angle, velocity, self.spin)
 
 
 def marker_at(part: str, point_m: Position, across_m: float = 0.0) -> Marker:
@@ -178,9 +178,9 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
     """Add parts, markers, hinges, feet and couplers; a planar joint keeps the base in the plane of the walk."""
     planar, names = export.model, export.names
     q, v = ([float(x) for x in part] for part in export.start)
-    frames: list[Frame] = []
+    frames: list[MovingFrame] = []
     for k, (name, link) in enumerate(zip(names, planar.links, strict=True)):
-        hinge = Frame((q[0], q[1]), q[2], (v[0], v[1]), v[2])
+        hinge = MovingFrame((q[0], q[1]), q[2], (v[0], v[1]), v[2])
         if link.parent >= 0:
             held = frames[link.parent].moved_to(link.parent_point_m)
             hinge = held._replace(angle=held.angle + q[2 + k], spin=held.spin + v[2 + k])
@@ -213,7 +213,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
     if export.pinned:
         foot_on_ground = FootTerms(export, STANCE_FOOT)
         part, (x, y, _) = model.parts[foot_on_ground.part], model.markers[foot_on_ground.marker].place
-        place = Frame(part.place, part.angle, part.velocity, part.spin).moved_to((x, y)).place
+        place = MovingFrame(part.place, part.angle, part.velocity, part.spin).moved_to((x, y)).place
         model.markers[f"{GROUND}.pin"] = Marker(GROUND, (*place, 0.0))
         model.joints["pin"] = Joint("INLINE", foot_on_ground.marker, f"{GROUND}.pin")
 
