@@ -31,7 +31,7 @@ START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
-# the same for sampled angles, which have kinks at heel strikes: parameters move these past samples
+# the same for sampled angles, which have kinks at heel strikes: a larger step would move these past samples
 SAMPLED_STEP: Final = 1e-5
 KEPT_PREDICTIONS: Final = 16  # search, derivatives and checks ask for the same walks
 
