@@ -11,13 +11,14 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numba
-from numba import types
 
 from walkerlab.physics.kernel_cache import PACKAGE, cache_folder, lock_of, watchers
 
+REWRITING_PASSES = ("InlineClosureLikes", "InlineOverloads", "NopythonRewrites")
 compiling: list[tuple["KernelCache", str]] = []
 """Kernels that this process is compiling, with their signatures; each is called by the one before it."""
 absent: list[str] = []
@@ -199,12 +200,25 @@ class QuickFlags(Flags):  # type: ignore[misc, valid-type]
         return hash(frozenset(self._values))
 
 
+def needed_passes(pipelines: list[Any], code: CodeType) -> list[Any]:
+    """Remove passes that rewrite functions inside a function and array expressions, if `code` holds no functions."""
+    # They take a twentieth of the compile time. Array expressions need memory, which kernels cannot allocate.
+    if not any(isinstance(constant, CodeType) for constant in code.co_consts):
+        for pipeline in pipelines:
+            pipeline.passes = [each for each in pipeline.passes if each[0].__name__ not in REWRITING_PASSES]
+            pipeline.finalize()
+    return pipelines
+
+
 class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
     """Numba's compiler without vectorised loops; if compilation fails, it releases the kernel's lock."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.state.flags = QuickFlags(self.state.flags)
+
+    def define_pipelines(self) -> list[Any]:
+        return needed_passes(super().define_pipelines(), self.state.func_id.code)
 
     def compile_extra(self, func: Any) -> Any:
         vectorize = numba.config.LOOP_VECTORIZE
@@ -237,15 +251,15 @@ class _Refreshed(_Standin):
         """Do nothing."""
 
 
-class _NumberTyping(_Refreshed):
-    """Typing context that resolves each operator and function of numbers only once."""
+class _ResolvedOnce(_Refreshed):
+    """Typing context that resolves each operator and function only once for the same types of arguments."""
 
     # Numba itself tries all overloads, even those for arrays, sets and strings, at every call.
 
     signatures: dict[Any, Any] = {}  # noqa: RUF012 - shared by all parts
 
     def resolve_function_type(self, function: Any, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
-        if keywords or not all(isinstance(argument, types.Number) for argument in arguments):
+        if keywords:
             return self._original.resolve_function_type(function, arguments, keywords)
         if (function, arguments) not in self.signatures:
             resolved = self._original.resolve_function_type(function, arguments, keywords)
@@ -289,13 +303,13 @@ class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
     def __init__(self, typing: Any, target: Any, *rest: Any) -> None:
         """Reuse the contexts that the kernel's compiler has refreshed."""
         super().__init__(_Refreshed(typing), _Refreshed(target), *rest)
-        self.state.typingctx, self.state.flags = _NumberTyping(typing), QuickFlags(self.state.flags)
+        self.state.typingctx, self.state.flags = _ResolvedOnce(typing), QuickFlags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
         if state.library is None:
             state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        return needed_passes([DefaultPassBuilder.define_nopython_pipeline(state)], state.func_id.code)
 
 
 def cached_plainly(function: Callable[..., Any], flags: dict[str, Any]) -> Any:
