@@ -23,10 +23,11 @@ from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import align_start, validate_tree
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.found_config import run_and_write
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.pipeline.results import MemoryResults
-from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.runner import Options
 from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
@@ -197,7 +198,7 @@ def run(
     _check_stage(stage)
     resolved = resolve(str(config), set_options(set), strides, _folder_of(runs), name)
     warn(resolved.loaded.warnings)
-    report = execute(resolved.loaded.config, stage, resolved.folder, Options(force=force, jobs=jobs))
+    report = run_and_write(resolved, stage, Options(force=force, jobs=jobs))
     content = artifact.read(report.artifact) if report.artifact is not None else Content()
     return _result_of(stage, report.as_json(), content, report.no_answer, report.artifact)
 

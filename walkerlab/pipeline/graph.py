@@ -98,6 +98,7 @@ class Stage:
     precompile: str = ""
     # the only command that runs the stage (its own or `STAGE --full`); empty if any command that needs it runs it
     only_by: str = ""
+    finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
     takes_of_scene: type | None = None  # replaces `takes` for a walker that belongs to no study
@@ -308,7 +309,7 @@ PIPELINE = Graph(
     Stage(
         "design", "walkerlab.pipeline.stages.design",
         "Optimise walker parameters within bounds.",
-        reads.DesignConfig, results_of("fixedpoint"), only_by="design",
+        reads.DesignConfig, results_of("fixedpoint"), only_by="design", finds="optimum",
         options=(
             Option("--minimise", "design.minimise", "QUANTITY", "Gait quantity to minimise."),
             Option("--maximise", "design.maximise", "QUANTITY", "Gait quantity to maximise."),
@@ -320,7 +321,7 @@ PIPELINE = Graph(
     Stage(
         "identify", "walkerlab.pipeline.stages.identify",
         "Estimate parameters of the walker from a measured walk, with error bars.",
-        reads.IdentifyConfig, results_of("fixedpoint"), only_by="identify",
+        reads.IdentifyConfig, results_of("fixedpoint"), only_by="identify", finds="identified",
         files=later("walkerlab.pipeline.stages.measured_walk", "digests"),
         options=(
             Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time."),

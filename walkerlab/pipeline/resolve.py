@@ -5,7 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkerlab.config.files import BUILTIN_FOLDER, DEFAULT, ConfigFile, builtin_config, builtin_names, find_config
+from walkerlab.config.files import (
+    BUILTIN_FOLDER,
+    DEFAULT,
+    ConfigFile,
+    builtin_config,
+    builtin_names,
+    config_to_extend,
+    find_config,
+)
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.problems import problem_error
 from walkerlab.config.walkers import PartsWalker
@@ -24,6 +32,7 @@ class ResolvedRun:
 
     loaded: LoadedConfig
     folder: RunFolder
+    extends: str  # config that a new one, written from this run's results, extends: a file or a built-in name
 
 
 def resolve(
@@ -55,7 +64,7 @@ def resolve(
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
-    return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes))
+    return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), config_to_extend(text))
 
 
 def refuse_what_makes_no_walker(read: LoadedConfig) -> None:

@@ -61,6 +61,7 @@ class ValueSpan:
 class BranchEnd:
     value: float
     reason: str
+    closes: bool = False  # whether the branch closes on the gait of half its period
 
 
 @dataclass(frozen=True)
@@ -116,8 +117,7 @@ class GaitBranch:
     def closes_on(self, flip: Bifurcation) -> list[bool]:
         reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
         near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
-        closing = (flip.kind == "flip" and end.reason.startswith("closes") for end in self.ends)
-        return [closes and is_near for closes, is_near in zip(closing, near, strict=True)]
+        return [flip.kind == "flip" and end.closes and is_near for end, is_near in zip(self.ends, near, strict=True)]
 
     @property
     def flipped_outside(self) -> bool:
@@ -236,7 +236,8 @@ class BranchFollower:
             if passes_through(Segment(equations, last, solved, self.control.tolerance), start, self.control.turn):
                 end, solved = BranchEnd(points[0].value, CLOSED_LOOP), start
             if period % 2 == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
-                end = BranchEnd(points[-1].value, f"closes on the gait of {period // 2} {steps_word(period // 2)}")
+                half = period // 2
+                end = BranchEnd(points[-1].value, f"closes on the gait of {half} {steps_word(half)}", closes=True)
                 break
             segment = Segment(equations, last, solved, self.control.tolerance)
             located = (locate_bifurcation(segment, kind, equations.scale) for kind in BIFURCATION_KINDS)

@@ -1,22 +1,14 @@
 """A stage's command: run the stage or show what would be computed, then print the result."""
 
-import os
 import shlex
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
-from walkerlab.config.files import builtin_names, config_to_extend
-from walkerlab.config.layers import parse_setting
-from walkerlab.config.loader import load
 from walkerlab.config.walkers import why_rigid_alone
-from walkerlab.config.writer import to_extending_yaml
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.executor import short_reason
+from walkerlab.pipeline.found_config import run_and_write
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
-from walkerlab.pipeline.runner import Options, StageReport, execute
-from walkerlab.pipeline.store.files import write_numbered
+from walkerlab.pipeline.runner import Options, StageReport
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 from walkerlab.views.report.answers import answer, verdict
@@ -24,13 +16,14 @@ from walkerlab.views.report.tables import aligned
 
 SEARCHING = ("fixedpoint", "report")
 """Stages whose advice suggests nearby gaits if the config has none."""
-WRITES_CONFIG = {"design": "optimum", "identify": "identified"}
-"""Stages that write a config, with the config's name."""
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its result; typer.Exit(4) if there is no answer. See `execute` for errors."""
+    """Run a stage as requested and print its result; typer.Exit(4) if there is no answer.
+
+    Raises the other errors of `run_and_write`.
+    """
     try:
         report_on(request, stage, graph)
     except ConfigError as error:
@@ -40,14 +33,11 @@ def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
 def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     """Run a stage as requested and print its result; a ConfigError does not give the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
-    config, folder = request.resolved, request.folder
-    report = execute(config, stage.name, folder, options, None if options.dry else request.console, graph)
+    report = run_and_write(request.resolved_run, stage.name, options, None if options.dry else request.console, graph)
     if options.dry:
         print_result(request, report.as_json() | {"dry_run": True}, plan_lines(report))
         return
     report = with_nearby_gaits(report, request)
-    if stage.name in WRITES_CONFIG and report.no_answer is None:
-        report.summary["config"] = str(write_config(request, report, WRITES_CONFIG[stage.name]))
     lines = report_lines(request, report)
     if request.open_page and "html" in report.summary and not request.console.shown:
         request.console.show(report.run_dir / str(report.summary["html"]))
@@ -65,24 +55,6 @@ def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
     typed = request.typed_for("fixedpoint")
     suggestions = suggest_gaits(request.resolved, typed)
     return replace(report, no_answer=NoAnswer(error.message, f"{suggestions} {error.advice}".strip()))
-
-
-def values_of(summary: Mapping[str, Any]) -> dict[str, float]:
-    if "best" in summary:
-        return dict(summary["best"])
-    return {estimate["key"]: estimate["value"] for estimate in summary["estimates"]}
-
-
-def write_config(request: Request, report: StageReport, name: str) -> Path:
-    """Write a config that extends the request's by the parameters that a stage found; StorageError if writing fails."""
-    found = values_of(report.summary)
-    start = config_to_extend(request.config)
-    base = load(Path(start)).config
-    typed = start if start in builtin_names() else os.path.relpath(start, report.run_dir)
-    settings = [parse_setting(f"{key}={value!r}") for key, value in found.items()]
-    changed = request.loaded.variant(settings).model_copy(update={report.stage: getattr(base, report.stage)})
-    text = to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
-    return write_numbered(report.run_dir / f"{name}.yaml", text)
 
 
 def report_lines(request: Request, report: StageReport) -> list[str]:
