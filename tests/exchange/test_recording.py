@@ -93,6 +93,14 @@ def test_the_unit_of_one_component_of_results_holds_for_it_alone(tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
 
+@pytest.mark.parametrize("names", ["T,time", "T,t", "T,sensor.time", "time,t", "t,sensor.time"])
+def test_a_column_whose_name_may_be_a_temperature_is_the_time_only_if_no_other_can_be(names, tmp_path):
+    first, second = ([20.0, 20.0], [0.0, 1.0]) if names.startswith("T,") else ([0.0, 1.0], [20.0, 20.0])
+    rows = "\n".join(f"{x},{y}" for x, y in zip(first, second, strict=True))
+    recording = read_recording(written(tmp_path, "walk.csv", f"{names}\n{rows}\n"))
+    assert recording.columns["time"].tolist() == [0.0, 1.0]
+
+
 def test_a_table_in_degrees_says_so_in_its_header(tmp_path):
     walk = as_walk(read_recording(written(tmp_path, "walk.mot", MOT)), {}, {})
     assert walk.both_legs("angle") == pytest.approx(np.radians(ANGLES), abs=1e-12)

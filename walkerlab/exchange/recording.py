@@ -27,6 +27,8 @@ from walkerlab.errors import ConfigError
 Array = NDArray[np.float64]
 
 TIME: Final = "time"
+TIME_NAMES = [re.compile(pattern) for pattern in ("(?i:time)", "t", r"(?i:.*[.\s_]time)", "T")]
+"""Names of a file's time column; T comes last, because it may be a temperature."""
 UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
@@ -233,10 +235,9 @@ def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: 
 
 
 def as_time_column(recording: Recording) -> Recording:
-    """Rename the time column to `time`; its name is time or t, or ends in the word time."""
+    """Rename the time column to `time`: the first whose name matches the first of TIME_NAMES that any name matches."""
     columns = recording.columns
-    name = next((name for name in columns if name.lower() in ("time", "t")), None)
-    name = name or next((name for name in columns if re.search(r"(^|[.\s_])time$", name, re.IGNORECASE)), None)
+    name = next((name for pattern in TIME_NAMES for name in columns if pattern.fullmatch(name)), None)
     if name is None or name == TIME:
         return recording
     renamed = {TIME if key == name else key: values for key, values in columns.items()}

@@ -57,6 +57,7 @@ Compiler = private_class("numba.core.compiler.Compiler", "compile_extra")
 CompilerBase = private_class("numba.core.compiler.CompilerBase", "define_pipelines")
 Flags = private_class("numba.core.compiler.Flags", "_values")
 DefaultPassBuilder = private_class("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
+private_class("numba.core.compiler_machinery.PassManager", "finalize")
 Record = private_class("numba.core.types.npytypes.Record", "mangling_args")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from walkerlab.labels import axis_label, unit_by_name, with_unit
+from walkerlab.labels import axis_label, unit_by_name
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, entry, label_of, panels
@@ -133,8 +133,10 @@ def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str
     parts = []
     for row, size in zip(rows, sizes, strict=True):
         if abs(size) >= LEADING * abs(largest):
-            amount = f"{100.0 * abs(size):.2g} %" if row["value"] else with_unit(f"{abs(size):.2g}", row["unit"])
-            parts.append(f"{axis_label(row['key'])} {'+' if size * largest > 0.0 else '−'} {amount}")
+            amount, unit = (100.0 * abs(size), "%") if row["value"] else (abs(size), row["unit"])
+            text = np.format_float_positional(amount, 2, fractional=False, trim="-")
+            sign = "+" if size * largest > 0.0 else "−"
+            parts.append(f"{axis_label(row['key'])} {sign} {text} {'' if unit == '1' else unit}".rstrip())
     return ", ".join(parts)
 
 
