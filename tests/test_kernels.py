@@ -1,5 +1,6 @@
 """What compiled functions may do, and what they may not."""
 
+import gc
 import importlib.util
 import os
 import subprocess
@@ -68,8 +69,10 @@ def allocating(n):
 
 def test_memory_comes_with_the_arguments():
     """Code that allocates would count references, which takes as long as its arithmetic."""
+    thresholds = gc.get_threshold()
     with pytest.raises(TypingError):
         allocating(3)
+    assert gc.get_threshold() == thresholds
     assert not compiling
     assert uncompiled(allocating)(3) == 0.0
 
