@@ -5,6 +5,7 @@ The rules are in CONTRIBUTING.md.
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,6 @@ PROJECT = Path(__file__).parents[1]
 """The checkout. The package may be installed elsewhere, without the docs beside it."""
 PACKAGE = Path(walkerlab.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCES}
 PARTICIPLES = {
     "asked", "begun", "counted", "drawn", "found", "held", "kept", "made", "meant", "met", "said", "shown", "sought",
     "spoken", "taken", "told", "walked", "wanted",
@@ -28,6 +28,11 @@ FRAGMENT = re.compile(
 REFERENCE = re.compile(r"`([a-z_]+(?:\.[A-Za-z_]+)+)`|\b((?:[a-z_]+/)*[a-z_]+\.(?:pyi?|md))\b")
 LIBRARIES = {"scipy", "numpy", "matplotlib", "mujoco", "numba"}
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+@cache
+def tree_of(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def named(path):
@@ -47,7 +52,7 @@ def assigned_names(tree):
 
 @pytest.mark.parametrize("path", SOURCES, ids=named)
 def test_functions_are_verbs_or_name_what_they_return(path):
-    functions = [node for node in ast.walk(TREES[path]) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    functions = [node for node in ast.walk(tree_of(path)) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
     names = [(node.lineno, node.name.strip("_")) for node in functions]
     assert [(line, name) for line, name in names if name.split("_")[0] in PARTICIPLES] == []
     assert [(line, name) for line, name in names if name.startswith("of_")] == []
@@ -55,7 +60,7 @@ def test_functions_are_verbs_or_name_what_they_return(path):
 
 @pytest.mark.parametrize("path", SOURCES, ids=named)
 def test_docstrings_begin_with_a_verb_or_the_thing(path):
-    documented = [node for node in ast.walk(TREES[path]) if isinstance(node, DOCUMENTED)]
+    documented = [node for node in ast.walk(tree_of(path)) if isinstance(node, DOCUMENTED)]
     texts = [(getattr(node, "lineno", 1), ast.get_docstring(node) or "") for node in documented]
     assert [(line, text.split("\n")[0]) for line, text in texts if FRAGMENT.match(text)] == []
 
@@ -63,11 +68,12 @@ def test_docstrings_begin_with_a_verb_or_the_thing(path):
 def test_references_lead_somewhere():
     """Files named in docstrings and comments exist, and dotted names in backticks are names of the package."""
     files = {path.name for path in PROJECT.rglob("*.*") if ".git" not in path.parts}
-    words = {name for tree in TREES.values() for name, _ in assigned_names(tree)} | {path.stem for path in SOURCES}
+    trees = {path: tree_of(path) for path in SOURCES}
+    words = {name for tree in trees.values() for name, _ in assigned_names(tree)} | {path.stem for path in SOURCES}
     words |= {path.name for path in PACKAGE.rglob("*") if path.is_dir()} | {"walkerlab"}
-    words |= {node.attr for tree in TREES.values() for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    words |= {node.attr for tree in trees.values() for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
     lost = []
-    for path, tree in TREES.items():
+    for path, tree in trees.items():
         for node in ast.walk(tree):
             text = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
             for dotted, file in REFERENCE.findall(text or ""):

@@ -4,6 +4,7 @@ The variations change the ground, the slope, the start, the knees or the solver'
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -31,6 +32,7 @@ CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_EN
 B = TypeVar("B", bound=Block)
 
 
+@cache
 def package_cases() -> tuple[Case, ...]:
     families = read_catalogue(CATALOGUE).items()
     return check_unique_names(
