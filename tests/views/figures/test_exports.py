@@ -1,6 +1,7 @@
 """What leaves a run for use elsewhere: figures, tables, trajectories, films."""
 
 import csv
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,24 +29,29 @@ from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Film, Target, export_from, walk_in, write_film
 from walkerlab.views.figures import illustration
 from walkerlab.views.figures import stage as plot
+from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.figures.style import WIDTH
 from walkerlab.views.report.tex import in_tex
 
 QUIET = Console(quiet=True)
 
 
-@pytest.fixture
-def run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    folder = tmp_path / "runs" / "paper"
-    folder.mkdir(parents=True)
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("paper")
     for name, result in both_models().items():
         extra = {"table3": {"t_left": {"unit": "s", "corrected": 0.7}}} if name == "compare" else {}
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
-    made = RunFolder.at(folder)
-    made.write_record(Record("paper", "", to_yaml(load().config)))  # without, all results are read to know the config
-    return made
+    # without, all results are read to know the config
+    RunFolder.at(folder).write_record(Record("paper", "", to_yaml(load().config)))
+    return folder
+
+
+@pytest.fixture
+def run(original, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return RunFolder.at(shutil.copytree(original, tmp_path / "runs" / "paper"))
 
 
 @pytest.mark.parametrize(
@@ -53,45 +59,51 @@ def run(tmp_path, monkeypatch):
     [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG"), ("eps", b"%!PS-Adobe"), ("tiff", b"II")],
 )
 def test_a_figure_in_every_format(run, kind, start):
-    path = export_from(run, "figure-07", Target(kind, None), 516.0, "", QUIET)
-    assert path.name == f"paper-figure-07.{kind}"
+    path = export_from(run, "figure-09", Target(kind, None), 516.0, "", QUIET)
+    assert path.name == f"paper-figure-09.{kind}"
     assert path.read_bytes().startswith(start)
 
 
-def test_every_figure_is_the_pages_in_another_size(run, monkeypatch):
+READERS_OF_RESULTS = {
+    "figure-07", "figure-08", "figure-09", "figure-10", "figure-13", "accuracy-rigid", "stability-step",
+}  # fmt: skip
+"""Figures of every stage, and those that draw whatever results there are."""
+
+
+def test_a_figure_is_the_pages_in_another_size(run, monkeypatch):
     monkeypatch.setattr(illustration, "POINT", 1.0)
+    monkeypatch.setattr(plot, "FIGURES", [figure for figure in FIGURES if figure.name in READERS_OF_RESULTS])
     results = {**everything(), **families()}
     for name, result in results.items():
         write(run.artifact(name), Content(result.groups, result.summary), result.identity, begin(load().config, {}))
     drawn = plot.run(only(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
-    names = [Path(entry["svg"]).stem for entry in drawn]
-    assert {"figure-07", "figure-09", "figure-10", "figure-13", "stability-step"} <= set(names)
-    for name in names:
+    assert {Path(entry["svg"]).stem for entry in drawn} == READERS_OF_RESULTS
+    for name in READERS_OF_RESULTS:
         path = export_from(run, name, Target("svg", None), WIDTH, "", QUIET)
         assert path.read_bytes() == (run.path / "figures" / f"{name}.svg").read_bytes(), name
 
 
 def test_a_figure_of_outdated_results_says_so(run, capsys):
-    export_from(run, "figure-07", Target("svg", None), 516.0, "", Console())
+    export_from(run, "figure-09", Target("svg", None), 516.0, "", Console())
     assert "outdated results, which are drawn anyway: compare, contact-sim and simulate;" in capsys.readouterr().err
 
 
 def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
     for points in (252.0, 300.0):
         file = Target("png", tmp_path / f"{points}.png")
-        with Image.open(export_from(run, "figure-07", file, points, "", QUIET)) as image:
+        with Image.open(export_from(run, "figure-09", file, points, "", QUIET)) as image:
             assert image.size[0] == pytest.approx(points / 72.0 * 300.0, abs=1.0)
 
 
 @pytest.mark.parametrize("kind", ["png", "tiff"])
 def test_pixels_are_as_many_an_inch_as_are_asked_for(run, kind):
-    with Image.open(export_from(run, "figure-07", Target(kind, None), 252.0, "", QUIET, dpi=600)) as image:
+    with Image.open(export_from(run, "figure-09", Target(kind, None), 252.0, "", QUIET, dpi=600)) as image:
         assert image.size[0] == pytest.approx(3.5 * 600.0, abs=1.0)
         assert image.info["dpi"] == pytest.approx((600.0, 600.0), abs=0.1)
 
 
 def test_fonts_of_a_pdf_are_embedded_as_truetype(run):
-    data = export_from(run, "figure-07", Target("pdf", None), 252.0, "", QUIET).read_bytes()
+    data = export_from(run, "figure-09", Target("pdf", None), 252.0, "", QUIET).read_bytes()
     assert b"/Type3" not in data.replace(b" ", b"")
     assert b"/FontFile2" in data.replace(b" ", b"")
 
@@ -101,11 +113,11 @@ def test_format_and_file_mean_the_same_everywhere(run, tmp_path):
         "paper-simulate-trajectory.csv"
     )
     for target in (Target("svg", tmp_path / "mine"), Target(None, tmp_path / "mine.svg")):
-        path = export_from(run, "figure-07", target, 252.0, "", QUIET)
+        path = export_from(run, "figure-09", target, 252.0, "", QUIET)
         assert path == target.output
         assert path.read_bytes().startswith(b"<?xml")
     with pytest.raises(ConfigError, match="contradicts the ending"):
-        export_from(run, "figure-07", Target("pdf", tmp_path / "mine.svg"), 252.0, "", QUIET)
+        export_from(run, "figure-09", Target("pdf", tmp_path / "mine.svg"), 252.0, "", QUIET)
     film = write_film(run, Target("gif", None), Film("simulate", 1, 5, 1.0), QUIET)
     assert film.name == "paper-simulate.gif"
 
@@ -145,15 +157,15 @@ def test_a_table_for_latex_guards_its_letters(run):
     assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
 
 
-@pytest.mark.parametrize("name", ["7", "07", "figure-7", "fig 7"])
+@pytest.mark.parametrize("name", ["9", "09", "figure-9", "fig 9"])
 def test_a_figure_is_known_by_its_number(run, name):
-    assert export_from(run, name, Target("svg", None), 516.0, "", QUIET).name == "paper-figure-07.svg"
+    assert export_from(run, name, Target("svg", None), 516.0, "", QUIET).name == "paper-figure-09.svg"
 
 
 def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
     with pytest.raises(ConfigError) as refused:
         export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
-    assert "figure-07" in refused.value.advice
+    assert "figure-09" in refused.value.advice
     assert refused.value.advice.endswith("\n  table-3\n  omitted-results\n  steps\n  trajectory")
     assert "figure-13" not in refused.value.advice
 
