@@ -64,9 +64,7 @@ def test_a_figure_in_every_format(run, kind, start):
     assert path.read_bytes().startswith(start)
 
 
-READERS_OF_RESULTS = {
-    "figure-07", "figure-08", "figure-09", "figure-10", "figure-13", "accuracy-rigid", "stability-step",
-}  # fmt: skip
+READERS_OF_RESULTS = {"figure-08", "figure-09", "figure-10", "figure-13", "accuracy-rigid", "stability-step"}
 """Figures of every stage, and those that draw whatever results there are."""
 
 
