@@ -1,11 +1,12 @@
 """What stages store of a small run of the paper's walker: the results that other tests' results derive from."""
 
 import functools
+from dataclasses import replace
 
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.physics.orbits import two_parameters
+from walkerlab.physics.orbits import family_search, two_parameters
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.store.content import Group, Variable
@@ -17,9 +18,9 @@ SMALL = {
     "compare": (),
     "tune": ("tune.cells=3", "tune.rigid_limit=false"),
     "continuation": (
-        "continuation.over=slope_deg", "continuation.from=4.3", "continuation.to=5.05", "continuation.periods=2",
+        "continuation.over=slope_deg", "continuation.from=4.3", "continuation.to=4.8", "continuation.periods=2",
         "continuation.points=10", "continuation.model=rigid",
-        "continuation.second={over: walker.hip_mass_kg, from: 9.5, to: 10.5}",
+        "continuation.second={over: walker.hip_mass_kg, from: 9.9, to: 10.1}",
     ),
 }  # fmt: skip
 MEMORY = MemoryResults()
@@ -31,6 +32,10 @@ def real(stage):
     config = load(None, ["strides=2", *SMALL[stage]]).config
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(two_parameters, "PLANE_CELLS", (3, 2))
+        patch.setattr(family_search, "OTHER_GAIT_VALUES", 2)
+        patch.setattr(family_search, "SCATTERED", 4)
+        few = replace(family_search.THOROUGHNESS["rigid"], values=24, transient=200, exponents=2, averaged=200)
+        patch.setitem(family_search.THOROUGHNESS, "rigid", few)
         return answer_in_memory(config, stage, MEMORY)
 
 

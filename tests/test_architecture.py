@@ -1,6 +1,7 @@
 """Walls between the parts of the package: imports run downward, kernels stay at home, configs have one source."""
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -72,7 +73,12 @@ def named(path):
 IN_LAYERS = [path for path in SOURCES if named(path) not in DOORS]
 
 
+@functools.cache
 def imported_modules(path):
+    return tuple(modules_in(path))
+
+
+def modules_in(path):
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
