@@ -45,6 +45,9 @@ PICTURE = "figure-06.png"
 EXAMPLE = re.compile(r"^(<!-- takes minutes -->\n)?```(console|pycon|yaml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+TERMINAL = {"COLUMNS": "100"}
+Run = Callable[[str, int], tuple[str, int]]
+"""What runs a command, after one that ended with an exit code: what it prints, and its own exit code."""
 PART = re.compile(r"(<!-- made by scripts/refresh_docs\.py: ([a-z-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -261,8 +264,9 @@ def try_examples(documents: Sequence[Path], slow: bool) -> int:
     return 1 if found else 0
 
 
-def differences(path: Path, folder: Path, slow: bool = False) -> Iterator[str]:
+def differences(path: Path, folder: Path, slow: bool = False, run: Run | None = None) -> Iterator[str]:
     """For each example of a document that prints something else than is shown: the command, and both texts."""
+    run = run or run_in_shell
     names: dict[str, Any] = {}
     exit_code = 0
     with contextlib.chdir(folder):
@@ -271,7 +275,7 @@ def differences(path: Path, folder: Path, slow: bool = False) -> Iterator[str]:
                 Path(f"{named[1] or named[2]}.yaml").write_text(text, encoding="utf-8")
             elif kind == "console" and (slow or not takes_minutes):
                 for command, shown in COMMAND.findall(text):
-                    printed, exit_code = run_in_shell(command, exit_code)
+                    printed, exit_code = run(command, exit_code)
                     if not doctest.OutputChecker().check_output(shown, printed, LOOSELY):
                         yield f"$ {command}\nshown:\n{shown}printed:\n{printed}"
             elif kind == "pycon" and (slow or not takes_minutes):
@@ -287,13 +291,17 @@ def run_in_shell(command: str, exit_code_before: int) -> tuple[str, int]:
     """What a command prints, after one that ended with an exit code: its answer, or its errors too if it fails."""
     environment = os.environ | {
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
-        "COLUMNS": "100",
+        **TERMINAL,
     }
     done = subprocess.run(
         ["bash", "-c", f"(exit {exit_code_before}); {command}"], env=environment, capture_output=True, text=True
     )
-    printed = done.stdout + (done.stderr if done.returncode else "")
-    return printed.replace("\u00a0", " "), done.returncode
+    return answer_of(done), done.returncode
+
+
+def answer_of(done: subprocess.CompletedProcess[str]) -> str:
+    """What a command printed: its answer, or its errors too if it failed."""
+    return (done.stdout + (done.stderr if done.returncode else "")).replace("\u00a0", " ")
 
 
 if __name__ == "__main__":

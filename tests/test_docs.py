@@ -3,6 +3,7 @@
 import base64
 import json
 import math
+import os
 import re
 import runpy
 import shlex
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pytest
+from forks import forks
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -195,9 +197,19 @@ def test_a_documented_config_is_accepted(text, tmp_path):
     assert load(path, ()).config
 
 
+def run(command, exit_code_before):
+    """As in a shell; a command of the package alone runs in a process that has the libraries loaded."""
+    name, *words = shlex.split(command)
+    if name != "walkerlab" or {"|", ";", "&&", ">", "<"} & {*words}:
+        return MAKER["run_in_shell"](command, exit_code_before)
+    paths = {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    done = forks().run("walkerlab", words, Path.cwd(), {**os.environ, **MAKER["TERMINAL"], **paths})
+    return MAKER["answer_of"](done), done.returncode
+
+
 @pytest.mark.parametrize("path", MAKER["with_examples"](), ids=lambda path: path.name)
 def test_examples_print_what_documents_show(path, tmp_path):
-    assert "\n".join(MAKER["differences"](path, tmp_path)) == ""
+    assert "\n".join(MAKER["differences"](path, tmp_path, run=run)) == ""
 
 
 def test_an_example_that_prints_otherwise_is_found(tmp_path):

@@ -113,7 +113,11 @@ WRITTEN = [
     stage.module for stage in PIPELINE.stages if (ROOT / stage.module.replace(".", "/")).with_suffix(".py").exists()
 ]
 STARTS = ["walkerlab.pipeline.runner", "walkerlab.views.cli.stored", "walkerlab.physics.kernels", *WRITTEN]
-LIBRARIES = ["h5py", "jinja2", "matplotlib.figure", "numba", "pydantic", "ruamel.yaml", "scipy.integrate", "typer"]
+LIBRARIES = [
+    "h5py", "jinja2", "matplotlib.figure", "multiprocessing.connection", "numba.extending", "numba.typed", "PIL.Image",
+    "pydantic.main", "pydantic.functional_validators", "ruamel.yaml", "scipy.integrate", "scipy.optimize", "typer",
+    "xml.etree.ElementTree",
+]  # fmt: skip
 IMPORTED = """
 import importlib, os, sys
 libraries, starts = (line.split() for line in sys.stdin)
