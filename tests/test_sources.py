@@ -119,7 +119,8 @@ LIBRARIES = [
     "xml.etree.ElementTree",
 ]  # fmt: skip
 IMPORTED = """
-import importlib, os, sys
+import gc, importlib, os, sys
+gc.disable()
 libraries, starts = (line.split() for line in sys.stdin)
 for name in libraries:
     importlib.import_module(name)
