@@ -8,6 +8,7 @@ import re
 import runpy
 import shlex
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol
@@ -38,6 +39,12 @@ ONLY_READ = ("init", "open", "rerun", "export", "animate", "draw")
 BUG, USAGE, BAD_CONFIG = 1, 2, 3
 
 
+@cache
+def whole_program():
+    """The command line as click's commands."""
+    return get_command(program())
+
+
 def text_of(path):
     return path.read_text(encoding="utf-8")
 
@@ -49,6 +56,7 @@ def code_in(path):
     yield from re.findall(r"(?<!`)`([^`\n]+)`(?!`)", text)
 
 
+@cache
 def commands():
     """Those of stages that are not run as examples."""
     names = {*(stage.name for stage in PIPELINE.stages), *ANSWER_AT_ONCE, "clean", "sweep"}
@@ -145,6 +153,7 @@ def places():
     return (ROOT, package, *(path for path in package.iterdir() if path.is_dir()))
 
 
+@cache
 def named_runs():
     """The runs that commands of the documents name."""
     return {name for command in commands() for name in re.findall(r"--name (\S+)", command)}
@@ -168,6 +177,7 @@ def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
     assert done.exit_code not in (BUG, USAGE, BAD_CONFIG), done.output
 
 
+@cache
 def commands_around_runs():
     found = {command.strip() for path in DOCUMENTS for code in code_in(path) for command in COMMAND.findall(code)}
     return sorted(command for command in found if shlex.split(command)[1] in ONLY_READ)
@@ -176,7 +186,7 @@ def commands_around_runs():
 @pytest.mark.parametrize("command", commands_around_runs())
 def test_a_documented_command_around_runs_has_the_options_that_it_is_given(command):
     _, name, *words = shlex.split(command)
-    asked = get_command(program()).commands[name]
+    asked = whole_program().commands[name]
     if words:
         asked.make_context(name, words)
     else:
@@ -185,7 +195,7 @@ def test_a_documented_command_around_runs_has_the_options_that_it_is_given(comma
 
 def test_every_command_is_in_the_docs():
     said = " ".join(code for path in DOCUMENTS for code in code_in(path))
-    assert [name for name in get_command(program()).commands if not re.search(rf"walkerlab {name}\b", said)] == []
+    assert [name for name in whole_program().commands if not re.search(rf"walkerlab {name}\b", said)] == []
 
 
 @pytest.mark.parametrize(
