@@ -1,8 +1,6 @@
 """`walkerlab design` ends in a config that extends its start, ready to be walked, and never over a file."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,24 +13,23 @@ COMMAND = (
 )  # fmt: skip
 
 
-def design(folder):
-    done = subprocess.run(
-        [sys.executable, "-m", "walkerlab", *COMMAND], cwd=folder, capture_output=True, text=True, check=True
-    )
+def design(walker):
+    done = walker(*COMMAND)
+    assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
-def test_the_optimum_is_a_config_that_extends_the_start_and_is_written_over_nothing(tmp_path):
-    found = design(tmp_path)
-    path = tmp_path / found["config"]
+def test_the_optimum_is_a_config_that_extends_the_start_and_is_written_over_nothing(walker):
+    found = design(walker)
+    path = walker.folder / found["config"]
     assert path.name == "optimum.yaml"
     assert path.read_text(encoding="utf-8").startswith("extends: slope-3deg\n")
     config = load(path).config
     assert config.walker.hip_mass_kg == found["best"]["walker.hip_mass_kg"]
     assert config.design == load(Path("slope-3deg")).config.design
-    assert design(tmp_path)["config"] == found["config"]
+    assert design(walker)["config"] == found["config"]
     path.write_text("extends: paper\n", encoding="utf-8")
-    assert Path(design(tmp_path)["config"]).name == "optimum-2.yaml"
+    assert Path(design(walker)["config"]).name == "optimum-2.yaml"
     assert path.read_text(encoding="utf-8") == "extends: paper\n"
 
 
@@ -68,34 +65,27 @@ OVER = "--over walker.foot_radius_m=0.1:0.7"
         ("fixedpoint --set slope_deg=95", "--set slope_deg=95: slope_deg: 95 is out of bounds"),
     ],
 )
-def test_what_is_wrong_is_told_as_it_was_typed_with_its_reason(command, message, tmp_path):
-    program = [sys.executable, "-m", "walkerlab", *command.split()]
-    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True)
+def test_what_is_wrong_is_told_as_it_was_typed_with_its_reason(command, message, walker):
+    done = walker(*command.split())
     assert done.returncode == 3
     assert done.stderr.startswith(f"error: {message}"), done.stderr
 
 
-def test_help_offers_the_models_that_the_schema_allows(tmp_path):
+def test_help_offers_the_models_that_the_schema_allows(walker):
     for stage, models in (("design", "rigid|contact "), ("robustness", "rigid|contact|both")):
-        done = subprocess.run(
-            [sys.executable, "-m", "walkerlab", stage, "--help"],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        done = walker(stage, "--help")
+        assert done.returncode == 0
         assert f"--model {models}" in done.stdout
 
 
-def test_a_config_without_contact_is_shown_the_block_to_add(tmp_path):
-    program = [sys.executable, "-m", "walkerlab", "contact-sim", "-c", "kneed", "--set", "contact=null"]
-    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True)
+def test_a_config_without_contact_is_shown_the_block_to_add(walker):
+    done = walker("contact-sim", "-c", "kneed", "--set", "contact=null")
     assert done.returncode == 3
     assert "`contact: {stiffness: 8000, damping: 7.2, terrain: plane}`" in done.stderr
 
 
 @pytest.mark.parametrize("stage", ["robustness", "design", "continuation"])
-def test_the_model_that_is_asked_about_is_an_option_that_goes_by_itself(stage, tmp_path):
-    command = [sys.executable, "-m", "walkerlab", stage, "--model", "contact", "--dry-run", "--json"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+def test_the_model_that_is_asked_about_is_an_option_that_goes_by_itself(stage, walker):
+    done = walker(stage, "--model", "contact", "--dry-run", "--json")
+    assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["run_dir"].endswith(f"{stage}.model=contact")
