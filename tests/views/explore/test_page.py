@@ -34,12 +34,35 @@ class Address:
         return self.text
 
 
-@pytest.fixture
-def page(browser, served):
+@pytest.fixture(scope="module")
+def other(tmp_path_factory):
+    """Another server, started from a change."""
+    one = Served(tmp_path_factory.mktemp("other"), "--set", "slope_deg=3")
+    yield one
+    one.close()
+
+
+def opened(browser, served, blocked=(), **seen):
     browser.open(Address("about:blank"))
-    browser.open(Address(served.url))
+    browser.call("Network.setBlockedURLs", urls=list(blocked))
+    browser.open(Address(served.url), **seen)
     browser.until(f"{STATE} === 'shown'")
     return browser
+
+
+@pytest.fixture
+def page(browser, served):
+    """The page standing still and without gaits along a number, which would be computed for every test."""
+    yield opened(browser, served, ["*/api/along"], calm=True)
+    browser.call("Network.setBlockedURLs", urls=[])
+
+
+@pytest.fixture
+def whole_page(browser, served):
+    """The page as it is; gaits along a number that are still being computed at the end are dropped."""
+    yield opened(browser, served)
+    browser.open(Address("about:blank"))
+    assert served.asked("/api/along", {"set": {"continuation.over": "nothing"}})[0] == 422
 
 
 def slider(key, value, kind="input"):
@@ -55,14 +78,16 @@ def typed(page, key, text):
     )
 
 
-def test_the_walker_walks_at_once_and_the_page_complains_of_nothing(page, served):
+def test_the_walker_walks_at_once_and_the_page_complains_of_nothing(whole_page, served):
+    page = whole_page
     page.until(f"{TIME} > 0.2")
     assert page.evaluate(SHOWN) == "Shown: paper"
     assert page.complaints() == []
     assert {url.split("/")[2] for url in page.requests()} == {f"127.0.0.1:{served.port}"}
 
 
-def test_a_slider_that_is_dragged_changes_the_walk_and_what_is_let_go_can_be_gone_back_to(page):
+def test_a_slider_that_is_dragged_changes_the_walk_and_what_is_let_go_can_be_gone_back_to(whole_page):
+    page = whole_page
     page.until(f"{TIME} > 0.2")
     before = page.evaluate("history.length")
     for place in range(400, 700, 10):
@@ -160,7 +185,8 @@ def test_the_camera_follows_what_still_walks(page):
         assert x == pytest.approx(width / 2, abs=0.1 * width)
 
 
-def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(page):
+def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(whole_page):
+    page = whole_page
     page.until("along.series?.length > 0")
     page.evaluate("along.cursor.scrollIntoView()")
     box = page.evaluate(
@@ -174,7 +200,8 @@ def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(page):
     )
 
 
-def test_gaits_along_a_number_of_the_ground_are_the_contact_models_over_decades(page):
+def test_gaits_along_a_number_of_the_ground_are_the_contact_models_over_decades(whole_page):
+    page = whole_page
     typed(page, "contact.stiffness", "50000")
     page.until("along.key === 'contact.stiffness' && along.found?.every(({ model }) => model === 'contact')")
     page.until("along.series.length > 0")
@@ -216,7 +243,8 @@ def test_the_picture_is_what_is_seen_on_the_pages_own_ground(page):
 
 
 def test_a_film_is_made_and_linked(page):
-    typed(page, "slope_deg", "2.5")
+    typed(page, "strides", "1")
+    page.until(f"{SHOWN} === 'Shown: paper with strides 1'")
     page.evaluate("document.getElementById('contact').click()")
     page.evaluate("document.getElementById('gif').click()")
     page.until("!!document.querySelector('#made a') || document.getElementById('made').textContent.includes('rror')")
@@ -230,9 +258,7 @@ def test_a_film_is_made_and_linked(page):
 
 @pytest.mark.parametrize(("width", "dark"), [(400, True), (1440, False)])
 def test_nothing_is_wider_than_the_screen(browser, served, width, dark):
-    browser.open(Address("about:blank"))
-    browser.open(Address(served.url), width, 900, dark=dark, calm=True)
-    browser.until(f"{STATE} === 'shown'")
+    opened(browser, served, width=width, dark=dark, calm=True)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
     assert browser.evaluate(TIME) == 0  # who asked for less motion starts it
 
@@ -271,25 +297,8 @@ def test_a_list_is_typed_and_comes_back_with_the_address(page):
     assert page.evaluate("shown.answer.scene.ground.length") > 2  # the player draws the levels
 
 
-def test_what_the_page_was_started_from_is_what_it_shows(browser, tmp_path):
-    one = Served(tmp_path, "--set", "slope_deg=3")
-    try:
-        browser.open(Address("about:blank"))
-        browser.open(Address(one.url))
-        browser.until(f"{STATE} === 'shown'")
-        assert browser.evaluate(SHOWN) == "Shown: paper with slope_deg=3"
-        assert browser.evaluate("rows.get('slope_deg').text.value") == "3"
-        assert "--set slope_deg=3" in browser.evaluate("document.getElementById('command').textContent")
-        browser.evaluate(
-            "document.getElementById('config').value = 'paper';"
-            "document.getElementById('config').dispatchEvent(new Event('change'))"
-        )
-        browser.until(f"{SHOWN} === 'Shown: paper'")
-    finally:
-        one.close()
-
-
-def test_a_loop_of_a_steady_walk_goes_on_over_the_ground(page):
+def test_a_loop_of_a_steady_walk_goes_on_over_the_ground(whole_page):
+    page = whole_page
     page.evaluate(
         "window.said = []; const drawn = CanvasRenderingContext2D.prototype.fillText;"
         "CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {"
@@ -311,16 +320,24 @@ def test_a_loop_of_a_steady_walk_goes_on_over_the_ground(page):
     assert max(steps) < 0.3
 
 
-def test_a_server_that_is_gone_is_told(browser, tmp_path):
-    one = Served(tmp_path)
-    try:
-        browser.open(Address(one.url))
-        browser.until(f"{STATE} === 'shown'")
-    finally:
-        one.close()
+def test_what_the_page_was_started_from_is_what_it_shows(browser, other):
+    opened(browser, other)
+    assert browser.evaluate(SHOWN) == "Shown: paper with slope_deg=3"
+    assert browser.evaluate("rows.get('slope_deg').text.value") == "3"
+    assert "--set slope_deg=3" in browser.evaluate("document.getElementById('command').textContent")
+    browser.evaluate(
+        "document.getElementById('config').value = 'paper';"
+        "document.getElementById('config').dispatchEvent(new Event('change'))"
+    )
+    browser.until(f"{SHOWN} === 'Shown: paper'")
+
+
+def test_a_server_that_is_gone_is_told(browser, other, tmp_path):
+    opened(browser, other)
+    other.close()
     typed(browser, "slope_deg", "2")
     browser.until(f"{SAID}.startsWith('The server does not answer')")
-    again = Served(tmp_path, "--port", str(one.port))
+    again = Served(tmp_path, "--port", str(other.port))
     try:
         browser.until(f"{SAID}.includes('Open the address as it was printed')")
     finally:
