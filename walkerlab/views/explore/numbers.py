@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any, Final
 
 from pydantic.fields import FieldInfo
@@ -109,6 +110,7 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
     }.get(unit, 0.0)  # fmt: skip
 
 
+@lru_cache(maxsize=1000)  # asked again for every key whenever a slider is released
 def gaits_by(key: str, start: Config) -> Parameter | None:
     """Return the key as a parameter along which gaits can be followed; None if no model depends on it."""
     try:
