@@ -13,8 +13,8 @@ tune: {cells: 3, rigid_limit: false}
 def test_results_and_drawings_are_the_same_with_one_job_and_with_two(walker):
     (walker.folder / "same.yaml").write_text(CONFIG)
     for jobs in ("1", "2"):
-        for arguments in (("tune", "--jobs", jobs), ("plot",)):
-            done = walker(*arguments, "-c", "same.yaml", "--runs", jobs, "--quiet")
+        for stage in ("tune", "plot"):
+            done = walker(stage, "--jobs", jobs, "-c", "same.yaml", "--runs", jobs, "--quiet")
             assert done.returncode == 0, done.stderr
     one, two = (walker.folder / jobs / "same" for jobs in ("1", "2"))
     names = {path.name for path in one.glob("*.h5")}
