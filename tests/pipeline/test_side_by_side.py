@@ -9,7 +9,6 @@ from process_table import workers_below
 
 from walkerlab.pipeline.executor import any_side_by_side
 from walkerlab.pipeline.graph import Graph
-from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.store.artifact import read
 from walkerlab.pipeline.workers import WorkerDiedError
 from walkerlab.scene.omissions import STILL_COMPUTED
@@ -23,7 +22,7 @@ def with_page_early(graph):
 
 
 @pytest.mark.parametrize("sets", [(), (STEEP,)])
-def test_processes_give_what_one_gives(toy, tmp_path, sets):
+def test_processes_give_what_one_gives_and_none_is_left(toy, tmp_path, sets):
     one = toy.execute("page", *sets)
     files = {name: one.run_dir / f"{name}.h5" for name in NUMBERS}
     digests = {name: read(path).digest() for name, path in files.items() if path.exists()}
@@ -35,6 +34,7 @@ def test_processes_give_what_one_gives(toy, tmp_path, sets):
     )
     assert str(two.no_answer) == str(one.no_answer)
     assert set(two.left_out) == set(one.left_out)
+    assert workers_below(os.getpid()) == []
     assert toy.execute("page", *sets, jobs=2).reused
 
 
@@ -72,7 +72,7 @@ def test_what_measures_times_has_nothing_beside_it(toy, listener):
     listener.end = lambda said: told.append(said.split(":")[0])
     begin = listener.begin
     listener.begin = lambda stage, *rest: told.append(f"{stage} begins") or begin(stage, *rest)
-    toy.execute("page", reporter=listener, jobs=3)
+    toy.execute("page", reporter=listener, jobs=2)
     place = told.index("survey begins")
     assert told[place + 1] == "survey"
     assert {name.split()[0] for name in told[:place] if name.endswith("begins")} == set(told[:place]) & set(NUMBERS)
@@ -97,9 +97,3 @@ def test_a_chain_is_walked_in_one_process(toy):
     chain = [toy.graph[name] for name in ("drop", "roll")]
     assert not any_side_by_side(chain, config)
     assert any_side_by_side([*chain, toy.graph["survey"]], config)
-
-
-def test_no_process_is_left(toy):
-    config, folder = toy.loaded()
-    execute(config, "page", folder, Options(jobs=2), graph=toy.graph)
-    assert workers_below(os.getpid()) == []

@@ -6,6 +6,7 @@ import signal
 
 import pytest
 
+ALONE = ("--jobs", "1")  # no processes are started, which takes longer than the toy's stages
 COMMON = {"stage", "run_dir", "artifact", "reused", "wall_s", "left_out"}
 
 
@@ -88,7 +89,7 @@ def test_dry_run_says_what_would_happen_and_why_and_touches_nothing(toy):
 
 
 def test_dry_run_after_a_run_says_that_all_is_reused(toy):
-    toy("page")
+    toy("page", *ALONE)
     plan = one_object(toy("page", "--dry-run", "--json"))
     assert plan["reused"] is True
     assert {step["action"] for step in plan["stages"]} == {"reuse"}
@@ -242,5 +243,8 @@ def test_a_question_that_cannot_be_meant_stops_before_anything_runs(walker, aske
 
 
 def test_what_was_left_out_is_told_to_those_who_ask(toy):
-    assert "left out" not in toy("page", "--config", "rigid-only").stdout
-    assert "left out: bounce (the config has no contact block)" in toy("page", "--config", "rigid-only", "-v").stdout
+    assert "left out" not in toy("page", *ALONE, "--config", "rigid-only").stdout
+    assert (
+        "left out: bounce (the config has no contact block)"
+        in toy("page", *ALONE, "--config", "rigid-only", "-v").stdout
+    )
