@@ -18,7 +18,10 @@ import traceback
 from functools import cache
 from pathlib import Path
 
-LIBRARIES = ["h5py", "jinja2", "numba", "numpy", "ruamel.yaml", "scipy.integrate", "scipy.optimize", "typer"]
+LIBRARIES = [
+    "email.parser", "filelock", "h5py", "jinja2", "numba", "numpy", "pydantic.type_adapter", "ruamel.yaml",
+    "scipy.integrate", "scipy.optimize", "typer",
+]  # fmt: skip
 PACKAGES = ["views.cli", "config", "views.report", "pipeline.runner", "pipeline.store", "pipeline.sweeps"]
 LONGEST_S = 120
 

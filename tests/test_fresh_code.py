@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.physics.kernel_cache import KEPT_GENERATIONS
+from walkerlab.physics.kernel_cache import KEPT_GENERATIONS, cache_folder
 
 PACKAGE = Path(__file__).parents[1] / "walkerlab"
 CALL = """
@@ -40,11 +40,21 @@ def once(x: float) -> float:
 '''
 
 
+@pytest.fixture(scope="module")
+def unchanged(tmp_path_factory):
+    """A copy of the package, with the bytecode of what kernels import."""
+    folder = tmp_path_factory.mktemp("unchanged")
+    shutil.copytree(PACKAGE, folder / "walkerlab", ignore=shutil.ignore_patterns("__pycache__"))
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    subprocess.run([sys.executable, "-c", "import walkerlab.physics.kernels"], cwd=folder, env=environment, check=True)
+    return folder / "walkerlab"
+
+
 @pytest.fixture
-def copy(tmp_path):
+def copy(unchanged, tmp_path):
     """A copy of the package with two files more, and a way to run it in a process of its own."""
     package = tmp_path / "walkerlab"
-    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(unchanged, package)
     (package / "physics" / "orbits" / "trial_of_code.py").write_text(CALLER)
     (package / "physics" / "mechanics" / "trial_of_code.py").write_text(CALLED)
 
@@ -74,19 +84,12 @@ def test_an_edited_function_of_another_file_never_runs_stale(copy):
     assert run()[0] == 10.0
 
 
-def test_code_that_is_as_before_is_not_compiled_again(copy):
-    package, run = copy
-    _, folder = run()
-    kept = compiled(package.parent / "cache" / folder)
-    assert run()[1] == folder
-    assert kept
-    assert compiled(package.parent / "cache" / folder) == kept
-
-
-def test_the_package_installed_anew_or_elsewhere_uses_what_is_compiled(copy, tmp_path):
+def test_the_package_as_before_installed_anew_or_elsewhere_uses_what_is_compiled(copy, tmp_path):
     package, run = copy
     _, folder = run()
     kept = compiled(tmp_path / "cache" / folder)
+    assert run()[1] == folder
+    assert compiled(tmp_path / "cache") == kept
     moved = tmp_path / "elsewhere"
     moved.mkdir()
     shutil.copytree(package, moved / "walkerlab", ignore=shutil.ignore_patterns("__pycache__"))  # with times of its own
@@ -154,8 +157,7 @@ def test_a_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
 def generations(copy, tmp_path):
     """Make twelve older generations of compiled code, last used so many days ago and earlier; those left of them."""
     _, run = copy
-    host = run()[1].split("-", 4)[4]  # kernels-DIGEST-pyVERSION-numbaVERSION-PROCESSOR
-    shutil.rmtree(tmp_path / "cache")
+    host = cache_folder().name.split("-", 4)[4]  # kernels-DIGEST-pyVERSION-numbaVERSION-PROCESSOR
 
     def left_after_a_new_one(days):
         folders = [tmp_path / "cache" / f"kernels-{number:016x}-py311-numba0.62.0-{host}" for number in range(12)]
@@ -195,23 +197,30 @@ def test_a_process_whose_compiled_code_is_removed_compiles_anew(copy, tmp_path):
     assert compiled(tmp_path / "cache")
 
 
-@pytest.fixture
-def digest_after_an_edit(tmp_path):
+DIGEST = "from walkerlab.physics.kernel_cache import sources_digest; print(sources_digest())"
+
+
+@pytest.fixture(scope="module")
+def digest_after_an_edit(unchanged, tmp_path_factory):
     """The digest of the kernels' sources before and after a remark is added to a file of a copy of the package."""
-    package = tmp_path / "walkerlab"
-    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    code = "from walkerlab.physics.kernel_cache import sources_digest; print(sources_digest())"
+    folder = tmp_path_factory.mktemp("edited")
+    shutil.copytree(unchanged, folder / "walkerlab")
+    command = [sys.executable, "-B", "-c", DIGEST]
 
     def digest():
-        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-        return subprocess.check_output([sys.executable, "-c", code], cwd=tmp_path, env=environment, text=True)
+        environment = {**os.environ, "PYTHONPATH": str(folder)}
+        return subprocess.check_output(command, cwd=folder, env=environment, text=True)
+
+    before = digest()
 
     def digests(path):
-        before = digest()
-        assert (package / path).is_file()
-        with (package / path).open("a") as file:
-            file.write("\n# a remark\n")
-        return before, digest()
+        file = folder / "walkerlab" / path
+        text = file.read_text()
+        file.write_text(f"{text}\n# a remark\n")
+        try:
+            return before, digest()
+        finally:
+            file.write_text(text)
 
     return digests
 
