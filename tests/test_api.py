@@ -158,17 +158,18 @@ def test_what_is_left_out_is_as_the_built_in_config_has_it(monkeypatch):
 UNGUARDED = """
 import sys
 import walkerlab
-gaits = walkerlab.sweep("fixedpoint", {"slope_deg": [1, 3]}, runs=sys.argv[1], jobs=2, engine=sys.argv[2])
+runs, engine, jobs = sys.argv[1:]
+gaits = walkerlab.sweep("fixedpoint", {"slope_deg": [1, 3]}, runs=runs, engine=engine, jobs=int(jobs))
 print([round(float(period), 4) for period in gaits.period_s])
 """
 
 
-def run_unguarded(tmp_path, engine, from_standard_input):
+def run_unguarded(tmp_path, engine, jobs, from_standard_input):
     """What became of a script that sweeps without a guard."""
     path = tmp_path / "unguarded.py"
     path.write_text(UNGUARDED)
     return subprocess.run(
-        [sys.executable, "-" if from_standard_input else str(path), str(tmp_path / "runs"), engine],
+        [sys.executable, "-" if from_standard_input else str(path), str(tmp_path / "runs"), engine, jobs],
         input=UNGUARDED if from_standard_input else "",
         capture_output=True,
         text=True,
@@ -178,7 +179,7 @@ def run_unguarded(tmp_path, engine, from_standard_input):
 
 @pytest.mark.parametrize("from_standard_input", [False, True], ids=["script", "stdin"])
 def test_a_script_without_a_guard_sweeps_once(tmp_path, from_standard_input):
-    done = run_unguarded(tmp_path, "local", from_standard_input)
+    done = run_unguarded(tmp_path, "local", "2", from_standard_input)
     assert done.stdout == "[0.7036, 0.7343]\n", done.stderr
     assert done.returncode == 0
 
@@ -191,7 +192,7 @@ def test_a_keyword_that_a_sweep_does_not_have_is_refused(tmp_path):
 @pytest.mark.parametrize("from_standard_input", [False, True], ids=["script", "stdin"])
 def test_where_a_guard_is_needed_this_is_said_at_once(tmp_path, from_standard_input):
     pytest.importorskip("distributed", reason="the extra `dask` is not installed")
-    done = run_unguarded(tmp_path, "dask", from_standard_input)
+    done = run_unguarded(tmp_path, "dask", "1", from_standard_input)
     assert done.returncode == 1
     assert "ConfigError: --engine dask: its processes did not start" in done.stderr
 

@@ -167,18 +167,15 @@ def caught(toy, tmp_path):
         process.kill()
 
 
-def test_interrupted_exits_130_and_leaves_no_lock(toy, caught):
+def test_no_wait_exits_6_beside_another_process_and_interrupted_that_exits_130_and_leaves_no_lock(toy, caught):
+    done = toy("drop", "--no-wait", "--json")
+    assert done.returncode == 6
+    assert one_object(done)["error"]["exit_code"] == 6
     os.kill(caught.pid, signal.SIGINT)
     assert caught.wait(timeout=30) == 130
     assert "Traceback" not in caught.stderr.read()
     assert json.loads(caught.stdout.read())["error"]["exit_code"] == 130
     assert toy("drop", "--no-wait").returncode == 0
-
-
-def test_no_wait_exits_6(toy, caught):
-    done = toy("drop", "--no-wait", "--json")
-    assert done.returncode == 6
-    assert one_object(done)["error"]["exit_code"] == 6
 
 
 @pytest.mark.parametrize(("force", "then"), [([], ", and its results will be reused"), (["--force"], "")])
