@@ -206,6 +206,72 @@ def compile_expression(text: str):
     return compile(source.strip(), "expression", "eval")
 
 
+def zero(*markers: int) -> float:
+    return 0.0
+
+
+class Motion:
+    """Where parts and markers of a dataset are at one state, and how they move: each is computed once."""
+
+    def __init__(self, dataset, q, u) -> None:
+        self.dataset, self.known = dataset, {}
+        self.frames = {dataset.ground: (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)}  # place, angle, cos, sin, rates
+        q, u = q.tolist(), u.tolist()
+        for part, i in dataset.index.items():
+            x, y, turn = q[i : i + 3]
+            self.frames[part] = (x, y, turn, math.cos(turn), math.sin(turn), *u[i : i + 3])
+
+    def of(self, marker):
+        """Place, angle, velocity and spin of a marker, and its lever from its part's origin."""
+        if (known := self.known.get(marker)) is None:
+            m = self.dataset.markers[marker]
+            x, y, turn, cos, sin, vx, vy, spin = self.frames[m.part]
+            ahead, up = m.place.tolist()
+            rx, ry = cos * ahead - sin * up, sin * ahead + cos * up
+            known = (x + rx, y + ry, turn + m.turn, vx - spin * ry, vy + spin * rx, spin, rx, ry)
+            self.known[marker] = known
+        return known
+
+    def centres(self):
+        """Levers of the parts' centres of mass."""
+        for identity, part in self.dataset.parts.items():
+            (ahead, up), cos, sin = part.centre.tolist(), *self.frames[identity][3:5]
+            yield cos * ahead - sin * up, sin * ahead + cos * up
+
+    def seen(self, first, i, j, k):
+        """A vector from J to I in the frame of K, either omitted for the ground's: from places or velocities."""
+        x, y = self.of(i)[first : first + 2]
+        if j:
+            there = self.of(j)
+            x, y = x - there[first], y - there[first + 1]
+        if k:
+            turn = self.of(k)[2]
+            x, y = math.cos(turn) * x + math.sin(turn) * y, math.cos(turn) * y - math.sin(turn) * x
+        return x, y
+
+    def dx(self, i, j=0, k=0):
+        return self.seen(0, i, j, k)[0]
+
+    def dy(self, i, j=0, k=0):
+        return self.seen(0, i, j, k)[1]
+
+    def vx(self, i, j=0, k=0, frame=0):
+        return self.velocity(i, j, k, frame)[0]
+
+    def vy(self, i, j=0, k=0, frame=0):
+        return self.velocity(i, j, k, frame)[1]
+
+    def velocity(self, i, j, k, frame):
+        assert not frame or self.dataset.markers[frame].part == self.dataset.ground, "differentiated in the ground"
+        return self.seen(3, i, j, k)
+
+    def spin(self, i, j=0, k=0):
+        return self.of(i)[5] - (self.of(j)[5] if j else 0.0)
+
+    def angle(self, i, j=0):
+        return self.of(i)[2] - (self.of(j)[2] if j else 0.0)
+
+
 @dataclass
 class Dataset:
     """A planar model of ADAMS in its own units (lengths, kg, s), as its text defines it."""
@@ -260,66 +326,22 @@ class Dataset:
         )
 
     # kinematics -----------------------------------------------------------------------------------------------------
-    def pose(self, q, part):
-        if part == self.ground:
-            return np.zeros(2), 0.0
-        i = self.index[part]
-        return q[i : i + 2], q[i + 2]
-
-    def rates(self, u, part):
-        if part == self.ground:
-            return np.zeros(2), 0.0
-        i = self.index[part]
-        return u[i : i + 2], u[i + 2]
-
     def place(self, q, marker):
-        m = self.markers[marker]
-        origin, angle = self.pose(q, m.part)
-        return origin + rotation(angle) @ m.place, angle + m.turn
+        x, y, turn, *_ = Motion(self, q, np.zeros_like(q)).of(marker)
+        return np.array([x, y]), turn
 
     def velocity(self, q, u, marker):
-        m = self.markers[marker]
-        _, angle = self.pose(q, m.part)
-        rate, spin = self.rates(u, m.part)
-        lever = rotation(angle) @ m.place
-        return rate + spin * np.array([-lever[1], lever[0]]), spin
+        *_, vx, vy, spin = Motion(self, q, u).of(marker)[:6]
+        return np.array([vx, vy]), spin
 
-    def jacobian(self, q, marker):
-        """(2, 3 parts): of a marker's velocity by the rates."""
-        m = self.markers[marker]
-        out = np.zeros((2, 3 * len(self.parts)))
-        if m.part != self.ground:
-            i = self.index[m.part]
-            lever = rotation(q[i + 2]) @ m.place
-            out[:, i : i + 2] = np.eye(2)
-            out[:, i + 2] = -lever[1], lever[0]
-        return out
+    def value(self, expression, t, q, u) -> float:
+        return float(eval(expression, self.environment(t, Motion(self, q, u))))
 
-    # measures -------------------------------------------------------------------------------------------------------
-    def environment(self, t, q, u):
-        def zero(place):
-            return 0.0
-
-        def relative(i, j=0, k=0):
-            vector = self.place(q, i)[0] - (self.place(q, j)[0] if j else 0.0)
-            return rotation(-self.place(q, k)[1]) @ vector if k else vector
-
-        def relative_rate(i, j=0, k=0, frame=0):
-            assert not frame or self.markers[frame].part == self.ground, "differentiated in the ground"
-            vector = self.velocity(q, u, i)[0] - (self.velocity(q, u, j)[0] if j else 0.0)
-            return rotation(-self.place(q, k)[1]) @ vector if k else vector
-
-        def spin(i, j=0, k=0):
-            return self.velocity(q, u, i)[1] - (self.velocity(q, u, j)[1] if j else 0.0)
-
-        def angle(i, j=0):
-            return self.place(q, i)[1] - (self.place(q, j)[1] if j else 0.0)
-
-        names = dict(FUNCTIONS)
-        names |= {"TIME": t, "PI": math.pi, "DTOR": math.pi / 180.0, "RTOD": 180.0 / math.pi}
-        names |= {"DX": lambda *a: relative(*a)[0], "DY": lambda *a: relative(*a)[1], "DZ": zero}
-        names |= {"VX": lambda *a: relative_rate(*a)[0], "VY": lambda *a: relative_rate(*a)[1], "VZ": zero}
-        names |= {"WZ": spin, "AZ": angle, "WX": zero, "WY": zero}
+    def environment(self, t, motion):
+        """What an expression may name, at one state."""
+        names = FUNCTIONS | {"TIME": t, "PI": math.pi, "DTOR": math.pi / 180.0, "RTOD": 180.0 / math.pi}
+        names |= {"DX": motion.dx, "DY": motion.dy, "VX": motion.vx, "VY": motion.vy, "WZ": motion.spin}
+        names |= {"AZ": motion.angle, "DZ": zero, "VZ": zero, "WX": zero, "WY": zero}
         values: dict[int, float] = {}
 
         def variable(identity):
@@ -329,9 +351,6 @@ class Dataset:
 
         names["VARVAL"] = variable
         return names
-
-    def value(self, expression, t, q, u) -> float:
-        return float(eval(expression, self.environment(t, q, u)))
 
     # dynamics -------------------------------------------------------------------------------------------------------
     @cached_property
@@ -345,82 +364,93 @@ class Dataset:
             u[i + 2] = part.velocity[2]
         return q, u
 
+    @cached_property
+    def mass_upright(self) -> np.ndarray:
+        """The mass matrix without what turns with the parts."""
+        diagonal = [(p.mass, p.mass, p.inertia + p.mass * p.centre @ p.centre) for p in self.parts.values()]
+        return np.diag(np.concatenate(diagonal))
+
     def mass(self, q):
         """Mass matrix by the parts' coordinates."""
-        out = np.zeros((len(q), len(q)))
-        for identity, part in self.parts.items():
+        out = self.mass_upright.copy()
+        for (identity, part), (x, y) in zip(self.parts.items(), Motion(self, q, q).centres(), strict=True):
             i = self.index[identity]
-            lever = rotation(q[i + 2]) @ part.centre
-            turn = np.array([-lever[1], lever[0]]) * part.mass
-            out[i : i + 2, i : i + 2] = part.mass * np.eye(2)
-            out[i : i + 2, i + 2] = out[i + 2, i : i + 2] = turn
-            out[i + 2, i + 2] = part.inertia + part.mass * lever @ lever
+            out[i, i + 2] = out[i + 2, i] = -part.mass * y
+            out[i + 1, i + 2] = out[i + 2, i + 1] = part.mass * x
         return out
 
     def applied(self, t, q, u):
         """Generalised forces of gravity, of expressions and of the centripetal terms."""
-        environment, out = self.environment(t, q, u), np.zeros_like(q)
-        for identity, part in self.parts.items():
-            i = self.index[identity]
-            lever = rotation(q[i + 2]) @ part.centre
-            force = part.mass * (self.gravity + u[i + 2] ** 2 * lever)
-            out[i : i + 2] += force
-            out[i + 2] += lever[0] * force[1] - lever[1] * force[0]
+        motion, out = Motion(self, q, u), [0.0] * len(q)
+        environment = self.environment(t, motion)
+        gx, gy = self.gravity.tolist()
+        for (identity, part), (x, y) in zip(self.parts.items(), motion.centres(), strict=True):
+            i, spin = self.index[identity], motion.frames[identity][7]
+            fx, fy = part.mass * (gx + spin**2 * x), part.mass * (gy + spin**2 * y)
+            out[i], out[i + 1], out[i + 2] = fx, fy, x * fy - y * fx
         for (marker, frame, expressions), reaction in zip(self.forces, self.reactions, strict=True):
-            fx, fy, tz = (eval(expression, environment) for expression in expressions)
             # a newton is a kilogram times `metre` lengths of the dataset per second squared
-            force = self.metre * (rotation(self.place(q, frame)[1]) @ np.array([fx, fy]))
-            self._apply(out, q, marker, force, self.metre * tz)
+            fx, fy, tz = (self.metre * eval(expression, environment) for expression in expressions)
+            turn = motion.of(frame)[2]
+            along, upward = math.cos(turn) * fx - math.sin(turn) * fy, math.sin(turn) * fx + math.cos(turn) * fy
+            self._apply(out, motion, marker, along, upward, tz)
             # a floating marker stands where I is, on the part that takes the reaction
             assert self.markers[reaction].floating
             assert self.markers[reaction].part == self.ground
         for statement, expression in self.single:
             value = self.metre * eval(expression, environment)
-            i, j = statement.marker("I"), statement.marker("J")
-            action_only = "ACTIONONLY" in statement.flags
-            if "ROTATIONAL" in statement.flags:
-                self._apply(out, q, i, np.zeros(2), value)
-                if not action_only:
-                    self._apply(out, q, j, np.zeros(2), -value)
-            else:
-                raise AssertionError("translational forces along z do not occur in planar models")
-        return out
+            assert "ROTATIONAL" in statement.flags, "translational forces along z do not occur in planar models"
+            self._apply(out, motion, statement.marker("I"), 0.0, 0.0, value)
+            if "ACTIONONLY" not in statement.flags:
+                self._apply(out, motion, statement.marker("J"), 0.0, 0.0, -value)
+        return np.array(out)
 
-    def _apply(self, out, q, marker, force, torque):
+    def _apply(self, out, motion, marker, fx, fy, torque):
         part = self.markers[marker].part
         if part != self.ground:
-            out += force @ self.jacobian(q, marker)
-            out[self.index[part] + 2] += torque
+            i, (*_, x, y) = self.index[part], motion.of(marker)
+            out[i] += fx
+            out[i + 1] += fy
+            out[i + 2] += x * fy - y * fx + torque
 
-    def constraints(self, q, u):
-        """Rows of the constraints' Jacobian, and minus their derivative times the rates."""
-        rows, biases = [], []
-
-        def lever_bias(marker):
-            m = self.markers[marker]
-            if m.part == self.ground:
-                return np.zeros(2)
-            i = self.index[m.part]
-            return -(u[i + 2] ** 2) * (rotation(q[i + 2]) @ m.place)
-
-        for s in self.of("JOINT"):
+    @cached_property
+    def joints(self) -> tuple[list[tuple[int, int, int]], np.ndarray]:
+        """(row, I, J) of the joints that hold two markers together, and what does not turn of all constraints' rows."""
+        pins, rows, width = [], [], 3 * len(self.parts)
+        joints = {s.id: s for s in self.of("JOINT")}
+        for s in joints.values():
             i, j = s.marker("I"), s.marker("J")
             if "PLANAR" in s.flags:
                 assert self.ground in (self.markers[i].part, self.markers[j].part)
                 continue
             assert {"REVOLUTE"} <= set(s.flags) or {"FIXED"} <= set(s.flags), s.flags
-            rows.extend(self.jacobian(q, i) - self.jacobian(q, j))
-            biases.extend(lever_bias(j) - lever_bias(i))
+            pins.append((len(rows), i, j))
+            rows += [np.zeros(width), np.zeros(width)]
+            for marker, sign in ((i, 1.0), (j, -1.0)):
+                if (part := self.markers[marker].part) != self.ground:
+                    rows[-2][self.index[part]] += sign
+                    rows[-1][self.index[part] + 1] += sign
             if "FIXED" in s.flags:
                 rows.append(self.relative_turn(i, j))
-                biases.append(0.0)
-        joints = {s.id: s for s in self.of("JOINT")}
         for s in self.of("COUPLER"):
             ids, scales = (s.numbers(key) for key in ("JOINTS", "SCALES"))
             turns = (self.relative_turn(joints[int(id)].marker("I"), joints[int(id)].marker("J")) for id in ids)
             rows.append(sum(scale * turn for scale, turn in zip(scales, turns, strict=True)))
-            biases.append(0.0)
-        return np.array(rows).reshape(len(rows), len(q)), np.array(biases)
+        return pins, np.array(rows).reshape(len(rows), width)
+
+    def constraints(self, q, u):
+        """Rows of the constraints' Jacobian, and minus their derivative times the rates."""
+        motion, (pins, steady) = Motion(self, q, u), self.joints
+        g, bias = steady.copy(), np.zeros(len(steady))
+        for row, i, j in pins:
+            for marker, sign in ((i, 1.0), (j, -1.0)):
+                if (part := self.markers[marker].part) != self.ground:
+                    *_, spin, x, y = motion.of(marker)
+                    g[row, self.index[part] + 2] -= sign * y
+                    g[row + 1, self.index[part] + 2] += sign * x
+                    bias[row] += sign * spin**2 * x
+                    bias[row + 1] += sign * spin**2 * y
+        return g, bias
 
     def relative_turn(self, i, j):
         row = np.zeros(3 * len(self.parts))
@@ -430,14 +460,14 @@ class Dataset:
         return row
 
     def rate(self, t, y):
-        q, u = np.split(y, 2)
+        q, u = y[: y.size // 2], y[y.size // 2 :]
         g, bias = self.constraints(q, u)
         n, m = len(q), len(g)
-        matrix = np.block([[self.mass(q), g.T], [g, np.zeros((m, m))]])
         # lengths are not metres: both blocks are brought to like sizes before they are solved
-        scale = np.concatenate([np.ones(n) / np.sqrt(np.diag(matrix)[:n]), np.ones(m)])
-        for row in range(m):
-            scale[n + row] = 1.0 / np.linalg.norm(g[row] * scale[:n])
+        near = 1.0 / np.sqrt(self.mass_upright.diagonal())
+        scale = np.concatenate([near, 1.0 / np.sqrt(((g * near) ** 2).sum(axis=1))])
+        matrix = np.zeros((n + m, n + m))
+        matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = self.mass(q), g.T, g
         right = np.concatenate([self.applied(t, q, u), bias])
         solution = scale * np.linalg.solve(scale[:, None] * matrix * scale, scale * right)
         return np.concatenate([u, solution[:n]])
@@ -451,7 +481,7 @@ class Dataset:
         for event in events:
 
             def function(t, y, event=event):
-                return event(t, *np.split(y, 2))
+                return event(t, y[: y.size // 2], y[y.size // 2 :])
 
             function.terminal = getattr(event, "terminal", False)
             function.direction = getattr(event, "direction", 0.0)

@@ -91,7 +91,7 @@ def touches_of(dataset, export, count):
         return height
 
     end = export.touches_s[count - 1] + 1e-3
-    solution = dataset.integrate(end, 1e-9, 1e-9, (sinking(0), sinking(1)), "LSODA")
+    solution = dataset.integrate(end, 1e-8, 1e-8, (sinking(0), sinking(1)), "LSODA")
     assert solution.success
     times = []
     for foot, events in enumerate(zip(solution.t_events, solution.y_events, strict=True)):
