@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-njit = partial(numba.njit, cache=True)  # all in one file, by whose time and size numba knows what is stale
-inner = partial(njit, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # called by compiled code alone
+# all in one file, by whose time and size numba knows what is stale
+njit = partial(numba.njit, cache=True, error_model="numpy", no_cfunc_wrapper=True)
+inner = partial(njit, no_cpython_wrapper=True)  # called by compiled code alone
 
 CHECKERBOARD, AFTER_MID_SWING, PLANE = 0, 1, 2
 WALKED, FELL, OFF_PAD, LIFTED_OFF, SLID, NO_HEEL_STRIKE, BENT_KNEE, STUBBED = 0, 1, 2, 3, 4, 5, 9, 10
@@ -433,7 +434,7 @@ def take_steps(walker, y, h, pinned, diary):
         left[foot] = cells[foot]
         inside = vertical_velocity <= 1e-12 if abs(height) < 1e-13 else height < 0.0
         side[3 * foot] = -1.0 if inside else 1.0
-    side[PASSING] = 1.0 if foot_at(walker, 1, y)[0] >= foot_at(walker, 0, y)[0] else -1.0
+    side[PASSING] = 1.0 if foothold[1] >= foothold[0] else -1.0
     while done < steps or leaving[0] or leaving[1]:
         counts[ROUNDS] += 1
         deadline = min(grounded_at + 0.25 * tau, last + 10.0 * tau) - t
@@ -516,8 +517,9 @@ def take_steps(walker, y, h, pinned, diary):
                 locks[counts[LOCKS]] = t
                 counts[LOCKS] += 1
             continue
-        x0, x1 = foot_at(walker, 0, y)[0], foot_at(walker, 1, y)[0]
-        along = np.array([x0, x1])
+        along = np.zeros(2)
+        for foot in range(2):
+            along[foot] = foot_at(walker, foot, y)[0]
         if event == PASSING:
             side[PASSING] = -side[PASSING]
             swing, swing_above = 1 - stance, False

@@ -220,7 +220,7 @@ def test_bad_questions_end_in_words(changes, said):
 
 
 def test_a_number_that_one_of_both_models_reads_is_answered_for_that_one():
-    found = run("kneed", "robustness.roughness_m=[]", "robustness.steps=1", "robustness.to=[contact.stiffness]")
+    found = run("slope-3deg", "robustness.roughness_m=[]", "robustness.steps=1", "robustness.to=[contact.stiffness]")
     assert {row["model"] for row in found.summary["sensitivity"]} == {"contact"}
 
 
