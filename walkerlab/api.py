@@ -23,7 +23,7 @@ from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import align_start, validate_tree
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.found_config import run_and_write
+from walkerlab.pipeline.extending_config import run_and_write
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.pipeline.results import MemoryResults

@@ -192,8 +192,8 @@ def _release(lock: Any) -> None:
         notify(compiling[-1][0].kernel if compiling else "")
 
 
-def needed_passes(pipelines: list[Any], code: CodeType) -> list[Any]:
-    """Remove passes that rewrite functions inside a function and array expressions, if `code` holds no functions."""
+def drop_rewriting_passes(pipelines: list[Any], code: CodeType) -> list[Any]:
+    """Drop passes that rewrite functions inside a function and array expressions, if `code` holds no functions."""
     # They take a twentieth of the compile time. Array expressions need memory, which kernels cannot allocate.
     if not any(isinstance(constant, CodeType) for constant in code.co_consts):
         for pipeline in pipelines:
@@ -206,7 +206,7 @@ class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
     """Numba's compiler without vectorised loops; if compilation fails, it releases the kernel's lock."""
 
     def define_pipelines(self) -> list[Any]:
-        return needed_passes(super().define_pipelines(), self.state.func_id.code)
+        return drop_rewriting_passes(super().define_pipelines(), self.state.func_id.code)
 
     def compile_extra(self, func: Any) -> Any:
         thresholds, vectorize = gc.get_threshold(), numba.config.LOOP_VECTORIZE
@@ -291,7 +291,7 @@ class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
         state = self.state
         if state.library is None:
             state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        return needed_passes([DefaultPassBuilder.define_nopython_pipeline(state)], state.func_id.code)
+        return drop_rewriting_passes([DefaultPassBuilder.define_nopython_pipeline(state)], state.func_id.code)
 
 
 def cached_plainly(function: Callable[..., Any], flags: dict[str, Any]) -> Any:

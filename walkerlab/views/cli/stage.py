@@ -6,7 +6,7 @@ from dataclasses import replace
 from walkerlab.config.walkers import why_rigid_alone
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.executor import short_reason
-from walkerlab.pipeline.found_config import run_and_write
+from walkerlab.pipeline.extending_config import run_and_write
 from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.runner import Options, StageReport
 from walkerlab.views.cli.failures import print_result
