@@ -20,10 +20,7 @@ DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
 def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
-    """Run a stage as requested and print its result; typer.Exit(4) if there is no answer.
-
-    Raises the other errors of `run_and_write`.
-    """
+    """Run a stage and print its result; raises typer.Exit(4) without an answer, and the errors of `run_and_write`."""
     try:
         report_on(request, stage, graph)
     except ConfigError as error:
