@@ -59,6 +59,7 @@ JITCodeLibrary = private_class(
 )
 Compiler = private_class("numba.core.compiler.Compiler", "compile_extra")
 CompilerBase = private_class("numba.core.compiler.CompilerBase", "define_pipelines")
+Flags = private_class("numba.core.compiler.Flags", "_values")
 DefaultPassBuilder = private_class("numba.core.compiler.DefaultPassBuilder", "define_nopython_pipeline")
 private_class("numba.core.compiler_machinery.PassManager", "finalize")
 Record = private_class("numba.core.types.npytypes.Record", "mangling_args")
@@ -192,6 +193,18 @@ def _release(lock: Any) -> None:
         notify(compiling[-1][0].kernel if compiling else "")
 
 
+class QuickFlags(Flags):  # type: ignore[misc, valid-type]
+    """Compiler flags that are equal if the same flags are set."""
+
+    # Numba looks up operators by their flags, and its own comparison goes through all flags, even those not set.
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, QuickFlags) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values))
+
+
 def drop_rewriting_passes(pipelines: list[Any], code: CodeType) -> list[Any]:
     """Drop passes that rewrite functions inside a function and array expressions, if `code` holds no functions."""
     # They take a twentieth of the compile time. Array expressions need memory, which kernels cannot allocate.
@@ -204,6 +217,10 @@ def drop_rewriting_passes(pipelines: list[Any], code: CodeType) -> list[Any]:
 
 class KernelCompiler(Compiler):  # type: ignore[misc, valid-type]
     """Numba's compiler without vectorised loops; if compilation fails, it releases the kernel's lock."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.flags = QuickFlags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
         return drop_rewriting_passes(super().define_pipelines(), self.state.func_id.code)
@@ -285,7 +302,7 @@ class PartCompiler(CompilerBase):  # type: ignore[misc, valid-type]
 
     def __init__(self, typing: Any, *rest: Any) -> None:
         super().__init__(typing, *rest)
-        self.state.typingctx = _ResolvedOnce(typing)
+        self.state.typingctx, self.state.flags = _ResolvedOnce(typing), QuickFlags(self.state.flags)
 
     def define_pipelines(self) -> list[Any]:
         state = self.state
