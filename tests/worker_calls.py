@@ -18,10 +18,6 @@ def own_id(_number=0):
     return os.getpid()
 
 
-def own_number():
-    return [float(own_id())]
-
-
 def sleep():
     time.sleep(600.0)
 

@@ -53,13 +53,6 @@ def test_a_unit_that_always_kills_its_worker_ends_the_work_and_the_others_are_ke
     assert Checkpoint(checkpoint.path, "key").kept == {"unit 0": [0.0], "unit 1": [1.0]}
 
 
-def test_short_work_is_done_alone_and_what_takes_longer_by_others(checkpoint):
-    units = [(f"unit {number}", 1, calls.own_number) for number in range(3)]
-    assert done(units, checkpoint, jobs=2, alone_s=600.0) == ([calls.own_number()] * 3, 3)
-    others, _ = done(units, Checkpoint(None, ""), jobs=2, alone_s=0.0)
-    assert calls.own_number() not in others
-
-
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize(("call", "error"), [(calls.divide_by_zero, ZeroDivisionError), (calls.no_answer, NoAnswer)])
 def test_an_error_of_a_unit_is_raised_and_what_came_before_is_kept(checkpoint, jobs, call, error):

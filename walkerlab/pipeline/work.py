@@ -145,7 +145,6 @@ def complete(
     jobs: int,
     shared_from: int = 0,
     compiled: bool = False,
-    alone_s: float = 0.0,
 ) -> tuple[list[Numbers], int]:
     """Compute the units that the checkpoint lacks, and store each in it.
 
@@ -153,7 +152,6 @@ def complete(
     jobs         maximum number of processes
     shared_from  minimum total size for which starting processes saves time
     compiled     whether all kernels are compiled; if not, the first unit runs alone and compiles them once
-    alone_s      time (s) during which this process computes alone; work that ends sooner starts no processes
 
     Returns the values computed for each unit, and the total size of the units computed now.
     """
@@ -171,10 +169,6 @@ def complete(
     def give_up(_unit: WorkUnit, error: BaseException) -> None:
         raise error
 
-    started = time.perf_counter()
-    while waiting and time.perf_counter() - started < alone_s:
-        unit = waiting.pop(0)
-        keep((unit,), compute((unit,)))
     workers = min(jobs, len(waiting)) if min(jobs, len(waiting)) > 1 and size >= shared_from else 0
     with WorkerPool(workers) if workers else InPlace() as executor:
         Spread(iter(waiting), len(waiting), keep, give_up, 0.0, 0.0 if compiled else None).run(executor)

@@ -92,6 +92,7 @@ def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
 
 DRIVES = {
     "nothing": (),
+    "a push-off": ("push_off.impulse_N_s=1",),
     "all drives": (
         "push_off.impulse_N_s=1", "push_off.duration_s=0.02", "walker.hip.spring_N_m_per_rad=2",
         "walker.hip.damping_N_m_s_per_rad=0.05", "walker.hip.torque_N_m=0.3",

@@ -28,6 +28,10 @@ class Program:
     def __call__(self, *arguments, environment=None):
         return forks().run(self.module, arguments, self.folder, {**self.environment, **(environment or {})})
 
+    def alone(self, *arguments):
+        """Run it in one process: to start others takes longer than the toy's stages."""
+        return self(*arguments, "--jobs", "1")
+
     def start(self, *arguments, environment=None, **options):
         """Start it as a terminal does: where the tests are a script's background job they ignore Ctrl-C."""
         return subprocess.Popen(

@@ -2,8 +2,6 @@ import json
 import os
 import pty
 
-ALONE = ("--jobs", "1")  # no processes are started, which takes longer than the toy's stages
-
 
 def states(done):
     return {row["stage"]: row["state"] for row in json.loads(done.stdout)["stages"]}
@@ -13,7 +11,7 @@ def test_status_says_missing_current_stale_damaged_and_left_out(toy):
     assert set(states(toy("status", "--json")).values()) == {"missing", "not run"}
     assert "drop     missing\n" in toy("status").stdout
     assert not list(toy.folder.iterdir())
-    toy("page", *ALONE)
+    toy.alone("page")
     runs = toy.folder / "runs"
     assert set(states(toy("status", "--json")).values()) == {"current", "not run"}
     (runs / "paper@strides=3").mkdir()
@@ -35,7 +33,7 @@ def test_status_says_missing_current_stale_damaged_and_left_out(toy):
 
 def test_status_says_where_there_is_no_answer(toy):
     steep = ("--set", "slope_rad=1.2")
-    toy("page", *ALONE, *steep)
+    toy.alone("page", *steep)
     found = toy("status", "--check", "--json", *steep)
     assert states(found)["drop"] == "no answer"
     assert states(found)["roll"] == "left out"
@@ -49,7 +47,7 @@ def test_status_check_exits_5_unless_all_is_current(toy):
     assert json.loads(done.stdout)["current"] is False
     assert "error: not every result is up to date: 4 missing." in done.stderr
     assert toy("status").returncode == 0
-    toy("page", *ALONE)
+    toy.alone("page")
     assert toy("status", "--check").returncode == 0
 
 
@@ -83,7 +81,7 @@ def test_show_of_no_run_exits_3_of_no_result_5_and_of_something_outdated_warns(t
 
 
 def test_clean_removes_results_and_nothing_else(toy):
-    toy("page", *ALONE)
+    toy.alone("page")
     run = toy.folder / "runs" / "paper"
     (run / "notes.txt").write_text("mine")
     (run / ".drop.h5.12345678.tmp").touch()
@@ -117,7 +115,7 @@ def test_clean_asks_on_a_terminal(toy):
 
 
 def test_status_gives_a_reason_once(toy):
-    toy("page", *ALONE, "--set", "slope_rad=1.2")
+    toy.alone("page", "--set", "slope_rad=1.2")
     lines = toy("status", "--set", "slope_rad=1.2").stdout.splitlines()
     reasons = [line.split(maxsplit=3)[3] for line in lines[3:] if "left out" in line]
     assert reasons == ["it needs drop", "as roll"]

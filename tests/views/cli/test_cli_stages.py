@@ -6,7 +6,6 @@ import signal
 
 import pytest
 
-ALONE = ("--jobs", "1")  # no processes are started, which takes longer than the toy's stages
 COMMON = {"stage", "run_dir", "artifact", "reused", "wall_s", "left_out"}
 
 
@@ -89,7 +88,7 @@ def test_dry_run_says_what_would_happen_and_why_and_touches_nothing(toy):
 
 
 def test_dry_run_after_a_run_says_that_all_is_reused(toy):
-    toy("page", *ALONE)
+    toy.alone("page")
     plan = one_object(toy("page", "--dry-run", "--json"))
     assert plan["reused"] is True
     assert {step["action"] for step in plan["stages"]} == {"reuse"}
@@ -167,7 +166,7 @@ def caught(toy, tmp_path):
         process.kill()
 
 
-def test_no_wait_exits_6_beside_another_process_and_interrupted_that_exits_130_and_leaves_no_lock(toy, caught):
+def test_no_wait_exits_6_while_another_process_works_which_exits_130_if_interrupted_and_leaves_no_lock(toy, caught):
     done = toy("drop", "--no-wait", "--json")
     assert done.returncode == 6
     assert one_object(done)["error"]["exit_code"] == 6
@@ -240,8 +239,7 @@ def test_a_question_that_cannot_be_meant_stops_before_anything_runs(walker, aske
 
 
 def test_what_was_left_out_is_told_to_those_who_ask(toy):
-    assert "left out" not in toy("page", *ALONE, "--config", "rigid-only").stdout
+    assert "left out" not in toy.alone("page", "--config", "rigid-only").stdout
     assert (
-        "left out: bounce (the config has no contact block)"
-        in toy("page", *ALONE, "--config", "rigid-only", "-v").stdout
+        "left out: bounce (the config has no contact block)" in toy.alone("page", "--config", "rigid-only", "-v").stdout
     )

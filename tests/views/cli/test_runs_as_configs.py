@@ -11,8 +11,6 @@ import pytest
 
 from walkerlab.pipeline.store import artifact
 
-ALONE = ("--jobs", "1")  # no processes are started, which takes longer than the toy's stages
-
 
 def config(toy, path, gravity, name="stone"):
     file = toy.folder / path
@@ -196,7 +194,7 @@ def test_a_run_that_is_not_there_exits_3(toy, command):
 
 
 def test_damaged_results_are_told_in_one_message_with_what_makes_them_anew(toy):
-    toy("page", *ALONE)
+    toy.alone("page")
     toy("roll", "--set", "strides=7")
     artifacts = [toy.folder / "runs/paper" / name for name in ("drop.h5", "roll.h5")]
     for path in artifacts:
@@ -225,10 +223,10 @@ def test_damaged_results_are_told_in_one_message_with_what_makes_them_anew(toy):
 
 
 def test_a_drawing_says_that_what_it_does_without_is_damaged(toy):
-    toy("survey", "--full", *ALONE)
+    toy.alone("survey", "--full")
     census = toy.folder / "runs/paper/census.h5"
     census.write_bytes(census.read_bytes()[:-1])
-    assert toy("page", *ALONE).returncode == 0
+    assert toy.alone("page").returncode == 0
     page = (toy.folder / "runs/paper/report.html").read_text()
     assert "<p>census: its result is damaged: it does not end" in page
     assert "`walkerlab survey --full` recomputes it</p>" in page

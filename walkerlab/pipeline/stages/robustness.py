@@ -48,8 +48,6 @@ from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 Rows = list[dict[str, Any]]
 
 WALKS_AT_ONCE: Final = 25
-ALONE_S: Final = 1.0
-"""Time for which the rigid model's disturbances and walks are computed in one process, about the start of another."""
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
 """Maximum total number of steps of all walks on ground of one roughness, by model."""
@@ -131,9 +129,8 @@ def run(
         answer["gait_sensitivity_norm"] += norms(subject.model, gait)
         rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
         units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
-        alone_s = 0.0 if subject.model == CONTACT else ALONE_S
         # the computation of the gait's quantities has compiled all kernels
-        done, _ = complete(units, checkpoint, label, progress, processes, compiled=True, alone_s=alone_s)
+        done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
         model, target = {"model": subject.model}, {"steps": config.robustness.steps}
         answer["largest_step"].append({**model, "down_m": down, "up_m": up, **target})
