@@ -2,40 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.recording import TIME, Array, Recording
+from walkerlab.exchange.recording import TIME, UNIT_IN_NAME, Array, Recording
+from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
 
-DEG_RAD: Final = math.pi / 180.0
-ANGLES: Final = {
-    "rad": 1.0, "radian": 1.0, "radians": 1.0, "deg": DEG_RAD, "degree": DEG_RAD, "degrees": DEG_RAD, "°": DEG_RAD,
-}  # fmt: skip
-LENGTHS: Final = {
-    "m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 1e-3, "millimeter": 1e-3, "cm": 1e-2, "centimeter": 1e-2, "km": 1e3,
-    "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "foot": 0.3048,
-}  # fmt: skip
-UNIT_VALUES: Final[Mapping[str, Mapping[str, float]]] = {
-    "time": {
-        "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "millisecond": 1e-3,
-        "min": 60.0, "minute": 60.0,
-    },
-    "angle": ANGLES,
-    "rate": {f"{unit}/{second}": value for unit, value in ANGLES.items() for second in ("s", "sec")},
-    "length": LENGTHS,
-    "speed": {f"{unit}/{second}": value for unit, value in LENGTHS.items() for second in ("s", "sec")},
-    "force": {"n": 1.0, "newton": 1.0, "kn": 1e3},
-    "energy": {"j": 1.0, "joule": 1.0, "mj": 1e-3, "n mm": 1e-3},
-}  # fmt: skip
-"""Value of each unit in SI, by kind of quantity; unit names are in lower case."""
-SI: Final = {kind: next(iter(units)) for kind, units in UNIT_VALUES.items()}
 OF_LEG: Final = {
     "angle": "angle", "velocity": "rate", "shank_angle": "angle", "shank_velocity": "rate", "foot_along_m": "length",
     "foot_height_m": "length", "knee_along_m": "length", "knee_height_m": "length", "normal_force_N": "force",
@@ -60,6 +39,7 @@ class RecordedWalk:
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)  # reason by quantity that a column has but the walk lacks
 
     def both_legs(self, name: str) -> Array | None:
         """Return a quantity of both legs (samples, 2); None unless it is recorded for both."""
@@ -75,13 +55,84 @@ def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str
 
     Raises ConfigError for a column or unit that is unknown or missing, and for gaps.
     """
-    sources = {**matches(recording, set(columns)), **named_columns(recording, columns)}
+    refuse_units(recording, units, QUANTITY_KINDS)
+    named = find_named(recording, columns)
+    sources, left_out = matches(recording, named.keys())
+    sources |= named
     for name in NEEDED:
+        if name in left_out:
+            raise ConfigError(left_out[name], f'Choose one: --columns "{name}=..."')
         if name not in sources:
             raise missing(recording, name)
-    values = {name: in_si(recording, name, source, units) for name, source in sources.items()}
+    asked = {**dict.fromkeys(NEEDED), **named}.keys()
+    part, cut = without_gaps_at_ends(recording, [sources[name] for name in asked])
+    left_out |= {"samples": cut} if cut else {}
+    within = replace(recording, columns={name: values[part] for name, values in recording.columns.items()})
+    values = {}
+    for name, source in sources.items():
+        try:
+            refuse_gaps(recording, source, part)
+            values[name] = in_si(within, name, source, units)
+        except ConfigError as error:
+            if name in asked:
+                raise
+            left_out[name] = error.message
     time = values.pop(TIME)
-    return RecordedWalk(time, values, sources)
+    refuse_order(recording.path, time)
+    return RecordedWalk(time, values, {name: sources[name] for name in (TIME, *values)}, left_out)
+
+
+def without_gaps_at_ends(recording: Recording, sources: Iterable[str]) -> tuple[slice, str]:
+    """Return the samples from the first to the last in which no source has a gap, and in words what is cut, or ''.
+
+    Raises ConfigError for a column that is not of numbers, and if every sample has a gap.
+    """
+    used = dict.fromkeys(column for source in sources for column in columns_of(recording, source))
+    for column in used:
+        refuse_problem(recording, column)
+    whole = np.flatnonzero(np.all([np.isfinite(recording.columns[column]) for column in used], axis=0))
+    if not whole.size:
+        raise ConfigError(f"{recording.path} has no sample with values of {', '.join(used)}.", "Record the walk again.")
+    before, after = int(whole[0]), next(iter(recording.columns.values())).size - 1 - int(whole[-1])
+    cut = f"{before} at the beginning and {after} at the end, which have gaps" if before or after else ""
+    return slice(before, int(whole[-1]) + 1), cut
+
+
+def refuse_problem(recording: Recording, column: str) -> None:
+    """Raise ConfigError for a column that the file's reader could not use."""
+    if column in recording.problems:
+        raise ConfigError(
+            f"{recording.path}: {column!r} cannot be used: {recording.problems[column]}.",
+            "Correct the file, or name another column (--columns).",
+        )
+
+
+def refuse_gaps(recording: Recording, source: str, part: slice) -> None:
+    """Raise ConfigError for a source of which values are missing within a part of the samples."""
+    for column in columns_of(recording, source):
+        refuse_problem(recording, column)
+        values = recording.columns[column]
+        gaps = np.arange(values.size)[part][~np.isfinite(values[part])]
+        if gaps.size:
+            raise ConfigError(
+                f"{recording.path}: {column!r} lacks {gaps.size} of {values.size} values, the first at sample "
+                f"{gaps[0] + 1}.",
+                "Fill the gaps, or cut the recording to a part without them.",
+            )
+
+
+def refuse_order(path: Path, time: Array) -> None:
+    """Raise ConfigError unless the times are at least two and strictly rising."""
+    if time.size < 2:
+        raise ConfigError(f"{path} holds {time.size} samples; a walk needs at least two.", "Record a longer walk.")
+    steps_back = np.flatnonzero(np.diff(time) <= 0.0)
+    if steps_back.size:
+        row = int(steps_back[0])
+        raise ConfigError(
+            f"{path}: time does not increase from sample {row + 1} ({time[row]:.9g} s) "
+            f"to {row + 2} ({time[row + 1]:.9g} s).",
+            "Sort the rows by time, and remove duplicate times.",
+        )
 
 
 def plain(name: str) -> str:
@@ -89,24 +140,29 @@ def plain(name: str) -> str:
     return re.sub(r"[\s_\-]+", "_", name.strip().lower())
 
 
-def matches(recording: Recording, named: set[str]) -> dict[str, str]:
+def matches(recording: Recording, named: Collection[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Return a column by quantity: the column with the quantity's name, otherwise the only one whose name ends in it.
+
+    Also returns the reason for each quantity for which there are several columns.
 
     named  quantities to skip, because the user names their columns
     """
-    sources = {}
-    for name in QUANTITY_KINDS.keys() - named:
-        names = {plain(name), plain(name).removesuffix("_m"), *leg_names(name)}
-        exact = [column for column in recording.columns if plain(column) in names]
-        longer = [column for column in recording.columns if any(ends_in(plain(column), ending) for ending in names)]
-        if len(candidates := exact or longer) == 1:
+    columns = {column: plain(column) for column in recording.columns}
+    by_ending: dict[str, list[str]] = {}
+    for column, name in columns.items():
+        for place in (0, *(match.end() for match in re.finditer(r"[./]", name))):
+            by_ending.setdefault(name[place:], []).append(column)
+    sources = {} if recording.time_name is None or TIME in named else {TIME: recording.time_name}
+    problems = {}
+    for name in (name for name in QUANTITY_KINDS if name != TIME and name not in named):
+        names = (plain(name), plain(name).removesuffix("_m"), *leg_names(name))
+        found = list(dict.fromkeys(column for ending in names for column in by_ending.get(ending, ())))
+        candidates = [column for column in found if columns[column] in names] or found
+        if len(candidates) == 1:
             sources[name] = candidates[0]
-        elif len(candidates) > 1:
-            raise ConfigError(
-                f"{recording.path}: columns {' and '.join(candidates[:3])} could each be {name!r}.",
-                f'Choose one: --columns "{name}=..."',
-            )
-    return sources
+        elif candidates:
+            problems[name] = f"{recording.path}: columns {' and '.join(candidates[:3])} could each be {name!r}."
+    return sources, problems
 
 
 def leg_names(name: str) -> list[str]:
@@ -115,12 +171,7 @@ def leg_names(name: str) -> list[str]:
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
 
-def ends_in(name: str, ending: str) -> bool:
-    """Return whether a name ends in `ending` after a dot or a slash."""
-    return name.endswith((f".{ending}", f"/{ending}"))
-
-
-def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str, str]:
+def find_named(recording: Recording, columns: Mapping[str, str]) -> dict[str, str]:
     """Return the columns that the user names, by quantity; raises ConfigError for an unknown quantity or column."""
     known = {plain(name): name for name in QUANTITY_KINDS}
     sources = {}
@@ -130,69 +181,127 @@ def named_columns(recording: Recording, columns: Mapping[str, str]) -> dict[str,
             near = get_close_matches(plain(quantity), known, 1)
             advice = f"Did you mean {known[near[0]]!r}?" if near else f"Available: {', '.join(QUANTITY_KINDS)}."
             raise ConfigError(f"--columns: {quantity!r} is not a quantity of a walk.", advice)
-        ends = LINE.fullmatch(column)
-        markers = [f"{marker}.{axis}" for marker in (ends[1], ends[2]) for axis in "xyz"] if ends else [column]
-        for needed in markers:
-            if needed not in recording.columns:
-                near = get_close_matches(needed, recording.columns, 1, 0.3)
-                advice = (
-                    f"Did you mean {near[0]!r}?" if near else f"Available: {', '.join(list(recording.columns)[:12])}."
-                )
-                raise ConfigError(f"{recording.path} has no column {needed!r}.", advice)
-        sources[name] = column
+        sources[name] = named_column(recording, column)
+        columns_of(recording, sources[name])
     return sources
+
+
+def named_column(recording: Recording, name: str) -> str:
+    """Return the column that a user names as in the file's header, with or without the unit in brackets."""
+    return name if name in recording.columns else UNIT_IN_NAME.sub("", name)
+
+
+def columns_of(recording: Recording, source: str) -> list[str]:
+    """Return the columns that a source needs: its own, or the coordinates of a line's ends; ConfigError if absent."""
+    ends = None if source in recording.columns else LINE.fullmatch(source)
+    if ends is not None:
+        return [column for pair in line_columns(recording, ends[1], ends[2]) for column in pair]
+    if source not in recording.columns:
+        raise unknown_column(recording, source)
+    return [source]
+
+
+def line_columns(recording: Recording, top: str, bottom: str) -> list[tuple[str, str]]:
+    """Return the two columns of each coordinate, x, y or z, that both markers have; ConfigError without a marker."""
+    ends = [axes_of(recording, marker) for marker in (top, bottom)]
+    return [(ends[0][axis], ends[1][axis]) for axis in "xyz" if axis in ends[0] and axis in ends[1]]
+
+
+def axes_of(recording: Recording, marker: str) -> dict[str, str]:
+    """Return the column of each coordinate of a marker, such as HIP.x, HIP X or HIP.PosX."""
+    pattern = re.compile(rf"{re.escape(marker)}(?i:[\s._:]+(?:pos[\s._]*)?([xyz]))")
+    axes: dict[str, str] = {}
+    for column in recording.columns:
+        match = pattern.fullmatch(column)
+        first = column if match is None else axes.setdefault(match[1].lower(), column)
+        if first != column:
+            raise ConfigError(
+                f"{recording.path}: columns {first} and {column} could each be a coordinate of {marker}.",
+                "Rename one of them in the file.",
+            )
+    if len(axes) < 2:
+        raise unknown_column(recording, f"{marker}.x")
+    return axes
+
+
+def unknown_column(recording: Recording, column: str) -> ConfigError:
+    """Build the error for a column that the file lacks; it suggests the one with the most similar name."""
+    near = get_close_matches(column, recording.columns, 1, 0.3)
+    advice = f"Did you mean {near[0]!r}?" if near else f"Available: {', '.join(list(recording.columns)[:12])}."
+    return ConfigError(f"{recording.path} has no column {column!r}.", advice)
 
 
 def missing(recording: Recording, name: str) -> ConfigError:
     """Build the error for a quantity without a column; it suggests the column with the most similar name."""
+    there = ", ".join(list(recording.columns)[:12])
+    if name == TIME:
+        return ConfigError(
+            f"{recording.path} has no time column; the first columns are {there}.",
+            'Name it: --columns "time=NAME". A file that counts frames needs a column of times.',
+        )
     near = get_close_matches(plain(name), [plain(column) for column in recording.columns], 1, 0.2)
     nearest = next((column for column in recording.columns if near and plain(column) == near[0]), "NAME")
-    there = ", ".join(column for column in list(recording.columns)[:12])
     return ConfigError(
         f"{recording.path} has no column for {name!r}; it has: {there}.", f'Name it: --columns "{name}={nearest}"'
     )
 
 
 def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]) -> Array:
-    """Return a quantity in SI units; raises ConfigError for gaps, and for a missing or unsuitable unit."""
-    kind = QUANTITY_KINDS[name]
-    if ends := LINE.fullmatch(source):
-        return line_angle(*(marker_place(recording, marker, units) for marker in (ends[1], ends[2])))
-    values = recording.columns[source] * unit_value(recording, name, source, kind, units)
-    return complete(recording, name, source, values)
+    """Return a quantity in SI units; raises ConfigError for a missing or unsuitable unit."""
+    ends = None if source in recording.columns else LINE.fullmatch(source)
+    if ends is not None:
+        return line_angle(*places_of_ends(recording, line_columns(recording, ends[1], ends[2]), units))
+    return recording.columns[source] * unit_value(recording, name, source, QUANTITY_KINDS[name], units)
 
 
-def complete(recording: Recording, name: str, source: str, values: Array) -> Array:
-    """Return the values of a column; raises ConfigError if it has gaps."""
-    gaps = np.flatnonzero(~np.isfinite(values))
-    if gaps.size:
-        time = recording.columns[TIME][gaps[0]]
-        raise ConfigError(
-            f"{recording.path}: {source!r} ({name}) has {gaps.size} gaps, the first at time {time:.6g} "
-            f"(sample {gaps[0] + 1}).",
-            "Fill the gaps, or cut the recording to a part without them.",
-        )
-    return values
+def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Collection[str]) -> None:
+    """Raise ConfigError for a unit of something that is neither a kind, a quantity nor a column, or of another kind."""
+    for name, unit in units.items():
+        if name not in (*UNIT_VALUES, *quantities, *recording.columns):
+            near = get_close_matches(name, (*UNIT_VALUES, *quantities, *recording.columns), 1)
+            advice = f"Did you mean {near[0]!r}?" if near else f"Kinds: {', '.join(UNIT_VALUES)}."
+            raise ConfigError(
+                f"--units: {name!r} is neither a kind, a quantity nor a column of {recording.path}.", advice
+            )
+        if name in UNIT_VALUES and value_in_si(unit, name) is None:
+            raise unknown_unit(recording, unit, name, name)
 
 
 def unit_value(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> float:
-    """Return the SI value of a column's unit, which the user, the file or the column's name states."""
-    unit = (
-        units.get(source) or units.get(name) or recording.units.get(source) or units.get(kind)
-        or recording.kind_units.get(kind) or unit_in_name(source, kind) or rate_unit(recording, kind, units)
-    )  # fmt: skip
+    """Return the SI value of a column's unit, which the file or the user states; ConfigError if they disagree."""
+    unit = stated_unit(recording, name, source, kind, units)
     if not unit:
         raise ConfigError(
             f"{recording.path} states no unit for {source!r} ({name}).",
             f"Add --units {kind}={SI[kind]}, or another unit: {', '.join(list(UNIT_VALUES[kind])[:6])}.",
         )
-    value = UNIT_VALUES[kind].get(unit.strip().lower())
+    value = value_in_si(unit, kind)
     if value is None:
-        raise ConfigError(
-            f"{recording.path}: {unit!r}, stated for {name!r}, is not a known unit of {kind}.",
-            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; set --units {kind}={SI[kind]}.",
-        )
+        raise unknown_unit(recording, unit, name, kind)
     return value
+
+
+def stated_unit(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> str:
+    """Return the unit that the file or the user states for a column, or ''; raises ConfigError if they disagree."""
+    of_user = units.get(source) or units.get(name) or units.get(kind) or rate_unit(units, kind)
+    of_file = (
+        recording.units.get(source) or recording.kind_units.get(kind) or unit_in_name(source, kind)
+        or rate_unit(recording.kind_units, kind)
+    )  # fmt: skip
+    known = value_in_si(of_file, kind)
+    if of_user and known is not None and value_in_si(of_user, kind) != known:
+        raise ConfigError(
+            f"{recording.path} states that {source!r} ({name}) is in {of_file}, but --units that it is in {of_user}.",
+            "Leave out that unit, or correct the one in the file.",
+        )
+    return of_user or of_file
+
+
+def unknown_unit(recording: Recording, unit: str, name: str, kind: str) -> ConfigError:
+    return ConfigError(
+        f"{recording.path}: {unit!r}, stated for {name!r}, is not a known unit of {kind}.",
+        f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; set --units {kind}={SI[kind]}.",
+    )
 
 
 def unit_in_name(column: str, kind: str) -> str:
@@ -201,18 +310,22 @@ def unit_in_name(column: str, kind: str) -> str:
     return max(endings, key=len, default="")
 
 
-def rate_unit(recording: Recording, kind: str, units: Mapping[str, str]) -> str:
+def rate_unit(units: Mapping[str, str], kind: str) -> str:
     """Derive the unit of velocities from the unit of angles or lengths; empty if that is not stated either."""
-    moved = {"rate": "angle", "speed": "length"}.get(kind, "")
-    unit = units.get(moved) or recording.kind_units.get(moved)
+    unit = units.get({"rate": "angle", "speed": "length"}.get(kind, ""))
     return f"{unit}/s" if unit else ""
 
 
-def marker_place(recording: Recording, marker: str, units: Mapping[str, str]) -> Array:
-    """Return the positions (samples, 3) of a marker (m)."""
-    axes = [f"{marker}.{axis}" for axis in "xyz"]
-    scale = unit_value(recording, marker, axes[0], "length", units)
-    return np.stack([complete(recording, marker, axis, recording.columns[axis] * scale) for axis in axes], axis=1)
+def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> list[Array]:
+    """Return the positions (samples, axes) of a line's ends: in m, or as recorded if all have the same unknown unit."""
+    columns = [column for pair in pairs for column in pair]
+    stated = {stated_unit(recording, column, column, "length", units) for column in columns}
+    scaled = len(stated) > 1 or value_in_si(next(iter(stated)), "length") is not None
+    places = {
+        column: recording.columns[column] * (unit_value(recording, column, column, "length", units) if scaled else 1.0)
+        for column in columns
+    }
+    return [np.stack([places[column] for column in end], axis=1) for end in zip(*pairs, strict=True)]
 
 
 def line_angle(top: Array, bottom: Array) -> Array:
@@ -241,7 +354,7 @@ def parse_units(texts: Sequence[str]) -> dict[str, str]:
     """Return units by kind, quantity or column; a unit alone, such as `deg`, applies to its kind (angles)."""
     pairs, alone = [], {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
-        kinds = [kind for kind, units in UNIT_VALUES.items() if part.lower() in units]
+        kinds = [kind for kind in UNIT_VALUES if value_in_si(part, kind) is not None]
         if "=" in part:
             pairs.append(part)
         elif kinds:

@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import csv
 import re
+import stat
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from importlib.util import find_spec
-from io import BytesIO, StringIO
+from io import BytesIO
+from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 from xml.etree import ElementTree
 from zipfile import BadZipFile
@@ -23,19 +28,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
+from walkerlab.exchange.units import UNIT_VALUES, is_unit
+
+csv.field_size_limit(2**31 - 1)  # a cell may hold a long comment
 
 Array = NDArray[np.float64]
+Row = tuple[int, list[str]]
+"""Line number of a row, as an editor shows it, and the row's cells."""
 
 TIME: Final = "time"
-TIME_NAMES = [re.compile(pattern) for pattern in ("(?i:time)", "t", r"(?i:.*[.\s_]time)", "T")]
+TIME_NAMES = [
+    re.compile(pattern)
+    for pattern in (
+        "(?i:time)", "t", r"(?i:.*[.\s_]time)", r"(?i:time[\s_]?stamp)",
+        rf"(?i:(?:time|time[\s_]?stamp|t)[\s_](?:{'|'.join(UNIT_VALUES['time'])}))", "T",
+    )
+]  # fmt: skip
 """Names of a file's time column; T comes last, because it may be a temperature."""
 UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 """Texts of cells without a value, in lower case."""
+DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
+THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+"""Pattern for numbers whose comma may also separate thousands."""
+DECLARED_ENCODING: Final = re.compile(rb"""\s*<\?xml[^>]*encoding\s*=\s*["']([\w.-]+)""")
+LONGEST_PATH: Final = 200  # characters of a path that messages show
 HEADER_LINES: Final = 60
 """Number of lines at the top of a file that are searched for the header."""
 WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
+
+EXPORT_MARKERS: Final = "Export the markers as .c3d or .trc."
+PROGRAMS: Final = {
+    re.compile(r"(?:Trajectories|Devices|Joints|Segments|Model Outputs)\W*\n"): ("Vicon Nexus", EXPORT_MARKERS),
+    re.compile(r"Format Version,"): ("Motive", EXPORT_MARKERS),
+    re.compile(r"NO_OF_FRAMES(?!(?s:.*)\nFrame\tTime)"): (
+        "Qualisys Track Manager without column headers or time",
+        "Export it with column headers and time, or export the markers as .c3d.",
+    ),
+    re.compile(r"scorer,"): (
+        "DeepLabCut, which counts frames",
+        "Write a table with a header of one row and a column of times: time (s),hip.x,hip.y,foot1.x,foot1.y,...",
+    ),
+}
+"""Program and advice by the beginning of a table that must be exported in another way."""
 
 
 C3D_PATIENCE_S: Final = 60.0
@@ -43,7 +79,9 @@ C3D_PROGRAM: Final = """
 import sys, ezc3d, numpy
 content = ezc3d.c3d(sys.argv[1])
 point = content["parameters"]["POINT"]
-labels, units = (numpy.array(point.get(name, {}).get("value", []), str) for name in ("LABELS", "UNITS"))
+names = sorted((name for name in point if name.startswith("LABELS")), key=lambda name: (len(name), name))
+labels = numpy.array([label for name in names for label in point[name]["value"]], str)
+units = numpy.array(point.get("UNITS", {}).get("value", []), str)
 rate = numpy.ravel(point["RATE"]["value"])
 numpy.savez(sys.stdout.buffer, places=content["data"]["points"], rate=rate, labels=labels, units=units)
 """
@@ -54,10 +92,17 @@ class Recording:
     """Time series of a recording as stored in the file, before any unit conversion; missing values are nan."""
 
     path: Path
-    columns: dict[str, Array]  # (samples,) arrays by name; the time column is named `time`
+    columns: dict[str, Array]  # (samples,) arrays by name
     units: dict[str, str] = field(default_factory=dict)  # unit by column, where the file states one, as written there
     # unit by kind ('angle', 'length', 'time', 'force'), where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
+    # reason by column why it cannot be used, such as a cell with text
+    problems: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def time_name(self) -> str | None:
+        """Name of the time column: the first that matches the first of TIME_NAMES that any matches; None if none."""
+        return next((name for pattern in TIME_NAMES for name in self.columns if pattern.fullmatch(name)), None)
 
 
 def read_recording(path: Path) -> Recording:
@@ -72,61 +117,71 @@ def read_recording(path: Path) -> Recording:
             FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {WANTED}."),
         )
     try:
-        recording = reader(path)
+        refuse_special(path)
+        return reader(path)
     except OSError as error:
-        raise ConfigError(
-            f"{path} cannot be read: {error.strerror or error}.", "Check the path given to --with."
-        ) from error
-    return checked_time(recording)
+        raise unreadable(path, error) from error
 
 
-def checked_time(recording: Recording) -> Recording:
-    """Return the recording unchanged; raises ConfigError unless its time is complete and strictly rising."""
-    time, path = recording.columns.get(TIME), recording.path
-    if time is None:
-        names = ", ".join(list(recording.columns)[:8])
-        raise ConfigError(f"{path} has no time column; the first columns are {names}.", "Name it: --columns time=NAME")
-    if time.size < 2:
-        raise ConfigError(f"{path} holds {time.size} samples; a walk needs at least two.", "Record a longer walk.")
-    gaps = np.flatnonzero(~np.isfinite(time))
-    if gaps.size:
-        raise ConfigError(
-            f"{path}: time is missing at sample {gaps[0] + 1}.", "Fill the time column, or leave out such rows."
-        )
-    steps_back = np.flatnonzero(np.diff(time) <= 0.0)
-    if steps_back.size:
-        row = int(steps_back[0])
-        raise ConfigError(
-            f"{path}: time does not increase from sample {row + 1} ({time[row]:.9g}) "
-            f"to {row + 2} ({time[row + 1]:.9g}).",
-            "Sort the rows by time, and remove duplicate times.",
-        )
-    return recording
+def unreadable(path: Path, error: OSError) -> ConfigError:
+    text = str(path)
+    shown = text if len(text) <= LONGEST_PATH else f"{text[:LONGEST_PATH]}..."
+    return ConfigError(f"{shown} cannot be read: {error.strerror or error}.", "Check the path of the file.")
+
+
+def refuse_special(path: Path) -> None:
+    """Raise ConfigError for a pipe or device, which might never end; OSError for a path without a file."""
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise ConfigError(f"{path} is a pipe or a device, not a file.", "Save what it delivers as a file first.")
+
+
+def build_recording(
+    path: Path,
+    names: Sequence[str],
+    values: Iterable[Array],
+    units: Mapping[str, str],
+    kind_units: Mapping[str, str],
+    problems: Iterable[str] = (),
+) -> Recording:
+    """Build a recording from columns in order; columns without a name are left out.
+
+    problems  reason for each column why it cannot be used, or ''; a name that several columns have is a reason, too
+    """
+    columns = dict(zip(names, values, strict=True))
+    reasons = {name: reason for name, reason in zip(names, problems, strict=False) if reason}
+    reasons |= {name: f"{count} columns have this name" for name, count in Counter(names).items() if count > 1}
+    columns.pop("", None)
+    return Recording(path, columns, dict(units), dict(kind_units), reasons)
 
 
 # Delimited text -------------------------------------------------------------------------------------------------------
 
 
 def read_delimited(path: Path) -> Recording:
-    """Read a CSV file or an ADAMS table, which has optional titles, a header, and rows of numbers."""
-    lines = without_last_delimiters(text_of(path).splitlines())
-    header, delimiter = header_of(path, lines)
-    names, units = names_and_units(split_row(lines[header], delimiter))
-    names = unique(path, names)
-    values = numbers_in(path, lines, header + 1, delimiter, len(names))
-    columns = {name: values[:, place] for place, name in enumerate(names)}
-    return as_time_column(
-        Recording(path, columns, {name: unit for name, unit in zip(names, units, strict=True) if unit})
-    )
+    """Read a CSV file or an ADAMS table: perhaps titles, a header, perhaps a row of units, and rows of numbers."""
+    text = text_of(path)
+    for beginning, (program, advice) in PROGRAMS.items():
+        if beginning.match(text):
+            raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
+    lines = text.splitlines()
+    delimiter, header, unit_row, first = header_of(path, lines)
+    names, units = names_and_units(header)
+    names = [name or f"column {number}" for number, name in enumerate(names, 1)]
+    stated = {name: of_row or unit for name, of_row, unit in zip(names, unit_row, units, strict=True) if of_row or unit}
+    return table_of(path, names, (row for row in rows_of(lines, delimiter) if row[0] >= first), stated)
 
 
 def text_of(path: Path) -> str:
-    """Read a text file in UTF-8, UTF-16 or Latin-1; raises ConfigError for binary data."""
+    """Read a text file: UTF-16, what an XML file declares, UTF-8 or Latin-1; raises ConfigError for binary data."""
     data = path.read_bytes()
-    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "latin-1"):
+    declared = match[1].decode() if (match := DECLARED_ENCODING.match(data)) else "utf-8"
+    # bytes that can be matched are not in the UTF-16 that some programs declare
+    encodings = ("utf-8-sig" if declared.lower().startswith(("utf-", "ucs-")) else declared, "utf-8-sig", "latin-1")
+    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else encodings:
         try:
             text = data.decode(encoding)
-        except UnicodeDecodeError:
+        except (UnicodeDecodeError, LookupError):
             continue
         if "\0" in text:
             break
@@ -134,44 +189,53 @@ def text_of(path: Path) -> str:
     raise ConfigError(f"{path} is not a text file, despite its extension.", f"Export it as one of: {WANTED}.")
 
 
-def without_last_delimiters(lines: list[str]) -> list[str]:
-    """Remove the delimiter that some spreadsheets append to every row."""
-    first = next((number for number, line in enumerate(lines) if line.endswith(tuple(DELIMITERS))), len(lines))
-    last = lines[first][-1] if first < len(lines) else ""
-    header_is_before = first > 0 and last in lines[first - 1]
-    if header_is_before or not all(line.endswith(last) for line in lines[first:] if line.strip()):
-        return lines
-    return [*lines[:first], *(line[:-1] for line in lines[first:])]
+def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[Row]:
+    """Yield the rows that are not empty, with their cells stripped of blanks."""
+    reader = csv.reader(lines, delimiter=delimiter)
+    for row in reader:
+        cells = [cell.strip() for cell in row]
+        if any(cells):
+            yield reader.line_num, cells
 
 
-def header_of(path: Path, lines: Sequence[str]) -> tuple[int, str]:
-    """Find the header, the first row of names above a row of as many values; return its index and the delimiter.
+def header_of(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[str], int]:
+    """Find the header: the first row of names above a row of as many values, perhaps with a row of units between them.
 
-    A table with several columns takes precedence over a table with one column.
+    Returns the delimiter, the names, the units ('' without a row of units), and the line number of the first values.
+    A table with several columns takes precedence over a table with one column, and words as names over numbers.
     """
-    several = [(number, delimiter) for number in range(len(lines[:HEADER_LINES])) for delimiter in DELIMITERS]
-    for fewest in (2, 1):
-        for number, delimiter in several:
-            following = next((row for row in lines[number + 1 :] if row.strip()), "")
-            names, cells = split_row(lines[number], delimiter), split_row(following, delimiter)
-            alike = len(names) == len(cells) >= fewest and all(names)
-            if alike and not all(map(is_number, names)) and any(map(is_number, cells)):
-                return number, delimiter
+    tops = [(delimiter, list(rows_of(lines[:HEADER_LINES], delimiter))) for delimiter in DELIMITERS]
+    places = [(rows[k : k + 3], delimiter) for delimiter, rows in tops for k in range(len(rows) - 1)]
+    places.sort(key=lambda place: place[0][0][0])
+    for fewest, only_words in product((2, 1), (True, False)):
+        for ((_, names), *below), delimiter in places:
+            has_units = len(below) > 1 and not any(map(is_number, below[0][1])) and any(map(is_unit, below[0][1]))
+            units = below[0][1] if has_units else [""] * len(names)
+            line, cells = below[has_units]
+            alike = len(names) == len(units) == len(without_blank_end(cells, len(names))) >= fewest
+            numbers = sum(map(is_number, names))
+            if alike and any(names) and numbers < (1 if only_words else len(names)) and any(map(is_number, cells)):
+                return delimiter, names, units, line
     raise ConfigError(
         f"{path} has no header with the names of its columns.",
-        "Its first row must name them, separated by commas, semicolons or tabs: time (s), angle 1 (rad), ...",
+        "Its first row must name them, separated by commas, semicolons or tabs: time (s), angle 1 (rad), ... "
+        "Numbers with decimal commas need semicolons, tabs or quotes.",
     )
 
 
-def split_row(line: str, delimiter: str) -> list[str]:
-    """Split a row into cells, stripped of blanks."""
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+def without_blank_end(cells: list[str], count: int) -> list[str]:
+    """Return the first `count` cells of a row if the others are empty, otherwise the row."""
+    return cells if any(cells[count:]) else cells[:count]
+
+
+def number_of(cell: str) -> float:
+    """Parse a number with a decimal point or comma; raises ValueError for other texts."""
+    return float(cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell)
 
 
 def is_number(cell: str) -> bool:
-    """Return whether a cell holds a number, with a decimal point or comma."""
     try:
-        float(cell.replace(",", "."))
+        number_of(cell)
     except ValueError:
         return False
     return True
@@ -183,67 +247,57 @@ def names_and_units(header: Iterable[str]) -> tuple[list[str], list[str]]:
     return [UNIT_IN_NAME.sub("", name).strip() for name in header], units
 
 
-def unique(path: Path, names: Sequence[str]) -> list[str]:
-    """Return the names; raises ConfigError if two are the same."""
-    for name in names:
-        if names.count(name) > 1:
-            raise ConfigError(f"{path} has two columns named {name!r}.", "Give each column a unique name.")
-    return list(names)
+def table_of(
+    path: Path,
+    names: Sequence[str],
+    rows: Iterable[Row],
+    units: Mapping[str, str] = MappingProxyType({}),
+    kind_units: Mapping[str, str] = MappingProxyType({}),
+) -> Recording:
+    """Build a recording from rows of cells; empty cells become nan, and a cell with text is a problem of its column.
+
+    Raises ConfigError for a row with too many or too few cells.
+    """
+    numbers, table = [], []
+    for number, row in rows:
+        cells = without_blank_end(row, len(names))
+        if len(cells) != len(names):
+            raise ConfigError(
+                f"{path}, line {number}: {len(cells)} values where the header names {len(names)} columns.",
+                "Complete or remove the line.",
+            )
+        numbers.append(number)
+        table.append(cells)
+
+    @cache
+    def has_points() -> bool:
+        return any("." in cell and is_number(cell) for cells in table for cell in cells)
+
+    parsed = [parse_column(column, numbers, has_points) for column in zip(*table, strict=True)]
+    values, problems = zip(*parsed, strict=True) if parsed else ([np.zeros(0)] * len(names), ())
+    return build_recording(path, names, values, units, kind_units, problems)
 
 
-def numbers_in(path: Path, lines: Sequence[str], first: int, delimiter: str, count: int) -> Array:
-    """Parse the lines from index `first` on into an array (rows, count); empty cells become nan."""
-    rows = [line for line in lines[first:] if line.strip()]
-    text = "\n".join(rows)
-    if delimiter == ";":
-        text = text.replace(",", ".")
+def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callable[[], bool]) -> tuple[Array, str]:
+    """Parse the cells of a column; return the values and '', or values that are incomplete and the reason.
+
+    lines       line number of each cell
+    has_points  returns whether the file has numbers with a decimal point
+    """
     try:
-        values = np.loadtxt(StringIO(text), delimiter=delimiter, ndmin=2, comments=None)
-        if values.shape[1] == count:
-            return values
+        return np.array([float(cell or "nan") for cell in cells]), ""
     except ValueError:
-        pass  # a cell is empty or not a number, so read cell by cell
-    return table_of(path, numbered_rows(lines, first), delimiter, count)
-
-
-def numbered_rows(lines: Sequence[str], first: int) -> Iterator[tuple[int, str]]:
-    """Return the non-blank lines from index `first` on, with line numbers as an editor shows them."""
-    return ((number + 1, line) for number, line in enumerate(lines) if number >= first and line.strip())
-
-
-def table_of(path: Path, rows: Iterable[tuple[int, str]], delimiter: str, count: int) -> Array:
-    """Parse numbered lines cell by cell into an array (rows, count); empty cells become nan."""
-    cells = [cells_as_numbers(path, number, line, delimiter, count) for number, line in rows]
-    return np.array(cells).reshape(len(cells), count)
-
-
-def cells_as_numbers(path: Path, number: int, line: str, delimiter: str, count: int) -> list[float]:
-    """Parse a row into numbers, nan for empty cells; raises ConfigError if the count is wrong or a cell holds text."""
-    cells = split_row(line.replace(",", ".") if delimiter == ";" else line, delimiter)
-    if len(cells) != count:
-        raise ConfigError(
-            f"{path}, line {number}: {len(cells)} values where the header names {count} columns.",
-            "Complete or remove the line.",
-        )
-    try:
-        return [np.nan if cell.lower() in EMPTY else float(cell) for cell in cells]
-    except ValueError:
-        wrong = next(cell for cell in cells if cell.lower() not in EMPTY and not is_number(cell))
-        raise ConfigError(
-            f"{path}, line {number}: {wrong!r} is not a number.", "Correct it, or leave the cell empty."
-        ) from None
-
-
-def as_time_column(recording: Recording) -> Recording:
-    """Rename the time column to `time`: the first whose name matches the first of TIME_NAMES that any name matches."""
-    columns = recording.columns
-    name = next((name for pattern in TIME_NAMES for name in columns if pattern.fullmatch(name)), None)
-    if name is None or name == TIME:
-        return recording
-    renamed = {TIME if key == name else key: values for key, values in columns.items()}
-    return replace(
-        recording, columns=renamed, units={TIME if key == name else key: unit for key, unit in recording.units.items()}
-    )
+        values = np.full(len(cells), np.nan)
+    commas = [place for place, cell in enumerate(cells) if DECIMAL_COMMA.fullmatch(cell)]
+    of_thousands = all(THOUSANDS.fullmatch(cells[place]) for place in commas)
+    if commas and (any("." in cell and is_number(cell) for cell in cells) or (of_thousands and has_points())):
+        return values, f"line {lines[commas[0]]}: {cells[commas[0]]!r} has a comma, but other numbers have points"
+    for place, cell in enumerate(cells):
+        try:
+            values[place] = np.nan if cell.lower() in EMPTY else number_of(cell)
+        except ValueError:
+            return values, f"line {lines[place]}: {cell!r} is not a number"
+    return values, ""
 
 
 # ADAMS results --------------------------------------------------------------------------------------------------------
@@ -252,33 +306,22 @@ def as_time_column(recording: Recording) -> Recording:
 def read_adams_results(path: Path) -> Recording:
     """Read XML results of ADAMS (.res): components with ids, and steps with a number for each component."""
     try:
-        root = ElementTree.parse(path).getroot()
+        root = ElementTree.fromstring(text_of(path))
     except ElementTree.ParseError as error:
         raise ConfigError(
             f"{path} is not complete XML: {error}.", "Export the results again with RESULTS/XRF."
         ) from None
-    blocks = [
-        block
-        for block in elements(root, "Data")
-        if not str(block.get("name", "")).startswith(("modelInput", "initial"))
-    ]
-    names = component_names(path, root)
-    steps = [step for block in blocks for step in elements(block, "Step")]
+    components = component_names(path, root)
+    blocks = (block for block in root.iterfind(".//{*}Data") if not block.get("name", "").startswith("modelInput"))
+    steps = [step for block in blocks for step in block.iterfind("{*}Step")]
     if not steps:
         raise ConfigError(
             f"{path} holds no simulation steps.", "Run a dynamic simulation before exporting its results."
         )
-    values = np.array([numbers_of_step(path, place, step, len(names)) for place, step in enumerate(steps)])
-    time = next((name for _, name, _ in names if name.lower() in ("time", "time.time")), "")
-    called = [TIME if name == time else name for _, name, _ in names]
-    columns = {name: values[:, place] for place, name in enumerate(called)}
-    units = {name: unit for name, (_, _, unit) in zip(called, names, strict=True) if unit not in ("", "no_units")}
-    return without_repeated_times(Recording(path, columns, units, xml_units(root)))
-
-
-def elements(node: ElementTree.Element, tag: str) -> Iterator[ElementTree.Element]:
-    """Return all elements below a node that have this tag, in any namespace."""
-    return (element for element in node.iter() if element.tag.rpartition("}")[2] == tag)
+    values = np.array([numbers_of_step(path, place, step, len(components)) for place, step in enumerate(steps)])
+    names = [name for _, name, _ in components]
+    units = {name: unit for _, name, unit in components if unit not in ("", "no_units")}
+    return without_repeated_times(build_recording(path, names, values.T, units, xml_units(root)))
 
 
 def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, str, str]]:
@@ -290,8 +333,8 @@ def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, st
                 f"{entity.get('name')}.{component.get('name')}",
                 component.get("unitsValue", ""),
             )
-            for entity in elements(root, "Entity")
-            for component in elements(entity, "Component")
+            for entity in root.iterfind(".//{*}Entity")
+            for component in entity.iterfind("{*}Component")
         ]
     except ValueError:
         raise ConfigError(f"{path}: a component has no id.", "Export the results again with RESULTS/XRF.") from None
@@ -305,7 +348,7 @@ def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, st
 def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: int) -> list[float]:
     """Return a step's numbers, in the order of the components' ids."""
     try:
-        values = [float(cell) for cell in (step.text or "").split()]
+        values = [number_of(cell) for cell in (step.text or "").split()]
     except ValueError:
         raise ConfigError(
             f"{path}: step {place + 1} contains a value that is not a number.", "Export the results again."
@@ -319,15 +362,15 @@ def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: in
 
 def xml_units(root: ElementTree.Element) -> dict[str, str]:
     """Return the model's unit for each kind of quantity."""
-    units: Mapping[str, str] = next((node.attrib for node in elements(root, "Units")), {})
+    units: Mapping[str, str] = next((node.attrib for node in root.iterfind(".//{*}Units")), {})
     return {kind: units[kind] for kind in ("angle", "length", "time", "force") if units.get(kind)}
 
 
 def without_repeated_times(recording: Recording) -> Recording:
-    """Remove samples that repeat a time: a block begins with the last sample of the block before it."""
-    time = recording.columns.get(TIME, np.zeros(0))
-    rising = np.concatenate(([True], np.diff(time) != 0.0)) if time.size else np.zeros(0, bool)
-    return replace(recording, columns={name: column[rising] for name, column in recording.columns.items()})
+    """Keep the last of the samples at a time: a block begins with the last sample of the block before it."""
+    time = recording.columns.get(recording.time_name or "", np.zeros(0))
+    last = np.append(np.diff(time) != 0.0, True) if time.size else np.zeros(0, bool)
+    return replace(recording, columns={name: column[last] for name, column in recording.columns.items()})
 
 
 # OpenSim --------------------------------------------------------------------------------------------------------------
@@ -337,20 +380,37 @@ def read_opensim(path: Path) -> Recording:
     """Read an OpenSim table (.sto, .mot) or SIMM's variant: settings up to `endheader`, column names, and rows."""
     lines = text_of(path).splitlines()
     end = next((number for number, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
-    if end is None or end + 1 >= len(lines):
+    start = next((number for number, line in enumerate(lines) if end is not None and number > end and line.strip()), 0)
+    if not start:
         raise ConfigError(f"{path} has no line 'endheader', or nothing after it.", "Export it again from OpenSim.")
     settings = dict(line.lower().replace(" ", "").split("=", 1) for line in lines[:end] if "=" in line)
     if settings.get("datatype", "double") != "double":
         raise ConfigError(
             f"{path} holds values of type {settings['datatype']}, not numbers.", "Export a table of type double."
         )
-    start = next((number for number in range(end + 1, len(lines)) if lines[number].strip()), len(lines) - 1)
-    names = unique(path, lines[start].split())
+    names = split_at_tabs(lines[start].strip())
     # the rows are counted, because their number in the header is often wrong
-    rows = [(number, "\t".join(line.split())) for number, line in numbered_rows(lines, start + 1)]
-    values = table_of(path, rows, "\t", len(names))
-    units = {"angle": "deg" if settings.get("indegrees", "no") == "yes" else "rad", "length": "m", "time": "s"}
-    return as_time_column(Recording(path, {name: values[:, place] for place, name in enumerate(names)}, {}, units))
+    rows = ((number, cells) for number, cells in rows_of(lines, "\t") if number > start + 1)
+    if "\t" not in lines[start]:
+        rows = ((number, " ".join(cells).split()) for number, cells in rows)
+    units = {"length": "m", "time": "s", "angle": angle_unit(path, settings)}
+    return table_of(path, names, rows, {}, {kind: unit for kind, unit in units.items() if unit})
+
+
+def angle_unit(path: Path, settings: Mapping[str, str]) -> str:
+    """Return the unit of the angles in an OpenSim table as OpenSim 4.6 reads it, or '' if its header contradicts that.
+
+    Without a version a .mot file is SIMM's, in degrees; other tables are in radians unless they say inDegrees=yes.
+    """
+    in_degrees = settings.get("indegrees", "")
+    if path.suffix.lower() == ".mot" and "version" not in settings and in_degrees != "yes":
+        return "" if in_degrees else "deg"
+    return "deg" if in_degrees == "yes" else "rad"
+
+
+def split_at_tabs(line: str) -> list[str]:
+    """Split a line into cells at tabs, or at blanks if it has no tab."""
+    return [cell.strip() for cell in next(csv.reader([line], delimiter="\t"))] if "\t" in line else line.split()
 
 
 # Markers --------------------------------------------------------------------------------------------------------------
@@ -363,19 +423,30 @@ def read_markers(path: Path) -> Recording:
         raise ConfigError(
             f"{path} is not a marker file: its first line must begin with PathFileType.", "Export it again as .trc."
         )
-    settings = dict(zip(lines[1].split(), lines[2].split(), strict=False))
-    labels = [label.strip() for label in lines[3].split("\t")]
-    names = [label for label in labels[2:] if label]
-    rows = list(numbered_rows(lines, 5))
-    if not rows or not names:
+    settings = dict(zip(split_at_tabs(lines[1]), split_at_tabs(lines[2]), strict=False))
+    labels = split_at_tabs(lines[3].rstrip())
+    spread = not any(labels[3::3]) and not any(labels[4::3])
+    markers = labels[2::3] if spread else labels[2:]
+    count = sum(map(bool, split_at_tabs(lines[4]))) // 3
+    stated = settings.get("NumMarkers", "")
+    if len(markers) > count or (stated and stated != str(count)):
+        raise ConfigError(
+            f"{path} names {len(markers)} markers over the coordinates of {count}, and its NumMarkers is {stated}.",
+            "Export it again as .trc, with a name for every marker.",
+        )
+    rows = [(number, cells) for number, cells in rows_of(lines, "\t") if number > 5]
+    if not rows or not any(markers):
         raise ConfigError(f"{path} holds no markers.", "Export it again as .trc.")
-    columns = [f"{name}.{axis}" for name in unique(path, names) for axis in "xyz"]
-    width = 2 + len(columns)
-    cells = [(number, [*line.rstrip("\r\n").split("\t"), *[""] * width][:width]) for number, line in rows]
-    values = table_of(path, [(number, "\t".join(row)) for number, row in cells], "\t", width)
-    units = {"time": "s", **({"length": settings["Units"]} if "Units" in settings else {})}
-    markers = {name: values[:, 2 + place] for place, name in enumerate(columns)}
-    return Recording(path, {TIME: values[:, 1], **markers}, {}, units)
+    names = [*labels[:2], *coordinates(markers), *[""] * (3 * (count - len(markers)))]
+    # writers leave out the tabs behind the last marker that is seen
+    padded = ((number, cells + [""] * (len(names) - len(cells))) for number, cells in rows)
+    units = {"time": "s", **({"length": settings["Units"]} if settings.get("Units") else {})}
+    return table_of(path, names, padded, {}, units)
+
+
+def coordinates(markers: Iterable[str]) -> list[str]:
+    """Return the names of the columns x, y and z of each marker; empty for a marker without a name."""
+    return [f"{marker}.{axis}" if marker else "" for marker in markers for axis in "xyz"]
 
 
 def read_c3d(path: Path) -> Recording:
@@ -383,15 +454,15 @@ def read_c3d(path: Path) -> Recording:
     if find_spec("ezc3d") is None:
         raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"')
     arrays = c3d_arrays(path)
-    names, places = unique(path, [str(label).strip() for label in arrays["labels"]]), arrays["places"]
+    places, labels = arrays["places"], [str(label).strip() for label in arrays["labels"]]
     rate = float(arrays["rate"][0]) if arrays["rate"].size else 0.0
-    if not names or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(names):
+    if not any(labels) or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(labels):
         raise ConfigError(f"{path} holds no markers, or no frame rate.", "Export it again.")
-    columns = {
-        f"{name}.{axis}": places[place, row] for row, name in enumerate(names) for place, axis in enumerate("xyz")
-    }
-    kind_units = {"time": "s", **({"length": str(arrays["units"][0])} if arrays["units"].size else {})}
-    return Recording(path, {TIME: np.arange(places.shape[2]) / rate, **columns}, {}, kind_units)
+    values = places[:3, : len(labels)].transpose(1, 0, 2).reshape(-1, places.shape[2])
+    unit = str(arrays["units"][0]).strip() if arrays["units"].size else ""
+    kind_units = {"time": "s", **({"length": unit} if unit else {})}
+    time = np.arange(places.shape[2]) / rate
+    return build_recording(path, [TIME, *coordinates(labels)], [time, *values], {}, kind_units)
 
 
 def c3d_arrays(path: Path) -> dict[str, NDArray[Any]]:

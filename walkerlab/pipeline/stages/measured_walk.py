@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import RecordedWalk, as_walk, plain, unit_value
+from walkerlab.exchange.columns import RecordedWalk, as_walk, named_column, plain, refuse_gaps, refuse_units, unit_value
 from walkerlab.exchange.rate_jumps import sums_at_jumps
-from walkerlab.exchange.recording import TIME, Recording, read_delimited, read_recording
+from walkerlab.exchange.recording import Recording, read_delimited, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
@@ -125,6 +125,7 @@ def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_su
 def read_steps(path: Path, block: Identify) -> MeasuredWalk:
     """Read a table with one row per step: `period_s` and, if measured, `length_m` and `touch_angle_rad`."""
     table = read_delimited(path)
+    refuse_units(table, block.units, STEP_KINDS)
     for name in block.columns.keys() - STEP_KINDS.keys():
         raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Choose from {', '.join(STEP_KINDS)}.")
     values = {name: read_column(table, name, block) for name in STEP_KINDS}
@@ -147,17 +148,9 @@ def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
     source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
     if source is None:
         return None
-    if source.lower() == "t" and TIME in table.columns:  # the file reader has renamed column t
-        source = TIME
-    if source not in table.columns:
-        near = get_close_matches(source, table.columns, 1, 0.3)
-        advice = f"The nearest is {near[0]!r}." if near else f"It has: {', '.join(list(table.columns)[:8])}."
-        raise ConfigError(f"{table.path} has no column {source!r}.", advice)
+    source = named_column(table, source)
+    refuse_gaps(table, source, slice(None))
     values = table.columns[source]
-    if (gaps := np.flatnonzero(~np.isfinite(values))).size:
-        raise ConfigError(
-            f"{table.path}: {source!r} is missing in step {gaps[0] + 1}.", "Complete it, or leave out the column."
-        )
     if name != "touch_angle_rad" and (bad := np.flatnonzero(values <= 0.0)).size:
         raise ConfigError(
             f"{table.path}: {source!r} is {values[bad[0]]:g} in step {bad[0] + 1}; it must be above 0.",
