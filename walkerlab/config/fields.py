@@ -6,7 +6,7 @@ from functools import reduce
 from itertools import chain
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, Tag, ValidationInfo, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -52,6 +52,16 @@ def key(
 def meaning_error(reason: str) -> PydanticCustomError:
     """Build the error that a validator raises for a value that is well-typed but wrong."""
     return PydanticCustomError("meaning", reason)
+
+
+def _storable(text: str) -> str:
+    if any(letter == "\0" or "\ud800" <= letter <= "\udfff" for letter in text):
+        raise meaning_error("holds a character that no file can store")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_storable)]
+"""Text of a user, such as a name or a path."""
 
 
 def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:

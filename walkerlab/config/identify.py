@@ -4,7 +4,7 @@ from typing import Literal, get_args
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, key, meaning_error
+from walkerlab.config.fields import Block, Text, key, meaning_error
 
 Nuisance = Literal["time_offset_s", "clock_rate", "angle_offset_rad", "angle_gain"]
 Pair = list[float]
@@ -13,7 +13,7 @@ Pair = list[float]
 class Identify(Block):
     """Estimation problem of `walkerlab identify`."""
 
-    data: str = key(
+    data: Text = key(
         "", "", "file with the measured walk", bounds="a path, from the current folder", default_in_words="none"
     )
     level: Literal["steps", "angles"] = key(
@@ -44,10 +44,10 @@ class Identify(Block):
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
     )
-    columns: dict[str, str] = key(
+    columns: dict[Text, Text] = key(
         dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
     )
-    units: dict[str, str] = key(
+    units: dict[Text, Text] = key(
         dict,
         "",
         "units by kind (time, length, angle), quantity or column",

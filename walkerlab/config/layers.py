@@ -78,15 +78,18 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
 def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
     """Apply settings in order; lists and blocks are replaced, not merged. ConfigError if a key's parent is no block."""
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
+    copies: dict[int, Mapping] = {}
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:
             tree = tree.without(*SLOPE_KEYS)
-        tree = _placed(tree, setting, 0)
+        tree = _placed(tree, setting, 0, copies)
     return tree
 
 
-def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:
-    result = block.without()
+def _placed(block: Mapping, setting: ConfigSetting, depth: int, copies: dict[int, Mapping]) -> Mapping:
+    """Place a setting in a copy of a block; `copies` holds, by id, the copies that earlier settings made."""
+    result = copies.get(id(block)) or block.without()
+    copies[id(result)] = result
     name = setting.path[depth]
     if depth == len(setting.path) - 1:
         result.put(name, setting.value, setting.position)
@@ -99,5 +102,5 @@ def _placed(block: Mapping, setting: ConfigSetting, depth: int) -> Mapping:
         raise problem_error(
             setting.position, f"{printable(full_key)}: {printable(above)} is a value, not a block of keys"
         )
-    result.put(name, _placed(inner, setting, depth + 1), block.keys.get(name, setting.position))
+    result.put(name, _placed(inner, setting, depth + 1, copies), block.keys.get(name, setting.position))
     return result

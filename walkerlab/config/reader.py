@@ -63,7 +63,7 @@ def _events(text: str, source: str, column: int) -> Iterator[Any]:
     from ruamel.yaml import YAML
 
     try:
-        yield from YAML(typ="safe", pure=True).parse(text)
+        yield from YAML(typ="safe", pure=True, plug_ins=[]).parse(text)
     except Exception as error:  # arbitrary input makes the parser fail in many ways, which all mean a bad config
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = _position(mark, source, column) if mark else Position(source, 1, column)

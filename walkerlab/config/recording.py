@@ -1,29 +1,29 @@
 """The recording block: a walk measured or computed elsewhere, to compare with."""
 
-from walkerlab.config.fields import Block, key
+from walkerlab.config.fields import Block, Text, key
 
 
 class RecordedFile(Block):
     """File with a walk for `walkerlab compare --with`, and the meaning of its columns."""
 
-    file: str = key(
+    file: Text = key(
         "",
         "",
         "file with the walk: CSV, ADAMS, OpenSim, markers, or a stored walk of a run",
         bounds="a path, from the current folder",
         default_in_words="none",
     )
-    name: str = key(
+    name: Text = key(
         "",
         "",
         "name of the walk in figures and tables",
         bounds="any text",
         default_in_words="file name without extension",
     )
-    columns: dict[str, str] = key(
+    columns: dict[Text, Text] = key(
         dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
     )
-    units: dict[str, str] = key(
+    units: dict[Text, Text] = key(
         dict,
         "",
         "units by kind (angle, length, ...), quantity or column",

@@ -12,7 +12,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, acting_on
-from walkerlab.config.fields import Block, check_against, key, meaning_error
+from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
 from walkerlab.config.plan import Plan
@@ -175,9 +175,9 @@ QUESTIONS: Final = (
 class Source(Block):
     """Study that a config reproduces, as named in the report."""
 
-    title: str = key(..., "", "title of the study", bounds="any text, not empty", min_length=1)
-    authors: str | None = key(None, "", "its authors", bounds="any text")
-    published: str | None = key(None, "", "where and when it was published", bounds="any text")
+    title: Text = key(..., "", "title of the study", bounds="any text, not empty", min_length=1)
+    authors: Text | None = key(None, "", "its authors", bounds="any text")
+    published: Text | None = key(None, "", "where and when it was published", bounds="any text")
     url: str | None = key(
         None,
         "",

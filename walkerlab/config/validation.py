@@ -1,6 +1,7 @@
 """Validation of a config tree against the schema; all problems are reported together, with positions."""
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
@@ -41,6 +42,7 @@ _REASONS: Final = {
     "union_tag_invalid": "is not a known type",
 }
 MAX_PROBLEMS: Final = 100
+DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+")
 NAMES_OF_BODIES: Final = {
     "hinges": ("parent", "child"),
     "particles": ("body",),
@@ -181,6 +183,8 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""
     meant = nearest(word, words_of(field.annotation)) if word else ""
+    if what == "float_type" and DECIMAL_COMMA.fullmatch(word):
+        meant = word.replace(",", ".")
     right = describe_allowed(field) if what in _REASONS else ""
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
 

@@ -116,24 +116,21 @@ def read_recording(path: Path) -> Recording:
             f"{path} has an unsupported format ({path.suffix or 'no extension'}).",
             FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {WANTED}."),
         )
+    return read_file(path, reader)
+
+
+def read_file(path: Path, reader: Callable[[Path], Recording]) -> Recording:
+    """Read a regular file; raises ConfigError if there is none, and for a pipe or a device, which might never end."""
+    shown = str(path) if len(str(path)) <= LONGEST_PATH else f"{str(path)[:LONGEST_PATH]}..."
     try:
-        refuse_special(path)
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            raise ConfigError(f"{shown} is a pipe or a device, not a file.", "Save what it delivers as a file first.")
         return reader(path)
     except OSError as error:
-        raise unreadable(path, error) from error
-
-
-def unreadable(path: Path, error: OSError) -> ConfigError:
-    text = str(path)
-    shown = text if len(text) <= LONGEST_PATH else f"{text[:LONGEST_PATH]}..."
-    return ConfigError(f"{shown} cannot be read: {error.strerror or error}.", "Check the path of the file.")
-
-
-def refuse_special(path: Path) -> None:
-    """Raise ConfigError for a pipe or device, which might never end; OSError for a path without a file."""
-    mode = path.stat().st_mode
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-        raise ConfigError(f"{path} is a pipe or a device, not a file.", "Save what it delivers as a file first.")
+        raise ConfigError(
+            f"{shown} cannot be read: {error.strerror or error}.", "Check the path of the file."
+        ) from error
 
 
 def build_recording(

@@ -223,13 +223,13 @@ ERRORS_TO_REACH = Option(
 )
 PIPELINE = Graph(
     Stage(
-        "fixedpoint", "walkerlab.pipeline.stages.fixedpoint",
-        "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
-    ),
-    Stage(
         "recorded-walk", "walkerlab.pipeline.stages.recorded_walk",
         "Read a walk recorded elsewhere and find its steps.", reads.RecordedWalkConfig, requires=("recording",),
         files=later("walkerlab.pipeline.stages.recorded_walk", "digests"),
+    ),
+    Stage(
+        "fixedpoint", "walkerlab.pipeline.stages.fixedpoint",
+        "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
     ),
     Stage(
         "simulate", "walkerlab.pipeline.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,

@@ -31,6 +31,7 @@ def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], d
     return groups, {
         "recorded": {
             "name": recorded.summary["name"],
+            "doubts": recorded.summary["doubts"],
             "steps": {model: last_step(walk.summary) for model, walk in walks.items()},
             "table3": {model: asdict(characteristics_of(walk)) for model, walk in walks.items()},
             "differences": {model: each.summary for model, each in compared.items()},

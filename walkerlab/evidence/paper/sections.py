@@ -184,7 +184,8 @@ def recorded(results: Results) -> Section | None:
 
 def recorded_words(stored: Row) -> str:
     period, length = (stored["steps"]["recorded"][key] for key in ("period_s", "length_m"))
-    return f"{stored['name']}: the last step takes {number(period, 5)} s and is {number(length, 5)} m long."
+    last = f"{stored['name']}: the last step takes {number(period, 5)} s and is {number(length, 5)} m long."
+    return " ".join([last, *stored["doubts"]])
 
 
 def recorded_tables(stored: Row) -> Iterator[Table]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
@@ -14,13 +13,14 @@ import numpy as np
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk, as_walk, named_column, plain, refuse_gaps, refuse_units, unit_value
 from walkerlab.exchange.rate_jumps import sums_at_jumps
-from walkerlab.exchange.recording import Recording, read_delimited, read_recording
+from walkerlab.exchange.recording import Recording, read_delimited, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.physics.estimation.prediction import OFFSET
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
+from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
@@ -41,10 +41,7 @@ def digests(config: Config) -> Mapping[str, str]:
     """Return the digest of the data file's content, so that a changed file makes results outdated."""
     if config.identify is None:
         return {}
-    try:
-        return {"identify.data": hashlib.sha256(Path(config.identify.data).read_bytes()).hexdigest()}
-    except OSError:
-        return {"identify.data": NO_DATA_FILE}
+    return {"identify.data": file_digest(Path(config.identify.data)) or NO_DATA_FILE}
 
 
 def read_measured(block: Identify, config: RigidConfig) -> MeasuredWalk:
@@ -59,19 +56,10 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
     Raises ConfigError for a file without a walk.
     """
     path = Path(block.data)
-    if not path.is_file():
-        raise ConfigError(
-            f"identify.data: {block.data} cannot be read: {'it is a folder' if path.is_dir() else NO_DATA_FILE}.",
-            "Check the path given to --data.",
-            ("identify", "data"),
-        )
-    try:
-        if block.level == "steps":
-            yield refuse_count(path, read_steps(path, block))
-            return
-        walk = as_walk(read_recording(path), block.columns, block.units)
-    except OSError as error:
-        raise ConfigError(f"{path} cannot be read: {error.strerror or error}.", "Check the path.") from error
+    if block.level == "steps":
+        yield refuse_count(path, read_steps(path, block))
+        return
+    walk = as_walk(read_recording(path), block.columns, block.units)
     problem, divided = None, False
     for touch_sum_rad in touch_sums(walk, block, config):
         try:
@@ -124,7 +112,7 @@ def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_su
 
 def read_steps(path: Path, block: Identify) -> MeasuredWalk:
     """Read a table with one row per step: `period_s` and, if measured, `length_m` and `touch_angle_rad`."""
-    table = read_delimited(path)
+    table = read_file(path, read_delimited)
     refuse_units(table, block.units, STEP_KINDS)
     for name in block.columns.keys() - STEP_KINDS.keys():
         raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Choose from {', '.join(STEP_KINDS)}.")

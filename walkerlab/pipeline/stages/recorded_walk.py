@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.config.reads import RecordedWalkConfig
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import OF_LEG, OF_WALKER, RecordedWalk, as_walk
-from walkerlab.exchange.recording import TIME, Recording, read_recording
+from walkerlab.exchange.recording import TIME, Recording, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.progress import Progress
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 NO_FILE = "there is no such file"
+NORMAL_QUARTILE = 0.6745  # median of the absolute value of a normal variable with standard deviation 1
+NOISY = 0.02  # noise over amplitude above which the times of single steps are off by several per cent
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -44,7 +46,27 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     walk = read_walk(block)
     steps = divide_into_steps(walk, rigid_walker(config), block.file)
     progress.advance()
-    return content_of(block, config, walk, steps)
+    doubts = list(doubts_about(walk))
+    for doubt in doubts:
+        progress.note(doubt)
+    return content_of(block, config, walk, steps, doubts)
+
+
+def doubts_about(walk: RecordedWalk) -> Iterator[str]:
+    """Yield a sentence for each reason to doubt the steps: noise, and columns or samples that are not used."""
+    angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
+    # noise dominates the third differences of a smooth motion; their variance is 20 times its own
+    noise = (
+        float(np.median(np.abs(np.diff(angles, 3, axis=0)))) / (0.6745 * math.sqrt(20.0)) if len(angles) > 3 else 0.0
+    )
+    amplitude = math.sqrt(max(2.0 * float(np.var(angles, axis=0).max()) - 2.0 * noise**2, 0.0))
+    if noise > NOISY * amplitude:
+        yield (
+            f"The angles scatter by {noise:.2g} rad from sample to sample, with an amplitude of {amplitude:.2g} rad: "
+            "heel strikes, and so periods and lengths of single steps, are uncertain."
+        )
+    for name, reason in walk.left_out.items():
+        yield f"Not used: {name}: {reason.removesuffix('.')}."
 
 
 def read_walk(block: RecordedFile) -> RecordedWalk:
@@ -52,7 +74,7 @@ def read_walk(block: RecordedFile) -> RecordedWalk:
     if not block.file:
         raise ConfigError("recording.file: the recording has no file.", "Name one: --with FILE.", ("recording", "file"))
     path = Path(block.file)
-    recording = read_artifact(path) if path.suffix.lower() == ".h5" else read_recording(path)
+    recording = read_file(path, read_artifact) if path.suffix.lower() == ".h5" else read_recording(path)
     return as_walk(recording, block.columns, block.units)
 
 
@@ -60,9 +82,7 @@ def read_artifact(path: Path) -> Recording:
     """Read the trajectory of a stored walk; raises ConfigError if the file has none."""
     try:
         groups = artifact.read(path).groups
-    except FileNotFoundError:
-        raise ConfigError(f"{path} cannot be read: {NO_FILE}.", "Check the path given to --with.") from None
-    except (Damaged, NotADirectoryError, IsADirectoryError) as error:
+    except (Damaged, IsADirectoryError) as error:
         raise ConfigError(
             f"{path} is not a stored walk: {error}.", "Name simulate.h5 or contact-sim.h5 of a run."
         ) from None
@@ -79,7 +99,9 @@ def read_artifact(path: Path) -> Recording:
     return Recording(path, columns, units)
 
 
-def content_of(block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps) -> Content:
+def content_of(
+    block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps, doubts: Sequence[str]
+) -> Content:
     """Build the content, with the same names as for computed walks; energies and forces only if they were recorded."""
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)
@@ -108,6 +130,7 @@ def content_of(block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWa
         "first_heel_strike_s": steps.origin_s,
         "legs_swapped": steps.swapped,
         "columns": walk.sources,
+        "doubts": [*doubts],
     }
     return Content({"steps": Group(columns), "trajectory": Group({**over_time(**samples), **legs()})}, summary)
 

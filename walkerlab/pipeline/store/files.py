@@ -155,8 +155,10 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
 
 def file_digest(path: Path) -> str | None:
-    """Return the sha256 of a file; None if it cannot be read."""
+    """Return the sha256 of a file; None if it cannot be read, or is a pipe or device, which might never end."""
     try:
+        if not path.is_file():
+            return None
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:

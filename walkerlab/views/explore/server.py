@@ -198,7 +198,7 @@ class Handler(BaseHTTPRequestHandler):
             file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
             if address.path.startswith("/runs/") and file.is_relative_to(runs) and file.is_file():
                 return self.send(200, file.read_bytes(), guess_type(file.name)[0] or "application/octet-stream")
-        except (ValueError, OSError):  # malformed address, or unreadable file
+        except (ValueError, OSError, RuntimeError):  # malformed address, unreadable file, or loop of links
             pass
         return self.answer(*failure(404, f"not found: {self.path}"))
 
