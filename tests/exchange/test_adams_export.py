@@ -162,7 +162,8 @@ def test_results_come_back_under_our_names():
         for name, components in re.findall(r"RESULTS_NAME = (\w+)\n, CNAMES = (.*)", text)
         for component in re.findall(r'"(\w+)"', components)
     ]
-    found = matches(Recording("a.res", dict.fromkeys(names, np.zeros(2))), {"time"})
+    found, ambiguous = matches(Recording("a.res", dict.fromkeys(names, np.zeros(2))), {"time"})
+    assert not ambiguous
     assert set(found.values()) == set(names)
     assert found["angle 1"] == "leg_1.angle"
     assert found["foot_along_m 2"] == "leg_2.foot_along"

@@ -7,7 +7,7 @@ import pytest
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk, parse_pairs, parse_units
-from walkerlab.exchange.recording import TIME, read_recording
+from walkerlab.exchange.recording import read_recording
 
 TIMES = np.linspace(0.0, 0.4, 5)
 ANGLES = np.stack([0.1 * np.sin(TIMES), -0.2 * np.cos(TIMES)], axis=1)
@@ -42,6 +42,7 @@ RES = (
     )
     + "</Analysis></Results>"
 )
+MARKERS = {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}
 FILES = {"own.csv": OWN, "table.txt": ADAMS_TABLE, "degrees.csv": DEGREES, "walk.sto": STO, "walk.res": RES}
 
 
@@ -64,10 +65,19 @@ def markers():
     return np.stack([hip, *feet], axis=1)
 
 
-def written(folder, name, text):
+def with_column(text, name, cells):
+    """A table with one more column."""
+    return "\n".join(f"{line},{cell}" for line, cell in zip(text.splitlines(), [name, *cells], strict=True))
+
+
+def written(folder, name, text, encoding="utf-8"):
     path = folder / name
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding=encoding)
     return path
+
+
+def read(path, columns=(), units=()):
+    return as_walk(read_recording(path), dict(columns), dict(units))
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -98,7 +108,7 @@ def test_a_column_whose_name_may_be_a_temperature_is_the_time_only_if_no_other_c
     first, second = ([20.0, 20.0], [0.0, 1.0]) if names.startswith("T,") else ([0.0, 1.0], [20.0, 20.0])
     rows = "\n".join(f"{x},{y}" for x, y in zip(first, second, strict=True))
     recording = read_recording(written(tmp_path, "walk.csv", f"{names}\n{rows}\n"))
-    assert recording.columns["time"].tolist() == [0.0, 1.0]
+    assert recording.columns[recording.time_name].tolist() == [0.0, 1.0]
 
 
 def test_a_table_in_degrees_says_so_in_its_header(tmp_path):
@@ -126,7 +136,7 @@ def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_pat
     recording = read_recording(written(tmp_path, "walk.trc", text))
     assert np.isnan(recording.columns["FOOT2.x"]).sum() == 1
     assert as_walk(recording, {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT1"}, {}).time_s.size == TIMES.size
-    with pytest.raises(ConfigError, match=r"FOOT2\.x.*1 gaps.*sample 3"):
+    with pytest.raises(ConfigError, match=r"FOOT2\.x.* lacks 1 of 5 values, the first at sample 3"):
         as_walk(recording, {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}, {})
 
 
@@ -138,13 +148,17 @@ def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_pat
         ("walk", "x", "no extension"),
         ("walk.csv", "", "no header"),
         ("walk.csv", "1,2,3\n4,5,6\n", "no header"),
-        ("walk.csv", OWN.replace("angle 2", "angle 1"), "two columns named"),
+        (
+            "walk.csv",
+            with_column(OWN, "angle 2 (rad)", ["1"] * 5),
+            "'angle 2' cannot be used: 2 columns have this name",
+        ),
         ("walk.csv", OWN.replace("time (s)", "tempo (s)"), "no time column"),
         ("walk.csv", "\n".join(OWN.splitlines()[:2]), "1 samples"),
         ("walk.csv", OWN.replace(repr(float(ANGLES[1, 0])), "abc"), "line 3: 'abc' is not a number"),
         ("walk.csv", OWN + ",7", "4 values where the header names 3"),
         ("walk.csv", "\n".join([*OWN.splitlines(), OWN.splitlines()[2]]), "time does not increase"),
-        ("walk.csv", OWN.replace("\n0.2,", "\n,"), "time is missing"),
+        ("walk.csv", OWN.replace("\n0.2,", "\n,"), "'time' lacks 1 of 5 values, the first at sample 3"),
         ("walk.res", RES[:-40], "not complete XML"),
         ("walk.res", RES.replace('id="3"', 'id="2"'), "not unique"),
         ("walk.res", RES.replace('id="3"', 'id="x"'), "no id"),
@@ -160,7 +174,7 @@ def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_pat
 )
 def test_a_damaged_file_says_what_is_wrong(name, text, message, tmp_path):
     with pytest.raises(ConfigError, match=message) as caught:
-        read_recording(written(tmp_path, name, text))
+        read(written(tmp_path, name, text), MARKERS if name.endswith(".trc") else {}, {"time": "s"})
     assert caught.value.advice
 
 
@@ -228,5 +242,5 @@ def test_options_are_pairs():
 
 def test_a_recording_keeps_columns_that_no_walker_has(tmp_path):
     recording = read_recording(written(tmp_path, "degrees.csv", DEGREES))
-    assert set(recording.columns) == {TIME, "Angle 1", "angle_2", "note"}
+    assert set(recording.columns) == {"t", "Angle 1", "angle_2", "note"}
     assert np.isnan(recording.columns["note"]).all()
