@@ -4,14 +4,18 @@ import math
 import re
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
+from time import process_time
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from walkerlab.config.layers import apply_settings, parse_setting
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config, Contact
+from walkerlab.config.tree import plain
 from walkerlab.errors import ConfigError
 
 Write = Callable[..., Path]
@@ -128,10 +132,41 @@ def test_strides_of_the_command_line_are_over_everything() -> None:
         (".".join("a" * 3000) + "=1", r"nested deeper"),
         ("walker=&a [*a]", r"anchor"),
         ("strides=\udcff", r"\\udcff cannot be in a config"),
+        ("slope_deg=0,5", r"'0,5' is not a number; did you mean 0\.5\?"),
+        ("contact.damping=1,5e2", r"'1,5e2' is not a number; did you mean 1\.5e2\?"),
+        ("contact.damping=1.000,5", r"'1\.000,5' is not a number; allowed"),
+        (r'recording.name="a\0b"', r"'a\\x00b' holds a character that no file can store"),
+        (r'recording.file="\ud800.csv"', r"'\\ud800\.csv' holds a character that no file can store"),
+        (r'recording.columns={"angle\0": x}', r"recording\.columns: .*holds a character that no file can store"),
+        (r'recording.units={angle: "\udfff"}', r"recording\.units: .*holds a character that no file can store"),
+        (r'identify={data: "\0"}', r"holds a character that no file can store"),
+        (r'source={title: "\0"}', r"holds a character that no file can store"),
     ],
 )
 def test_a_bad_setting_is_refused_with_its_place(refused: Refused, setting: str, expected: str) -> None:
     assert re.search(expected, refused("contact: {units: si}\n", sets=[setting]))
+
+
+def test_settings_of_one_block_leave_the_config_that_they_change_untouched() -> None:
+    """Also those within a block that an earlier setting brought."""
+    tree = load(None).tree
+    damping, stiffness = (parse_setting(f"contact.{text}") for text in ("damping=7", "stiffness=8"))
+    block = parse_setting("contact={damping: 3, stiffness: 4}")
+    both, alone = apply_settings(tree, [block, damping, stiffness]), apply_settings(tree, [block])
+    assert plain(both)["contact"] == {"damping": 7, "stiffness": 8}
+    assert plain(alone)["contact"] == {"damping": 3, "stiffness": 4}
+    assert plain(tree) == plain(load(None).tree)
+
+
+def test_the_time_for_settings_grows_as_their_number() -> None:
+    """Eight times as many settings take far less than 64 times as long."""
+    took = []
+    for count in (2_000, 16_000):
+        settings = [replace(parse_setting("walker.x=1"), path=("walker", f"x{number}")) for number in range(count)]
+        begin = process_time()
+        apply_settings(load(None).tree, settings)
+        took.append(process_time() - begin)
+    assert took[1] < 24.0 * took[0]
 
 
 def test_bad_strides_are_refused() -> None:

@@ -1,11 +1,14 @@
 """Shortest exact notation of numbers, and comparison of numbers up to rounding."""
 
 import math
+import re
 from decimal import Decimal
 from typing import Any, Final
 
 SAME: Final = 1e-9
 """Maximum relative difference between numbers that count as equal; unit conversion rounds numbers by less."""
+
+DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
 
 
 def short_number(number: float) -> str:

@@ -1,7 +1,6 @@
 """Validation of a config tree against the schema; all problems are reported together, with positions."""
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
@@ -13,7 +12,7 @@ from walkerlab.config.contact import BOUNDS_SI
 from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of, leaves, words_of
 from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, read_layers
 from walkerlab.config.layers import merge_layers
-from walkerlab.config.numbers import short_number
+from walkerlab.config.numbers import DECIMAL_COMMA, short_number
 from walkerlab.config.problems import Problem, beyond_scope, format_node, nearest, printable, problems_error
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
@@ -42,7 +41,6 @@ _REASONS: Final = {
     "union_tag_invalid": "is not a known type",
 }
 MAX_PROBLEMS: Final = 100
-DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+")
 NAMES_OF_BODIES: Final = {
     "hinges": ("parent", "child"),
     "particles": ("body",),

@@ -27,6 +27,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.config.numbers import DECIMAL_COMMA
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.units import UNIT_VALUES, is_unit
 
@@ -49,10 +50,10 @@ UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 """Texts of cells without a value, in lower case."""
-DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
 THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Pattern for numbers whose comma may also separate thousands."""
 DECLARED_ENCODING: Final = re.compile(rb"""\s*<\?xml[^>]*encoding\s*=\s*["']([\w.-]+)""")
+NO_FILE: Final = "there is no such file"
 LONGEST_PATH: Final = 200  # characters of a path that messages show
 HEADER_LINES: Final = 60
 """Number of lines at the top of a file that are searched for the header."""
@@ -105,8 +106,8 @@ class Recording:
         return next((name for pattern in TIME_NAMES for name in self.columns if pattern.fullmatch(name)), None)
 
 
-def read_recording(path: Path) -> Recording:
-    """Read the columns of a file, in the format of its extension.
+def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
+    """Read the columns of a file, in the format of its extension; `key` is the config key that names it, if one does.
 
     Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """
@@ -116,21 +117,22 @@ def read_recording(path: Path) -> Recording:
             f"{path} has an unsupported format ({path.suffix or 'no extension'}).",
             FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {WANTED}."),
         )
-    return read_file(path, reader)
+    return read_file(path, reader, key)
 
 
-def read_file(path: Path, reader: Callable[[Path], Recording]) -> Recording:
+def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, ...] = ()) -> Recording:
     """Read a regular file; raises ConfigError if there is none, and for a pipe or a device, which might never end."""
     shown = str(path) if len(str(path)) <= LONGEST_PATH else f"{str(path)[:LONGEST_PATH]}..."
+    name = f"{'.'.join(key)}: {shown}" if key else shown
     try:
         mode = path.stat().st_mode
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            raise ConfigError(f"{shown} is a pipe or a device, not a file.", "Save what it delivers as a file first.")
+            advice = "Save what it delivers as a file first."
+            raise ConfigError(f"{name} is a pipe or a device, not a file.", advice, key)
         return reader(path)
     except OSError as error:
-        raise ConfigError(
-            f"{shown} cannot be read: {error.strerror or error}.", "Check the path of the file."
-        ) from error
+        reason = NO_FILE if isinstance(error, FileNotFoundError) else error.strerror or error
+        raise ConfigError(f"{name} cannot be read: {reason}.", "Check the path of the file.", key) from error
 
 
 def build_recording(

@@ -1,21 +1,28 @@
 """Walks recorded elsewhere, read as files and compared: round trips, and 300 damaged files."""
 
+import contextlib
 import functools
 import json
 import math
+import os
 import random
+import re
 
 import numpy as np
 import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
+from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.paper.sections import recorded_tables, recorded_words
 from walkerlab.exchange.walk_in_steps import MOST_SAMPLES
 from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.stages import recorded_walk
 from walkerlab.pipeline.store.runfolder import RunFolder
 
 MEMORY = MemoryResults()
@@ -279,6 +286,85 @@ def test_a_recording_that_is_refused_stores_nothing(tmp_path):
     with pytest.raises(ConfigError):
         execute(config, "recorded-walk", folder)
     assert not list(folder.path.rglob("*.h5*"))
+
+
+def test_a_recording_is_refused_before_anything_is_computed(tmp_path):
+    path = written(tmp_path, "time (s),angle 1 (rad)\n0,0.1\n1,0.2\n")
+    config = load(None, (f"recording.file={json.dumps(str(path))}",)).config
+    folder = RunFolder(tmp_path / "runs", "refused")
+    with pytest.raises(ConfigError, match="no column for 'angle 2'"):
+        execute(config, "compare", folder)
+    assert not list(folder.path.rglob("*.h5*"))
+
+
+class Notes(Silent):
+    """Progress that keeps the lines it is to show."""
+
+    def __init__(self):
+        self.lines = []
+
+    def note(self, text):
+        self.lines.append(text)
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.05, 0.3])
+def test_noise_that_blurs_heel_strikes_is_named(tmp_path, noise):
+    """The amplitude of each leg is 0.2 rad; with noise of 0.05 rad periods of single steps vary by a tenth."""
+    path = written(tmp_path, table(simulated("rigid"), noise=noise))
+    config, notes = load(None, (f"recording.file={json.dumps(str(path))}",)).config, Notes()
+    with contextlib.suppress(ConfigError):  # a walk may be hidden altogether
+        recorded_walk.run(only(config, PIPELINE["recorded-walk"].takes), {}, notes)
+    if noise < 0.01:
+        assert notes.lines == []
+        return
+    (line,) = notes.lines
+    assert float(re.search(r"scatter by (\S+) rad", line)[1]) == pytest.approx(noise, rel=0.1)
+    assert float(re.search(r"amplitude of (\S+) rad", line)[1]) == pytest.approx(0.2, abs=0.05)
+
+
+def test_few_samples_are_not_taken_for_noise(tmp_path):
+    lines = table(simulated("rigid")).splitlines()
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+    times = np.arange(0.0, rows[-1, 0], 0.08)
+    sparse = np.column_stack((times, *(np.interp(times, rows[:, 0], column) for column in rows.T[1:])))
+    text = "\n".join([lines[0], *(",".join(map(repr, row)) for row in sparse.tolist())])
+    assert walkerlab.read_walk(written(tmp_path, text)).summary["doubts"] == []
+
+
+def test_what_is_not_used_of_a_recording_is_said_in_the_comparison(tmp_path):
+    lines = table(simulated("rigid")).splitlines()
+    cells = ["kinetic_J (J)", *("" if n == 5 else "1" for n in range(len(lines) - 1))]
+    path = written(tmp_path, "\n".join(f"{line},{cell}" for line, cell in zip(lines, cells, strict=True)))
+    read = walkerlab.read_walk(path)
+    assert len(read.summary["doubts"]) == 1
+    assert "Not used: kinetic_J" in read.summary["doubts"][0]
+    assert "lacks 1 of" in read.summary["doubts"][0]
+    assert "kinetic_J" not in read.content["trajectory"].variables
+    stored = {
+        "name": "mine",
+        "steps": {"recorded": {"period_s": 0.7, "length_m": 0.37}},
+        "doubts": read.summary["doubts"],
+    }
+    assert "Not used: kinetic_J" in recorded_words(stored)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_named_pipe_is_refused_by_every_stage_that_reads_files(tmp_path):
+    os.mkfifo(tmp_path / "walk.csv")
+    for name in ("walk.csv", "walk.h5"):
+        if name == "walk.h5":
+            os.mkfifo(tmp_path / name)
+        with pytest.raises(ConfigError, match="is a pipe or a device"):
+            walkerlab.read_walk(tmp_path / name)
+    for level in ("steps", "angles"):
+        with pytest.raises(ConfigError, match="is a pipe or a device"):
+            walkerlab.identify(tmp_path / "walk.csv", fit={"slope_deg": None}, level=level)
+
+
+@pytest.mark.parametrize("name", ["a\0b.csv", "\ud800.csv"])
+def test_a_path_that_no_file_can_have_is_refused(name):
+    with pytest.raises(ConfigError, match=r"recording\.file: .* holds a character that no file can store"):
+        walkerlab.read_walk(name)
 
 
 def damaged(draw, lines):

@@ -9,6 +9,7 @@ import pytest
 
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
+from walkerlab.errors import ConfigError
 from walkerlab.pipeline.stages.measured_walk import read_steps
 
 WALK = ("--set", "start=[-0.20477, 0.17, -0.35, -0.9]")
@@ -64,6 +65,34 @@ def test_exported_steps_are_read_back_as_the_walk_that_was_stored(walker, config
         nearest = [int(np.abs(file["trajectory/time"][:] - time).argmin()) for time in steps["touch_time_s"][:]]
         legs = np.arange(len(nearest)) % 2
         assert measured.touch_angles_rad == pytest.approx(angle[nearest, legs], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "period_s;length_m\n0,7036;0,3714\n0,7040;0,3716\n",
+        "period_s\tlength_m\n0,7036\t0,3714\n0,7040\t0,3716\n",
+        'period_s,length_m\n"0,7036","0,3714"\n"0,7040","0,3716"\n',
+        "step,period,length,note\n,s,m,\n1,0.7036,0.3714,first\n2,0.7040,0.3716,second\n",
+    ],
+)
+def test_a_table_of_steps_is_read_as_spreadsheets_write_it(tmp_path, text):
+    path = tmp_path / "steps.csv"
+    path.write_text(text)
+    measured = read_steps(path, Identify())
+    assert measured.periods_s.tolist() == [0.7036, 0.704]
+    assert measured.lengths_m.tolist() == [0.3714, 0.3716]
+
+
+def test_a_column_of_steps_is_named_with_or_without_its_unit(tmp_path):
+    path = tmp_path / "steps.csv"
+    path.write_text("duration (ms),step [mm]\n703.6,371.4\n704.0,371.6\n")
+    columns = {"period_s": "duration", "length_m": "step [mm]"}
+    assert read_steps(path, Identify(columns=columns)).lengths_m == pytest.approx([0.3714, 0.3716])
+    with pytest.raises(ConfigError, match="is in mm, but --units that it is in m"):
+        read_steps(path, Identify(columns=columns, units={"length": "m"}))
+    with pytest.raises(ConfigError, match="'lenght' is neither a kind, a quantity nor a column"):
+        read_steps(path, Identify(columns=columns, units={"lenght": "mm"}))
 
 
 def test_a_missing_file_is_refused_as_it_was_typed(walker):

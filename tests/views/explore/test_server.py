@@ -188,6 +188,21 @@ def test_who_may_not_ask_and_what_is_no_question_is_refused_in_words(served, sta
     assert said["error"]["message"]
 
 
+def test_a_circle_of_links_below_the_runs_is_not_found(served):
+    runs = served.folder / "runs"
+    runs.mkdir(exist_ok=True)
+    (runs / "circle").symlink_to(runs / "circle")
+    status, said = served.asked("/runs/circle/report.html")
+    assert status == 404
+    assert said["error"]["message"]
+
+
+def test_a_decimal_comma_is_refused_with_the_number_that_was_meant(served):
+    status, said = served.walk({"slope_deg": "0,5"})
+    assert status == 422
+    assert "did you mean 0.5?" in said["error"]["message"]
+
+
 def test_the_page_is_small(served):
     status, page = served.asked(f"/?token={served.token}")
     assert status == 200

@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk, as_walk, named_column, plain, refuse_gaps, refuse_units, unit_value
 from walkerlab.exchange.rate_jumps import sums_at_jumps
-from walkerlab.exchange.recording import Recording, read_delimited, read_file, read_recording
+from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
@@ -32,16 +32,16 @@ STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad"
 """Kind of unit of each quantity in a table of steps."""
 MIN_STEPS: Final = 2
 MOST_STEPS: Final = 500  # each step adds an unknown floor height; memory grows as steps squared, time as steps cubed
+DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
 SAME_TOUCHES: Final = 0.002  # rad, largest change of the sum of leg angles at heel strike that counts as no change
-NO_DATA_FILE: Final = "there is no such file"
 
 
 def digests(config: Config) -> Mapping[str, str]:
     """Return the digest of the data file's content, so that a changed file makes results outdated."""
     if config.identify is None:
         return {}
-    return {"identify.data": file_digest(Path(config.identify.data)) or NO_DATA_FILE}
+    return {"identify.data": file_digest(Path(config.identify.data)) or NO_FILE}
 
 
 def read_measured(block: Identify, config: RigidConfig) -> MeasuredWalk:
@@ -59,7 +59,7 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
     if block.level == "steps":
         yield refuse_count(path, read_steps(path, block))
         return
-    walk = as_walk(read_recording(path), block.columns, block.units)
+    walk = as_walk(read_recording(path, DATA_KEY), block.columns, block.units)
     problem, divided = None, False
     for touch_sum_rad in touch_sums(walk, block, config):
         try:
@@ -112,7 +112,7 @@ def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_su
 
 def read_steps(path: Path, block: Identify) -> MeasuredWalk:
     """Read a table with one row per step: `period_s` and, if measured, `length_m` and `touch_angle_rad`."""
-    table = read_file(path, read_delimited)
+    table = read_file(path, read_delimited, DATA_KEY)
     refuse_units(table, block.units, STEP_KINDS)
     for name in block.columns.keys() - STEP_KINDS.keys():
         raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Choose from {', '.join(STEP_KINDS)}.")

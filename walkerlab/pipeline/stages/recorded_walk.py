@@ -12,7 +12,7 @@ import numpy as np
 from walkerlab.config.reads import RecordedWalkConfig
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import OF_LEG, OF_WALKER, RecordedWalk, as_walk
-from walkerlab.exchange.recording import TIME, Recording, read_file, read_recording
+from walkerlab.exchange.recording import NO_FILE, TIME, Recording, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.progress import Progress
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from walkerlab.config.recording import RecordedFile
     from walkerlab.config.schema import Config
 
-NO_FILE = "there is no such file"
 NORMAL_QUARTILE = 0.6745  # median of the absolute value of a normal variable with standard deviation 1
 NOISY = 0.02  # noise over amplitude above which the times of single steps are off by several per cent
 
@@ -44,11 +43,12 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     assert block is not None, "the stage requires the block"
     progress.start("recorded-walk", 1)
     walk = read_walk(block)
-    steps = divide_into_steps(walk, rigid_walker(config), block.file)
-    progress.advance()
     doubts = list(doubts_about(walk))
+    # before the division into steps, which noise may make fail
     for doubt in doubts:
         progress.note(doubt)
+    steps = divide_into_steps(walk, rigid_walker(config), block.file)
+    progress.advance()
     return content_of(block, config, walk, steps, doubts)
 
 
@@ -74,7 +74,8 @@ def read_walk(block: RecordedFile) -> RecordedWalk:
     if not block.file:
         raise ConfigError("recording.file: the recording has no file.", "Name one: --with FILE.", ("recording", "file"))
     path = Path(block.file)
-    recording = read_file(path, read_artifact) if path.suffix.lower() == ".h5" else read_recording(path)
+    key = "recording", "file"
+    recording = read_file(path, read_artifact, key) if path.suffix.lower() == ".h5" else read_recording(path, key)
     return as_walk(recording, block.columns, block.units)
 
 
