@@ -365,6 +365,7 @@ def test_a_motion_without_version_that_denies_degrees_needs_a_unit(tmp_path):
         ("Devices\n1000\n,,Force\nFrame,Sub Frame,Fx\n,,N\n1,0,1\n", "Vicon Nexus"),
         ("Format Version,1.23,Take Name,walk\n\n,Type,Marker,Marker\n", "Motive"),
         ("NO_OF_FRAMES\t2\nFREQUENCY\t100\nMARKER_NAMES\tHIP\tF1\n1\t2\t3\t4\t5\t6\n", "Qualisys"),
+        ("mass_A\nt\tx\ty\n0.0\t1.0\t2.0\n0.1\t1.1\t2.1\n", "Tracker"),
         ("scorer,net,net\nbodyparts,hip,hip\ncoords,x,y\n0,1,2\n1,2,3\n", "DeepLabCut"),
     ],
 )

@@ -76,7 +76,7 @@ def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str
         except ConfigError as error:
             if name in asked:
                 raise
-            left_out[name] = error.message
+            left_out[name] = error.message.removeprefix(f"{recording.path}: ")
     time = values.pop(TIME)
     refuse_order(recording.path, time)
     return RecordedWalk(time, values, {name: sources[name] for name in (TIME, *values)}, left_out)

@@ -59,6 +59,9 @@ HEADER_LINES: Final = 60
 """Number of lines at the top of a file that are searched for the header."""
 WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
 
+ONE_TABLE: Final = (
+    "Write a table with a column of times and all points side by side: time (s),hip.x,hip.y,foot1.x,foot1.y,..."
+)
 EXPORT_MARKERS: Final = "Export the markers as .c3d or .trc."
 PROGRAMS: Final = {
     re.compile(r"(?:Trajectories|Devices|Joints|Segments|Model Outputs)\W*\n"): ("Vicon Nexus", EXPORT_MARKERS),
@@ -67,10 +70,8 @@ PROGRAMS: Final = {
         "Qualisys Track Manager without column headers or time",
         "Export it with column headers and time, or export the markers as .c3d.",
     ),
-    re.compile(r"scorer,"): (
-        "DeepLabCut, which counts frames",
-        "Write a table with a header of one row and a column of times: time (s),hip.x,hip.y,foot1.x,foot1.y,...",
-    ),
+    re.compile(r"scorer,"): ("DeepLabCut, which counts frames", ONE_TABLE),
+    re.compile(r"mass[ _]\w+\W*\n#?t\Wx\Wy"): ("Tracker with a single point", ONE_TABLE),
 }
 """Program and advice by the beginning of a table that must be exported in another way."""
 

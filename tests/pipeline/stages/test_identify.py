@@ -14,7 +14,7 @@ from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, identify, simulate
-from walkerlab.pipeline.stages.measured_walk import NO_DATA_FILE, digests, read_measured
+from walkerlab.pipeline.stages.measured_walk import NO_FILE, digests, read_measured
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.report.answers import answer
@@ -163,7 +163,7 @@ def test_columns_and_units_are_mapped(table, tmp_path):
 def test_a_changed_file_changes_the_key_of_the_result(tmp_path):
     path = tmp_path / "steps.csv"
     config = load(Path("paper"), ask(path, "identify.fit={slope_deg: null}")).config
-    assert digests(config) == {"identify.data": NO_DATA_FILE}
+    assert digests(config) == {"identify.data": NO_FILE}
     keys = []
     for text in (GOOD, GOOD.replace("0.373", "0.372"), GOOD):
         path.write_text(text)
