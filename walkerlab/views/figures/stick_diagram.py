@@ -17,7 +17,7 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from walkerlab.outcome import outcome_of
-from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.pipeline.store.footholds import FAR, ground_levels
 from walkerlab.views.figures.canvas import add_legend, blank, entry, styled
@@ -129,7 +129,7 @@ class Sticks:
         return at_strikes, np.abs(self.time[:, None] - np.concatenate(between)).argmin(axis=0)
 
 
-def sticks_of(result: Stored, under: str = "") -> Sticks:
+def sticks_of(result: Identified, under: str = "") -> Sticks:
     """Read the joint positions of a stored walk; `under` is the prefix of its groups."""
     asked = result.identity.config_slice
     trajectory, walker = result[f"{under}trajectory"], asked["walker"]
