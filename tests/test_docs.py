@@ -268,6 +268,22 @@ def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
     )
 
 
+def test_links_out_of_the_site_lead_to_source_code_and_become_text():
+    keep_text = runpy.run_path(str(ROOT / "scripts" / "mkdocs_hooks.py"))["on_page_markdown"]
+    assert keep_text("See [`tree.py`](../walkerlab/tree.py) and [theory](theory.md).", page=None) == (
+        "See `tree.py` and [theory](theory.md)."
+    )
+    for path in (ROOT / "docs").glob("*.md"):
+        outside = [link for link in LINK.findall(text_of(path)) if link.startswith("../")]
+        assert [link for link in outside if not link.startswith(("../walkerlab/", "../tests/", "../configs/"))] == []
+
+
+def test_the_start_page_links_every_page_of_the_site():
+    pages = re.findall(r": ([\w-]+\.md)$", text_of(ROOT / "scripts" / "mkdocs.yml"), re.MULTILINE)
+    assert "identify.md" in pages
+    assert [page for page in pages if f"({page})" not in text_of(ROOT / "docs" / "index.md")] == ["index.md"]
+
+
 def test_the_gallery_has_a_page_whose_gaits_walk(tmp_path):
     make = runpy.run_path(str(ROOT / "scripts" / "make_gallery.py"))["sweep_page"]
     make.__globals__.update(SLOPES="3:20:2", HIPS=[10])
