@@ -116,27 +116,30 @@ def complete_ascents(
     trials: Sequence[Trial], ascents: Sequence[Ascent], checkpoint: Checkpoint, jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
     """Compute each trial's first reference end (or why it is missing) and, with `long_runs`, the postponed runs."""
-    postponed = [index for index, ascent in enumerate(ascents) if ascent.unfinished and long_runs]
-    ends = [unit_name(trial.name, "first end") for trial in trials]
-    runs = [unit_name(ascents[index].trial.name, ascents[index].method, "long run") for index in postponed]
     # longest first: the last trial is near the rigid limit, where the explicit reference method takes the most steps
     calls: dict[str, Callable[[], End | WalkEndsError | MethodRun]] = {
-        unit: partial(try_first_end, trial) for unit, trial in zip(ends[::-1], trials[::-1], strict=True)
+        unit_name(trial.name, "first end"): partial(try_first_end, trial) for trial in reversed(trials)
     }
-    for unit, ascent in zip(runs, (ascents[index] for index in postponed), strict=True):
-        calls[unit] = partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)])
+    for ascent in ascents:
+        if ascent.unfinished and long_runs:
+            call = partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)])
+            calls[unit_name(ascent.trial.name, ascent.method, "long run")] = call
     todo = {unit: call for unit, call in calls.items() if unit not in checkpoint.kept}
-    problems: dict[str, WalkEndsError] = {}
+    ends: dict[str, End | WalkEndsError] = {}
     for unit, result in zip(todo, in_order(list(todo.values()), jobs), strict=True):
         if isinstance(result, WalkEndsError):
-            problems[unit] = result
+            ends[unit] = result
         else:
             checkpoint.keep(unit, result.packed())
-    completed = list(ascents)
-    for index, unit in zip(postponed, runs, strict=True):
-        last = MethodRun.unpack(checkpoint.kept[unit])
-        completed[index] = replace(ascents[index], runs=(*ascents[index].runs, last), unfinished=False)
-    return [problems[unit] if unit in problems else End.unpack(checkpoint.kept[unit]) for unit in ends], completed
+
+    def completed(ascent: Ascent) -> Ascent:
+        unit = unit_name(ascent.trial.name, ascent.method, "long run")
+        if unit not in calls:
+            return ascent
+        return replace(ascent, runs=(*ascent.runs, MethodRun.unpack(checkpoint.kept[unit])), unfinished=False)
+
+    units = [unit_name(trial.name, "first end") for trial in trials]
+    return [ends.get(unit) or End.unpack(checkpoint.kept[unit]) for unit in units], [*map(completed, ascents)]
 
 
 def try_first_end(trial: Trial) -> End | WalkEndsError:
