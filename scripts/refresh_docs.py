@@ -1,11 +1,12 @@
 """Keep README and docs true: write the parts that follow from the code, and try the examples.
 
-    python scripts/refresh_docs.py [--check | --picture]
+    python scripts/refresh_docs.py [--check | --pictures | --downloads]
     python scripts/refresh_docs.py --examples [--slow] [DOCUMENT ...]
 
 A part stands between `<!-- made by scripts/refresh_docs.py: NAME -->` and `<!-- end -->`. With --check nothing is
-written, and the exit code is 1 if a part is out of date. With --picture the README's picture and the models in
-docs/downloads are written too; their bytes depend on versions and platform, so they are not compared.
+written, and the exit code is 1 if a part or a picture is out of date. --pictures draws the pictures of docs/images, see
+pictures.py, and --downloads writes the models in docs/downloads; their bytes depend on versions and platform, so they
+are not compared.
 
 An example is a fenced block: `console` has commands after `$` and what they print below them, `pycon` has Python after
 `>>>`, and a `yaml` block that begins with `# NAME.yaml` or `name: NAME` is written to NAME.yaml. `...` stands for
@@ -39,9 +40,12 @@ from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.runner import execute
 from walkerlab.pipeline.store.runfolder import RunFolder
 
+sys.path.insert(0, str(Path(__file__).parent))
+
+from pictures import stale_pictures, write_pictures
+
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")
-PICTURE = "figure-06.png"
 EXAMPLE = re.compile(r"^(<!-- takes minutes -->\n)?```(console|pycon|yaml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
@@ -62,12 +66,6 @@ class Results:
     def _summary(self, stage: str, *sets: str) -> dict[str, Any]:
         loaded = load(None, sets)
         return execute(loaded.config, stage, RunFolder(self.runs, loaded.run_name)).summary
-
-    def picture(self) -> bytes:
-        """The README's picture, as `walkerlab plot` draws it."""
-        loaded = load(None, ())
-        execute(loaded.config, "plot", RunFolder(self.runs, loaded.run_name))
-        return (RunFolder(self.runs, loaded.run_name).figures / PICTURE).read_bytes()
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -214,17 +212,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a document is out of date")
     parser.add_argument("--examples", action="store_true", help="try the examples; exit with 1 if one prints otherwise")
     parser.add_argument("--slow", action="store_true", help="those that take minutes too")
-    parser.add_argument("--picture", action="store_true", help="write the README's picture and docs/downloads too")
+    parser.add_argument("--pictures", action="store_true", help="draw the pictures of docs/images too; takes minutes")
+    parser.add_argument("--downloads", action="store_true", help="write docs/downloads too")
     parser.add_argument("--runs", type=Path, help="folder of runs to reuse; default: a temporary one")
     options = parser.parse_args(arguments)
     if options.examples:
         return try_examples(options.documents or with_examples(), options.slow)
     with tempfile.TemporaryDirectory() as temporary:
         results = Results(options.runs or Path(temporary))
-        if options.picture:
+        if options.downloads:
             write_downloads()
-            (ROOT / "docs" / "images" / PICTURE).write_bytes(results.picture())
+        if options.pictures:
+            write_pictures(results.runs)
         stale = [path for name in DOCUMENTS if not refresh(path := ROOT / name, results, write=not options.check)]
+        if options.check:
+            stale += stale_pictures(results.runs)
     for path in stale:
         print(f"{path.relative_to(ROOT)}: {'out of date' if options.check else 'written'}")
     return 1 if stale and options.check else 0

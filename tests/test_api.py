@@ -1,8 +1,11 @@
 """The package from Python."""
 
 import ast
+import copy
 import doctest
+import inspect
 import itertools
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -13,8 +16,10 @@ import pytest
 import walkerlab
 from walkerlab import api
 from walkerlab.code_digest import Sources
+from walkerlab.config.contact import Contact
 from walkerlab.config.loader import load
-from walkerlab.errors import ConfigError, StaleError
+from walkerlab.config.walkers import CompassWalker, Kneed
+from walkerlab.errors import ConfigError, NoAnswer, StaleError
 
 
 def test_the_examples_of_the_docstrings_say_what_happens(tmp_path):
@@ -292,3 +297,103 @@ def test_measurements_are_planned_in_memory():
     angles = plan.summary["measurements"][3]
     assert angles["measurement"] == "angles over time"
     assert 2 <= angles["errors"][0]["steps_needed"] <= 6
+
+
+@pytest.mark.parametrize(
+    ("maker", "block"),
+    [(walkerlab.compass, CompassWalker), (walkerlab.kneed, Kneed), (walkerlab.contact, Contact)],
+)
+def test_editors_can_complete_every_key_of_a_walker_and_a_ground(maker, block):
+    signature = inspect.signature(maker)
+    assert set(signature.parameters) == {*block.model_fields, "others"} - {"type"}
+    assert signature.return_annotation is block
+    assert isinstance(maker(), block)
+
+
+def test_keys_that_are_passed_arrive_and_omitted_ones_keep_their_defaults():
+    walker = walkerlab.compass(leg_length_m=0.8, hip={"spring_N_m_per_rad": 1.0})
+    assert (walker.leg_length_m, walker.foot_to_mass_m, walker.hip.spring_N_m_per_rad) == (0.8, 0.4, 1.0)
+    assert walkerlab.kneed(thigh={"length_m": 0.4}).thigh.length_m == 0.4
+    assert walkerlab.contact(friction="none", pad_pitch=0.2).pad_pitch == 0.2
+
+
+def test_values_of_a_result_are_attributes_and_items():
+    walk = walkerlab.simulate(strides=1)
+    assert walk.outcome == walk["outcome"] == walk.summary["outcome"]
+    assert walk.last_step_period_s == walk["last_step_period_s"] == walk.summary["step_periods_s"][-1]
+    assert {"outcome", "step_periods_s", "last_step_period_s", "plot"} <= set(dir(walk))
+    assert pickle.loads(pickle.dumps(walk)).outcome == copy.deepcopy(walk).outcome == "walked"
+
+
+def test_a_value_that_a_result_lacks_is_answered_with_a_hint():
+    walk = walkerlab.simulate(strides=1)
+    with pytest.raises(AttributeError, match=r"has no value 'outcom'\. Did you mean outcome\?"):
+        _ = walk.outcom
+    with pytest.raises(KeyError, match=r"has no value 'zzz'\. It has .*last_step_period_s.* and more in `summary`"):
+        _ = walk["zzz"]
+    with pytest.raises(AttributeError, match=r"an array: dataset\('trajectory'\).angle"):
+        _ = walk.angle
+    with pytest.raises(AttributeError, match="'period_s': no gait at a slope"):
+        _ = walkerlab.find_gait(slope_deg=-1).period_s
+
+
+def test_notebooks_show_a_result_as_tables(tmp_path):
+    html = walkerlab.find_gait()._repr_html_()
+    assert "there is a stable gait" in html
+    assert "<td" in html
+    assert "0.703597" in html
+    assert walkerlab.find_gait(slope_deg=-1)._repr_html_().startswith("<p>No answer: no gait at a slope")
+    hostile = api.Result("known-problems", {"name": "<script>"}, walkerlab.find_gait().content)
+    assert "<script>" not in hostile._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("ask", "names"),
+    [
+        (lambda: walkerlab.simulate(strides=2), {"figure-02", "figure-07", "figure-10"}),
+        (lambda: walkerlab.simulate(contact=walkerlab.contact(), strides=2), {"figure-06", "ground-forces"}),
+        (lambda: walkerlab.basin(cells=(4, 4)), {"figure-15"}),
+    ],
+    ids=["rigid", "contact", "basin"],
+)
+def test_a_result_in_memory_is_drawn(ask, names):
+    result = ask()
+    assert names <= set(result.figures)
+    for name in ("", *result.figures):
+        assert result.plot(name).axes
+    assert result.plot()._repr_png_().startswith(b"\x89PNG")
+    with pytest.raises(ConfigError, match="has no figure circle"):
+        result.plot("circle")
+
+
+def test_the_plot_of_a_gait_shows_its_multipliers():
+    gait = walkerlab.find_gait()
+    (axes,) = gait.plot().axes
+    points = [complex(*line.get_xydata()[0]) for line in axes.lines if line.get_marker() == "o"]
+    assert points == list(gait.multipliers)
+    with pytest.raises(NoAnswer, match="no gait at a slope"):
+        walkerlab.find_gait(slope_deg=-1).plot()
+
+
+def test_a_group_of_arrays_becomes_a_table_with_units():
+    pytest.importorskip("pandas")
+    walk = walkerlab.simulate(strides=1)
+    steps = walk.to_dataframe()
+    assert steps.period_s.tolist() == walk.summary["step_periods_s"]
+    assert steps.index.tolist() == [0, 1]
+    assert steps.attrs["units"]["length_m"] == "m"
+    trajectory, data = walk.to_dataframe("trajectory"), walk.dataset("trajectory")
+    assert trajectory["angle.2"].tolist() == data.angle.sel(leg=2).values.tolist()
+    assert trajectory.index.tolist() == data.time.values.tolist()
+    grid = walkerlab.basin(cells=(3, 4)).to_dataframe()
+    assert grid.index.nlevels == 2
+    assert len(grid) == 12
+    with pytest.raises(KeyError, match="has no group 'walks'; its groups: steps, trajectory"):
+        walk.to_dataframe("walks")
+
+
+def test_a_table_without_pandas_is_refused_with_advice(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ConfigError, match="a DataFrame needs pandas") as caught:
+        walkerlab.find_gait().to_dataframe()
+    assert caught.value.advice == "pip install pandas"

@@ -7,6 +7,7 @@ import os
 import re
 import runpy
 import shlex
+import shutil
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -266,6 +267,44 @@ def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
     assert shown("Walk.\n\nslope_deg  downhill,\n           deg\na, b       both\n\n>>> 1 + 1\n2\n\nEnd.") == (
         "Walk.\n\n- `slope_deg`: downhill,\n           deg\n- `a, b`: both\n\n```pycon\n>>> 1 + 1\n2\n```\n\nEnd."
     )
+
+
+def test_pictures_have_the_words_that_are_drawn_today(tmp_path):
+    pictures = MAKER["stale_pictures"].__globals__
+    assert set(pictures["PICTURES"]) <= {path.name for path in (ROOT / "docs" / "images").iterdir()}
+    assert list(MAKER["stale_pictures"](tmp_path)) == [], "run: python scripts/refresh_docs.py --pictures"
+
+
+def test_a_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
+    pictures = MAKER["stale_pictures"].__globals__
+    shutil.copytree(ROOT / "docs" / "images", tmp_path / "images")
+    monkeypatch.setitem(pictures, "IMAGES", tmp_path / "images")
+    words = tmp_path / "images" / "figure-06.words"
+    words.write_text(words.read_text().replace("height (m)", "height in m"))
+    monkeypatch.setitem(pictures, "PICTURES", {"figure-06.png": pictures["PICTURES"]["figure-06.png"]})
+    assert list(MAKER["stale_pictures"](tmp_path / "runs")) == [tmp_path / "images" / "figure-06.png"]
+
+
+def test_words_of_a_drawing_leave_numbers_out():
+    words_of = MAKER["stale_pictures"].__globals__["words_of"]
+    svg = "<text x='1'>slope (rad)</text><text>0.25</text><text><tspan>step 12</tspan></text>"
+    assert words_of(svg) == "slope (rad)\nstep #\n"
+
+
+def test_links_out_of_the_site_lead_to_source_code_and_become_text():
+    keep_text = runpy.run_path(str(ROOT / "scripts" / "mkdocs_hooks.py"))["on_page_markdown"]
+    assert keep_text("See [`tree.py`](../walkerlab/tree.py) and [theory](theory.md).", page=None) == (
+        "See `tree.py` and [theory](theory.md)."
+    )
+    for path in (ROOT / "docs").glob("*.md"):
+        outside = [link for link in LINK.findall(text_of(path)) if link.startswith("../")]
+        assert [link for link in outside if not link.startswith(("../walkerlab/", "../tests/", "../configs/"))] == []
+
+
+def test_the_start_page_links_every_page_of_the_site():
+    pages = re.findall(r": ([\w-]+\.md)$", text_of(ROOT / "scripts" / "mkdocs.yml"), re.MULTILINE)
+    assert "identify.md" in pages
+    assert [page for page in pages if f"({page})" not in text_of(ROOT / "docs" / "index.md")] == ["index.md"]
 
 
 def test_the_gallery_has_a_page_whose_gaits_walk(tmp_path):

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import os
 import tempfile
 import warnings
@@ -9,7 +10,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType
-from typing import Any, TypedDict, Unpack, cast
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, cast
+
+from markupsafe import escape
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, block_of, kinds_of
@@ -17,10 +20,12 @@ from walkerlab.config.files import DEFAULT, builtin_config, read_layers
 from walkerlab.config.layers import merge_layers
 from walkerlab.config.loader import suspicious_values
 from walkerlab.config.overlay import tree_of
+from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import align_start, validate_tree
+from walkerlab.config.walkers import CompassWalker, Kneed, Walker
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.extending_config import run_and_write
@@ -30,11 +35,17 @@ from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.runner import Options
 from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.artifact import Damaged
+from walkerlab.pipeline.store.artifact import Damaged, Identified
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.report.text import in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+    from walkerlab.views.figures.illustration import Illustration
 
 RUNS = "runs"
 MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
@@ -62,13 +73,23 @@ class Combined(TypedDict, total=False):
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """Result of a stage; its repr shows the headline values.
+    """Result of a stage; its repr shows the headline values, and notebooks show its answer with tables.
+
+    Each value of the summary is also an attribute and an item.
 
     stage      name of the stage
     summary    values that `--json` prints, in SI units
     content    all labelled arrays, by group
     no_answer  reason if there is no answer, otherwise None
     artifact   file of the result; None if it was computed in memory
+
+    >>> gait = find_gait()
+    >>> gait.period_s == gait["period_s"] == gait.summary["period_s"]
+    True
+    >>> gait.periods
+    Traceback (most recent call last):
+    ...
+    AttributeError: Gait of fixedpoint has no value 'periods'. Did you mean period_s?
     """
 
     stage: str
@@ -77,12 +98,56 @@ class Result:
     no_answer: str | None = None
     artifact: Path | None = None
 
+    def __getattr__(self, name: str) -> Any:
+        # Python asks for attributes such as __deepcopy__ before there is a summary.
+        if name.startswith("_"):
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+        if name in self._values:
+            return self._values[name]
+        raise AttributeError(
+            f"{type(self).__name__} has no attribute {name!r}" if name[:1] == "_" else self._describe_missing(name)
+        )
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._values:
+            raise KeyError(self._describe_missing(name))
+        return self._values[name]
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *filter(str.isidentifier, self._values)})
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._values)
+
+    @property
+    def _values(self) -> Mapping[str, Any]:
+        return {**headline_values(self.stage, self.summary), **self.summary}
+
+    def _describe_missing(self, name: str) -> str:
+        """Explain why there is no value of this name, and where there is one."""
+        start = f"{type(self).__name__} of {self.stage} has no value {name!r}"
+        if self.no_answer is not None:
+            return f"{start}: {self.no_answer}."
+        holders = [group for group in self.groups if name in self.content[group].variables]
+        if holders:
+            return f"{start}, but an array: dataset({holders[0]!r}).{name}"
+        names = ", ".join(headline_values(self.stage, self.summary))
+        return f"{start}.{suggestion(name, self._values) or f' It has {names} and more in `summary` and `groups`.'}"
+
     def __repr__(self) -> str:
         values = headline_values(self.stage, self.summary)
         lines = [f"no answer: {self.no_answer}"] if self.no_answer is not None else []
         lines += [f"  {name:<{max(map(len, values))}}  {in_words(value)}" for name, value in values.items()]
         lines += [f"groups: {', '.join(self.groups)}"] if self.groups else []
         return "\n".join([f"{type(self).__name__} of {self.stage}", *lines])
+
+    def _repr_html_(self) -> str:
+        # Imported here: only notebooks show HTML.
+        from walkerlab.views.report.answers import answer_html
+
+        if self.no_answer is not None:
+            return f"<p>No answer: {escape(self.no_answer)}</p>"
+        return answer_html(self.stage, self.summary)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -94,14 +159,63 @@ class Result:
 
         Raises KeyError for an unknown group.
         """
-        if group not in self.groups:
-            raise KeyError(f"{self.stage} has no group {group!r}; its groups: {', '.join(self.groups) or 'none'}")
-        return dataset(self.content[group])
+        return dataset(self._group(group))
+
+    def _group(self, name: str) -> Group:
+        if name not in self.groups:
+            raise KeyError(f"{self.stage} has no group {name!r}; its groups: {', '.join(self.groups) or 'none'}")
+        return self.content[name]
+
+    def to_dataframe(self, group: str = "") -> "DataFrame":
+        """Return a group of arrays, by default the first, as a pandas DataFrame; `attrs["units"]` has units by column.
+
+        Its index is made of the dimensions that all arrays share; others give columns such as `angle.1`.
+
+        Raises KeyError for an unknown group, ConfigError if pandas is not installed.
+
+        >>> list(simulate(strides=1).to_dataframe("steps").period_s.round(4))
+        [0.7036, 0.7036]
+        """
+        return dataframe(self._group(group or next(iter(self.groups), "")))
+
+    def plot(self, figure: str = "") -> "Figure":
+        """Draw a figure of this result as a matplotlib Figure, by default the first one of `figures`.
+
+        Raises ConfigError for an unknown figure.
+
+        >>> simulate(strides=1).plot().savefig(folder / "walk.png")
+        """
+        figures = self._drawable()
+        if figure not in ("", *figures) or not figures:
+            advice = f"Choose from {', '.join(figures)}." if figures else "Plot a `dataset` instead."
+            raise ConfigError(f"{self.stage}: this result has no figure {figure}".rstrip() + ".", advice)
+        return figures[figure or next(iter(figures))].figure({self.stage: cast(Identified, self.content)})
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of the figures that show this result alone, as arguments of `plot`."""
+        return tuple(self._drawable())
+
+    def _drawable(self) -> "dict[str, Illustration]":
+        # Imported here: it loads matplotlib.
+        from walkerlab.views.figures.registry import FIGURES
+
+        results = {self.stage: cast(Identified, self.content)}
+        own = (figure for figure in FIGURES if figure.stages == (self.stage,))
+        return {figure.name: figure for figure in own if figure.why_left_out(results, {}) is None}
 
 
 @dataclass(frozen=True, repr=False)
 class Gait(Result):
     """Result of `fixedpoint`."""
+
+    def plot(self, figure: str = "") -> "Figure":
+        """Draw the multipliers in the unit circle as a matplotlib Figure; NoAnswer if there is no gait."""
+        from walkerlab.views.figures.multipliers import draw_multipliers
+
+        if self.no_answer is not None:
+            raise NoAnswer(self.no_answer)
+        return super().plot(figure) if figure else draw_multipliers(self.multipliers)
 
     @property
     def multipliers(self) -> tuple[complex, ...]:
@@ -262,7 +376,7 @@ def sweep(
     return dataset(swept.content[""])
 
 
-def walker(type: str, **keys: Any) -> Any:
+def walker(type: Literal["compass", "straight-legs", "kneed", "parts"], **keys: Any) -> Walker:
     """Build the config block of a walker of any type; omitted keys have their defaults.
 
     Raises ConfigError for a key or value that the type does not allow.
@@ -270,36 +384,85 @@ def walker(type: str, **keys: Any) -> Any:
     return validate_tree(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
 
 
-def compass(**keys: Any) -> Any:
+def compass(
+    *,
+    leg_length_m: float | None = None,
+    foot_to_mass_m: float | None = None,
+    leg_mass_kg: float | None = None,
+    hip_mass_kg: float | None = None,
+    leg_inertia_kg_m2: float | None = None,
+    foot_radius_m: float | None = None,
+    torso: Mapping[str, Any] | None = None,
+    hip: Mapping[str, Any] | None = None,
+    **others: Any,
+) -> CompassWalker:
     """Build a compass walker: two straight legs with a mass on each, and a mass at the hip; by default the paper's.
+
+    Arguments are keys of the config's block `walker`, see docs/config.md; None leaves a key at its default. Raises
+    ConfigError for other keys and for values that are not allowed.
 
     >>> compass(hip_mass_kg=20).total_mass_kg
     30.0
     """
-    return walker("compass", **keys)
+    return cast(CompassWalker, walker("compass", **_passed(locals())))
 
 
-def kneed(**keys: Any) -> Any:
-    """Build a walker with knees that lock; by default Hsu Chen's walker.
+def kneed(
+    *,
+    thigh: Mapping[str, Any] | None = None,
+    shank: Mapping[str, Any] | None = None,
+    hip_mass_kg: float | None = None,
+    foot_radius_m: float | None = None,
+    foot_centre_ahead_m: float | None = None,
+    knee: Mapping[str, Any] | None = None,
+    torso: Mapping[str, Any] | None = None,
+    hip: Mapping[str, Any] | None = None,
+    **others: Any,
+) -> Kneed:
+    """Build a walker with knees that lock; by default Hsu Chen's walker. Arguments and errors are as for `compass`.
 
     >>> kneed(hip_mass_kg=1.0).total_mass_kg
     2.1
     """
-    return walker("kneed", **keys)
+    return cast(Kneed, walker("kneed", **_passed(locals())))
 
 
-def contact(**keys: Any) -> Contact:
+def contact(
+    *,
+    units: Literal["adams", "si"] | None = None,
+    stiffness: float | None = None,
+    exponent: float | None = None,
+    damping: float | None = None,
+    full_damping_penetration: float | None = None,
+    friction: str | None = None,
+    static_friction: float | None = None,
+    dynamic_friction: float | None = None,
+    stiction_velocity: float | None = None,
+    friction_velocity: float | None = None,
+    terrain: Literal["checkerboard", "after-mid-swing", "plane"] | None = None,
+    pad_pitch: float | Literal["rigid", "own"] | None = None,
+    stance: Literal["free", "pinned"] | None = None,
+    **others: Any,
+) -> Contact:
     """Build the ground of the contact model; values are in N, mm, s as in ADAMS dialogs, unless `units="si"`.
+
+    Arguments are keys of the config's block `contact`; None leaves a key at its default.
 
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    block = validate_tree(tree_of({"contact": keys}, NOWHERE)).contact
+    block = validate_tree(tree_of({"contact": _passed(locals())}, NOWHERE)).contact
     assert block is not None, "a block set by an argument is in the config"
     return block
 
 
-def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -> Gait:
+def _passed(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return the keys that a caller passed: `others`, and all other arguments that are not None."""
+    others: dict[str, Any] = arguments.pop("others")
+    return {name: value for name, value in arguments.items() if value is not None} | others
+
+
+def find_gait(walker: Walker | None = None, slope_deg: float | None = None, **keys: Any) -> Gait:
     """Find the periodic gaits of a walker on a slope, in memory; `summary` has the chosen gait, `dataset` all of them.
 
     Here and in the functions below, omitted arguments have the values of the built-in `paper` config.
@@ -318,7 +481,7 @@ def find_gait(walker: Any = None, slope_deg: float | None = None, **keys: Any) -
 
 
 def simulate(
-    walker: Any = None,
+    walker: Walker | None = None,
     slope_deg: float | None = None,
     contact: Contact | None = None,
     strides: int | None = None,
@@ -343,7 +506,7 @@ def simulate(
 
 
 def continue_gait(
-    walker: Any = None,
+    walker: Walker | None = None,
     over: str | None = None,
     span: tuple[float, float] | None = None,
     slope_deg: float | None = None,
@@ -363,7 +526,7 @@ def continue_gait(
 
 
 def basin(
-    walker: Any = None, slope_deg: float | None = None, cells: tuple[int, int] | None = None, **keys: Any
+    walker: Walker | None = None, slope_deg: float | None = None, cells: tuple[int, int] | None = None, **keys: Any
 ) -> Result:
     """Find which starts lead to which attractor, in memory; `summary` has their fractions, `dataset` a grid of starts.
 
@@ -377,7 +540,11 @@ def basin(
 
 
 def robustness(
-    walker: Any = None, slope_deg: float | None = None, to: Sequence[str] = (), walks: int | None = None, **keys: Any
+    walker: Walker | None = None,
+    slope_deg: float | None = None,
+    to: Sequence[str] = (),
+    walks: int | None = None,
+    **keys: Any,
 ) -> Result:
     """Find the largest disturbances that a gait survives and the parameter that matters most, in memory.
 
@@ -392,7 +559,7 @@ def robustness(
 
 
 def explore(
-    walker: Any = None,
+    walker: Walker | None = None,
     slope_deg: float | None = None,
     contact: Contact | None = None,
     runs: str | Path = RUNS,
@@ -415,7 +582,7 @@ def explore(
     return server
 
 
-def design(walker: Any = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
+def design(walker: Walker | None = None, over: Mapping[str, Any] | None = None, **keys: Any) -> Result:
     """Find, in memory, the walker with the smallest or largest gait quantity; `summary["best"]` has the optimal values.
 
     walker  built by `compass`, `kneed` or `walker`
@@ -429,7 +596,7 @@ def read_walk(
     path: str | Path,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
-    walker: Any = None,
+    walker: Walker | None = None,
     slope_deg: float | None = None,
     **keys: Any,
 ) -> Result:
@@ -506,7 +673,7 @@ def with_blocks(config: str | Path | Config, **blocks: Mapping[str, Any]) -> Con
 
 def export_model(
     path: str | Path,
-    walker: Any = None,
+    walker: Walker | None = None,
     slope_deg: float | None = None,
     contact: Contact | None = None,
     law: str = "contact",
@@ -567,6 +734,33 @@ def dataset(group: Group) -> Any:
     return result.set_coords(str(group.attrs.get("coordinates", "")).split())
 
 
+def dataframe(group: Group) -> "DataFrame":
+    """Convert a group of labelled arrays to a pandas DataFrame; ConfigError if pandas is not installed."""
+    try:
+        import pandas
+    except ImportError as error:
+        raise ConfigError("a DataFrame needs pandas, which is not installed.", "pip install pandas") from error
+    sizes = {
+        dim: size for one in group.variables.values() for dim, size in zip(one.dims, one.values.shape, strict=True)
+    }
+    labels = {dim: group.variables[dim].values if dim in group.variables else range(sizes[dim]) for dim in sizes}
+    arrays = {name: variable for name, variable in group.variables.items() if name not in sizes}
+    shared = [dim for dim in sizes if all(dim in variable.dims for variable in arrays.values())]
+    columns: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    for name, variable in arrays.items():
+        others = [dim for dim in variable.dims if dim not in shared]
+        order = [variable.dims.index(dim) for dim in (*others, *shared)]
+        parts = variable.values.transpose(order).reshape(-1, math.prod(sizes[dim] for dim in shared))
+        for part, place in zip(parts, itertools.product(*(labels[dim] for dim in others)), strict=True):
+            column = ".".join([name, *map(str, place)])
+            columns[column], units[column] = part, variable.units
+    index = pandas.MultiIndex.from_product([labels[dim] for dim in shared], names=shared)
+    frame = pandas.DataFrame(columns, index.get_level_values(0) if len(shared) == 1 else index)
+    frame.attrs["units"] = units
+    return frame
+
+
 def xarray_here() -> Any:
     """Import xarray; ConfigError if it is not installed."""
     try:
@@ -580,8 +774,11 @@ def in_memory(stage: str, config: Config) -> Result:
     """Compute a stage and its inputs without files; ConfigError if the config lacks a block that the stage needs."""
     _check_stage(stage)
     PIPELINE[stage].refuse_question(config)
-    answer = answer_in_memory(config, stage, MemoryResults())
-    return _result_of(stage, answer.findings, answer, answer.no_answer)
+    memory = MemoryResults()
+    answer = answer_in_memory(config, stage, memory)
+    identity = memory.keys.identity(PIPELINE[stage], config, {})
+    content = Identified(answer.groups, answer.summary, answer.timed, complete=answer.complete, identity=identity)
+    return _result_of(stage, answer.findings, content, answer.no_answer)
 
 
 def config_of_scene(walker: Any, values: Mapping[str, Any], keys: Mapping[str, Any]) -> Config:

@@ -31,7 +31,7 @@ def test_downloads_are_todays_models(folder, name):
         re.sub(r".*Written by walkerlab.*", "", path.read_text()) for path in (DOCS / "downloads" / name, folder / name)
     ]
     before, now = (NUMBER.sub("#", text) for text in texts)
-    assert before == now, "run: python scripts/refresh_docs.py --picture"
+    assert before == now, "run: python scripts/refresh_docs.py --downloads"
     np.testing.assert_allclose(*(np.array(NUMBER.findall(text), float) for text in texts), rtol=1e-7, atol=1e-9)
 
 

@@ -1,6 +1,7 @@
 """Exported MJCF: it compiles silently, survives being saved, and walks in plain MuJoCo as our contact model does."""
 
 import importlib.util
+import subprocess
 import sys
 
 import numpy as np
@@ -116,6 +117,15 @@ def test_a_driven_walker_walks_with_the_script_beside_it(tmp_path, capsys):
     export = export_of("level")
     assert np.diff(touches[:, 0])[-4:] == pytest.approx(export.walk.periods_s[-1], rel=0.03)
     assert "mujoco" in sys.modules
+
+
+@pytest.mark.parametrize("arguments", [["2"], ["level.xml", "2"]])
+def test_the_script_of_a_driven_walker_finds_the_model_next_to_it(tmp_path, arguments):
+    for name, text in files_of("mjcf", "contact", "level").files.items():
+        (tmp_path / name).write_text(text)
+    done = subprocess.run([sys.executable, "level.py", *arguments], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert [line.partition(":")[0] for line in done.stdout.splitlines()] == ["step 1", "step 2"]
 
 
 @pytest.mark.parametrize(

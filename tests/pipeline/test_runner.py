@@ -300,7 +300,7 @@ def test_of_two_processes_one_computes_and_the_other_waits_and_reuses(toy, tmp_p
         second = subprocess.Popen(
             command, env=toy.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
-        assert second.stderr.readline().startswith("waiting: another walkerlab process")
+        assert second.stderr.readline().startswith("waiting: `-c ")
         go_on.touch()
         outputs = [json.loads(process.communicate()[0]) for process in (first, second)]
     assert outputs == [{"reused": False}, {"reused": True}]

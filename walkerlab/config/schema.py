@@ -220,8 +220,8 @@ class Config(Block):
     start: Start = key(
         "fixed-point",
         "rad, rad, rad/s, rad/s",
-        "fixed-point, or [theta_1, theta_2, dtheta_1, dtheta_2]; "
-        "theta_1 is replaced so that both feet stand on the slope",
+        "fixed-point, or the state just after heel strike: [theta_1, theta_2, dtheta_1, dtheta_2], where leg 1 "
+        "swings and leg 2 stands; theta_1 is replaced so that both feet stand on the slope",
         "eq. 11",
         bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
     )

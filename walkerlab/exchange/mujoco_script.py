@@ -1,10 +1,12 @@
 """Simulate in MuJoCo a walker that walkerlab exported, with push-offs and hip torque, and print its touchdowns.
 
-Usage: python NAME.py NAME.xml [steps] [--view]; needs the package mujoco.
+Usage: python NAME.py [MODEL.xml] [steps] [--view]. By default it walks ten steps of NAME.xml, which stands next to it.
+It needs the package mujoco.
 """
 
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -71,4 +73,6 @@ def main(path: str, steps: int, view: bool) -> None:
 
 if __name__ == "__main__":
     words = [word for word in sys.argv[1:] if word != "--view"]
-    main(words[0], int(words[1]) if len(words) > 1 else 10, "--view" in sys.argv)
+    steps = next((int(word) for word in words if word.isdecimal()), 10)
+    model = next((word for word in words if not word.isdecimal()), str(Path(__file__).with_suffix(".xml")))
+    main(model, steps, "--view" in sys.argv)

@@ -232,12 +232,12 @@ PIPELINE = Graph(
         "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
     ),
     Stage(
-        "simulate", "walkerlab.pipeline.stages.simulate", "Walk the rigid model.", reads.SimulateConfig,
+        "simulate", "walkerlab.pipeline.stages.simulate", "Simulate a walk of the rigid model.", reads.SimulateConfig,
         gait_unless_start_is_given, options=(STRIDES,), does_without=rigid_walk_omissions,
     ),
     Stage(
         "contact-sim", "walkerlab.pipeline.stages.contact_sim",
-        "Walk the contact model, with contact forces as in ADAMS.",
+        "Simulate a walk of the contact model, with contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
         precompile="compile_kernels", does_without=contact_walk_omissions,
     ),
@@ -263,7 +263,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "engines", "walkerlab.evidence.benchmarks.engines.stage",
-        "Walk in other engines (MuJoCo, Drake, Exudyn): our contact law in their integrators, then their own contact.",
+        "Simulate the walk in MuJoCo, Drake and Exudyn: our contact law in their integrators, then their own contact.",
         reads.SceneConfig, gait_for_start_or_pads, requires=("contact",), only_by="engines",
         programs=later("walkerlab.evidence.benchmarks.engines.registry", "installed_versions"),
     ),

@@ -98,7 +98,7 @@ def execute(
         refuse_another_config(folder, config)
     if changes and not options.dry:
         refuse_incomplete_law(config, steps)
-        reused = "" if options.force else ", and its results will be reused"
+        reused = "" if options.force else "; its results will be reused"
         with folder.locked(options.wait, lambda message: run.reporter.note(message + reused)):
             claim(folder, config)
             # decide again: another process may have worked in the folder until now

@@ -22,6 +22,7 @@ from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsErr
 from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
+from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.scene.rigid import rigid_walker
 
@@ -107,7 +108,7 @@ def test_an_error_below_what_the_reference_is_known_to_is_marked():
 
 def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkeypatch):
     monkeypatch.setattr(ladder, "RUN_BUDGET", 500)
-    one = ascend(TRIAL, "radau5")
+    one = ascend(TRIAL, "radau5", Checkpoint(None, ""))
     rows = [make_row(one, run, reference) for run in one.runs]
     assert [row.outcome for row in rows[:-1]] == ["walked"] * (len(rows) - 1)
     assert (rows[-1].outcome, rows[-1].error, rows[-1].within_reference) == ("budget-exhausted", None, False)
@@ -118,17 +119,67 @@ def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkey
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_librarys_long_run_is_put_off_and_made_good(jobs, monkeypatch):
-    whole = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853").runs]
+    whole = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853", Checkpoint(None, "")).runs]
     monkeypatch.setattr(ladder, "SHORT_RUN_BUDGET", whole[2] - 1)
-    short = ascend(TRIAL, "scipy-dop853")
+    short = ascend(TRIAL, "scipy-dop853", Checkpoint(None, ""))
     assert short.unfinished
     assert [run.result.rhs_evaluations for run in short.runs] == whole[:2]
-    other = ascend(TRIAL, "dop853")
-    (end,), (made_good, same) = complete_ascents([TRIAL], [short, other], jobs)
+    other = ascend(TRIAL, "dop853", Checkpoint(None, ""))
+    (end,), (made_good, same) = complete_ascents([TRIAL], [short, other], Checkpoint(None, ""), jobs)
     assert [run.result.rhs_evaluations for run in made_good.runs] == whole[:3]
     assert len(omitted_tolerances(made_good)) == len(ladder.LIBRARY_LADDER) - 3
     assert same is other
     assert end.state == pytest.approx(made_good.runs[-1].result.state, abs=1e-5)
+
+
+class StopsAfter:
+    """A trial that is stopped after some runs, as Ctrl-C does."""
+
+    name, methods, steps = "rigid", ("dop853",), TRIAL.steps
+
+    def __init__(self, runs):
+        self.left = runs
+
+    def prepare(self, method, rtol, budget):
+        run = TRIAL.prepare(method, rtol, budget)
+
+        def counted_run():
+            self.left -= 1
+            if self.left < 0:
+                raise KeyboardInterrupt
+            return run()
+
+        return counted_run
+
+
+def test_a_stopped_measurement_resumes_with_the_runs_that_it_has_finished(tmp_path):
+    path = tmp_path / "accuracy.parts"
+    with pytest.raises(KeyboardInterrupt):
+        ascend(StopsAfter(30), "dop853", Checkpoint(path, "key"))
+    finished = Checkpoint(path, "key").kept
+    assert 1 <= len(finished) < len(ladder.OWN_LADDER)
+    resumed = ascend(TRIAL, "dop853", Checkpoint(path, "key"))
+    assert [run.packed() for run in resumed.runs[: len(finished)]] == list(finished.values())
+    fresh = ascend(TRIAL, "dop853", Checkpoint(None, ""))
+    for run, same in zip(resumed.runs, fresh.runs, strict=True):
+        assert (run.tolerance, run.result.outcome) == (same.tolerance, same.result.outcome)
+        assert run.result.state.tolist() == same.result.state.tolist()
+        assert run.result.rhs_evaluations == same.result.rhs_evaluations
+
+
+def test_a_stopped_measurement_keeps_its_references_and_long_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr(ladder, "SHORT_RUN_BUDGET", 300)
+    path = tmp_path / "accuracy.parts"
+    checkpoint = Checkpoint(path, "key")
+    ascents = [ascend(TRIAL, "scipy-dop853", checkpoint)]
+    assert ascents[0].unfinished
+    (end,), (completed,) = complete_ascents([TRIAL], ascents, checkpoint, 1)
+    shifted = replace(end, state=end.state + 1.0)
+    checkpoint.keep(ladder.unit_name(TRIAL.name, "first end"), shifted.packed())
+    (kept_end,), (resumed,) = complete_ascents([TRIAL], ascents, Checkpoint(path, "key"), 1)
+    assert kept_end.packed() == shifted.packed()
+    # Timings differ whenever a run is measured again.
+    assert resumed.runs[-1].walls_s == completed.runs[-1].walls_s
 
 
 class SlowAtFirst:
@@ -151,7 +202,8 @@ class SlowAtFirst:
 def test_compiling_is_not_measured(reference, monkeypatch):
     trial = SlowAtFirst()
     monkeypatch.setattr(ladder.time, "perf_counter", lambda: trial.clock)
-    rows = [make_row(one, run, reference) for one in (ascend(trial, "dop853"),) for run in one.runs]
+    ascent = ascend(trial, "dop853", Checkpoint(None, ""))
+    rows = [make_row(ascent, run, reference) for run in ascent.runs]
     assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(ladder.OWN_LADDER))
     assert {row.repeats_of_wall_s for row in rows} == {ladder.MAX_REPEATS}
 

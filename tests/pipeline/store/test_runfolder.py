@@ -70,6 +70,14 @@ def test_who_waits_is_told_so_and_gets_the_lock(folder, holder):
     assert "waiting" in said[0]
 
 
+def test_a_folder_names_the_process_that_works_in_it(folder, holder):
+    assert folder.worker().process == holder.pid
+    (folder.path / ".worker.json").write_text("{}")
+    assert folder.worker() is None
+    with pytest.raises(LockedError, match="another walkerlab process is working"), folder.locked(wait=False):
+        pass
+
+
 def test_lock_is_free_again_after_a_failure(folder):
     with pytest.raises(KeyboardInterrupt), folder.locked():
         raise KeyboardInterrupt
@@ -81,7 +89,8 @@ def test_what_killed_writers_left_goes_under_the_lock(folder):
     folder.path.mkdir(parents=True)
     (folder.path / ".simulate.h5.12345678.tmp").touch()
     with folder.locked():
-        assert [entry.name for entry in folder.path.iterdir()] == [".lock"]
+        assert sorted(entry.name for entry in folder.path.iterdir()) == [".lock", ".worker.json"]
+    assert [entry.name for entry in folder.path.iterdir()] == [".lock"]
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path, unprivileged):

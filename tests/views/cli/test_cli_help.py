@@ -1,9 +1,11 @@
 import json
 import os
+import re
 import subprocess
 import sys
 
 import pytest
+from typer.main import get_command
 from typer.testing import CliRunner
 
 import walkerlab
@@ -12,6 +14,7 @@ from walkerlab.config.schema import Config
 from walkerlab.pipeline.graph import PIPELINE, Graph, Option, Stage
 from walkerlab.pipeline.store.provenance import git_commit
 from walkerlab.pipeline.workers import ONE_THREAD
+from walkerlab.views.cli import main
 from walkerlab.views.cli.main import program
 
 HEAVY = (
@@ -51,12 +54,29 @@ def test_help_loads_no_library(arguments):
 
 def test_help_names_every_command(walker):
     done = walker("--help")
-    commands = {line.split()[0] for line in done.stdout.split("Commands:")[1].splitlines() if line.strip()}
+    commands = {line.split()[0] for line in done.stdout.split("Start:")[1].splitlines() if line.strip()}
     assert {*(stage.name for stage in PIPELINE.stages), "status", "show", "schema", "clean"} <= commands
 
 
+def test_help_lists_every_command_once_in_five_groups(walker):
+    lines = walker("--help").stdout.split("Options:")[1].splitlines()
+    titles = [line.removesuffix(":") for line in lines if re.fullmatch(r"\w.*:", line)]
+    assert titles == ["Start", "Walk", "Explore families of gaits", "Measure and compare", "Keep house"]
+    assert titles == list(main.GROUPS)
+    listed = [name for names in main.GROUPS.values() for name in names]
+    assert sorted(listed) == sorted(get_command(main.program()).commands)
+    shown = [line.split()[0] for line in lines if re.match(r"  [a-z]", line)]
+    assert shown == listed
+
+
+def test_help_begins_every_purpose_with_a_verb(walker):
+    verbs = {command.help.split()[0] for command in get_command(main.program()).commands.values()}
+    assert "Walk" not in verbs
+    assert all(verb.istitle() and verb not in ("The", "A", "Whether") for verb in verbs)
+
+
 def test_help_says_what_each_command_is_for_without_cutting_it_short(walker):
-    words = " ".join(walker("--help").stdout.split("Commands:")[1].split())
+    words = " ".join(walker("--help").stdout.split("Start:")[1].split())
     assert all(stage.purpose in words for stage in PIPELINE.stages)
     assert "..." not in words
 

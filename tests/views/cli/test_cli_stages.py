@@ -177,13 +177,32 @@ def test_no_wait_exits_6_while_another_process_works_which_exits_130_if_interrup
     assert toy("drop", "--no-wait").returncode == 0
 
 
-@pytest.mark.parametrize(("force", "then"), [([], ", and its results will be reused"), (["--force"], "")])
-def test_a_second_process_says_that_it_waits_and_whether_it_then_reuses(toy, caught, force, then):
+@pytest.mark.parametrize(("force", "then"), [([], "; its results will be reused"), (["--force"], "")])
+def test_a_second_process_says_for_which_command_it_waits_and_how_to_avoid_it(toy, caught, force, then):
     with toy.start("drop", "--json", *force) as second:
-        assert second.stderr.readline() == f"waiting: another walkerlab process is working in runs/paper{then}\n"
+        message = second.stderr.readline()
+        assert re.fullmatch(
+            rf"waiting: `walkerlab drop --json` \(process {caught.pid}, since [\d-]{{10}} [\d:]{{8}}\) is working in "
+            rf"runs/paper \(`--name NAME` chooses another folder\){then}\n",
+            message,
+        ), message
         caught.go_on()
         assert json.loads(second.stdout.read())["reused"] is not bool(force)
     assert json.loads(caught.stdout.read())["reused"] is False
+
+
+def test_status_shows_the_command_that_is_running(toy, caught):
+    for run in ([], ["--set", "strides=5"]):
+        lines = toy("status", *run).stdout.splitlines()
+        assert lines[0].startswith(f"running in runs/paper: `walkerlab drop --json` (process {caught.pid}, since ")
+    (running,) = json.loads(toy("status", "--json").stdout)["running"]
+    assert (running["run_dir"], running["command"]) == ("runs/paper", "walkerlab drop --json")
+    caught.kill()
+    caught.wait()
+    assert json.loads(toy("status", "--json").stdout)["running"] == []
+    assert toy("status").stdout.startswith("runs/paper:\n")
+    assert toy("drop", "--no-wait").returncode == 0
+    assert not list((toy.folder / "runs" / "paper").glob(".worker*"))
 
 
 def test_runs_go_where_they_are_told(toy, tmp_path):

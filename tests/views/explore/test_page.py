@@ -342,3 +342,35 @@ def test_a_server_that_is_gone_is_told(browser, other, tmp_path):
         browser.until(f"{SAID}.includes('Open the address as it was printed')")
     finally:
         again.close()
+
+
+def in_sight(selector):
+    return (
+        f"(box => box.top >= 0 && box.bottom <= innerHeight && "
+        f"document.elementFromPoint((box.left + box.right) / 2, (box.top + box.bottom) / 2).matches('{selector}'))"
+        f"(document.querySelector('{selector}').getBoundingClientRect())"
+    )
+
+
+def test_on_a_phone_the_walk_play_and_a_slider_are_in_sight_together(browser, served):
+    page = opened(browser, served, ["*/api/along"], width=390, height=800, calm=True)
+    for name in ("slope_deg", "dynamic_friction"):
+        slider = f"#sliders [aria-label*={name}], #sliders [id*={name}]"
+        page.evaluate(f"document.querySelector('{slider}').closest('.turn').scrollIntoView({{block: 'center'}})")
+        assert page.evaluate(in_sight(".walk"))
+        assert page.evaluate(in_sight(".play"))
+        middle = f"document.querySelector('{slider}').closest('.turn').getBoundingClientRect()"
+        assert page.evaluate(f"document.querySelector('.walk').getBoundingClientRect().bottom <= {middle}.top")
+        assert page.evaluate(f"{middle}.bottom <= document.querySelector('.controls').getBoundingClientRect().top")
+    scrolling = "[...document.querySelectorAll('#seen, #seen *')].filter(one => one.scrollHeight > one.clientHeight + 1"
+    assert page.evaluate(f"{scrolling} && getComputedStyle(one).overflowY === 'auto').length") == 0
+    page.evaluate("document.querySelector('.play').click()")
+    page.until(f"{TIME} > 0")
+
+
+def test_a_phone_held_sideways_scrolls_past_the_walk_to_the_sliders(browser, served):
+    page = opened(browser, served, ["*/api/along"], width=800, height=390, calm=True)
+    page.evaluate("document.querySelector('#sliders').scrollIntoView()")
+    assert page.evaluate("document.querySelector('.walk').getBoundingClientRect().bottom") <= 0
+    assert page.evaluate(in_sight(".play"))
+    browser.call("Network.setBlockedURLs", urls=[])

@@ -207,6 +207,16 @@ def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
         assert (np.asarray(film.convert("L")) != first).any()
 
 
+def test_a_film_of_both_models_needs_both_walks(run, tmp_path):
+    path = write_film(run, Target("gif", None), Film("both", 1, 5, 1.0), QUIET)
+    assert path.name == "paper-both.gif"
+    with Image.open(path) as film:
+        assert film.n_frames == pytest.approx(4, abs=1)
+    run.artifact("simulate").unlink()
+    with pytest.raises(StaleError, match="simulate"):
+        write_film(run, Target("gif", None), Film("both", 1, 5, 1.0), QUIET)
+
+
 def test_a_film_of_another_kind_is_refused(run, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     for name, said in (("walk.avi", "an animation cannot be written as avi"), ("walk.mp4", "needs ffmpeg")):

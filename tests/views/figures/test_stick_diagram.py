@@ -141,6 +141,20 @@ def test_a_film_of_a_walk_on_pads_shows_them_and_no_plane():
     assert tinted[1] > tinted[0] + 200
 
 
+def test_a_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
+    walks = both_models()
+    contact_sticks, rigid_sticks = sticks_of(walks["contact-sim"]), sticks_of(walks["simulate"])
+    (alone,) = pictures(contact_sticks, np.array([0.3]))
+    (both,) = pictures(contact_sticks, np.array([0.3]), None, rigid_sticks)
+    for look in LEGS:
+        assert coloured(both, look) > 0.9 * coloured(alone, look)
+
+    def grey(picture):
+        return int(((np.ptp(picture, axis=2) < 3) & (picture[:, :, 0] > 140) & (picture[:, :, 0] < 200)).sum())
+
+    assert grey(both) > grey(alone) + 500
+
+
 def test_a_film_of_a_walk_that_falls_shows_the_fall_and_stays_there_for_a_second():
     walk = sticks_of(contact(1, outcome="fell"))
     late = replace(walk, time=walk.time * 1.5)  # after the last landing it goes on

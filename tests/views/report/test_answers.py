@@ -87,7 +87,7 @@ def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
     lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
     assert lines[0].startswith("On a slope of 0.0174 rad (0.997°) there is a stable gait")
     assert ["quantity", "corrected", "as", "printed"] in cells(lines)
-    assert row(lines, "θ₁ (rad)") == ["−0.204200", "−0.202200"]
+    assert row(lines, "θ₁, swing leg (rad)") == ["−0.204200", "−0.202200"]
     assert "0.70360123456789" not in "\n".join(lines)
 
 
@@ -101,9 +101,9 @@ def test_a_walker_with_more_angles_has_its_own_names():
     gait = {**GAIT, "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2]}
     names = ["theta_1", "theta_2", "theta_1_shank", "dtheta_1", "dtheta_2", "dtheta_1_shank"]
     lines = answer("fixedpoint", {**gait, "state_names": names, "equation_sets": {"corrected": gait}})
-    assert row(lines, "θ₁, shank (rad)") == ["0.300000"]
-    assert row(lines, "θ̇₁ (rad/s)") == ["1.000000"]
-    assert row(lines, "θ̇₁, shank (rad/s)") == ["1.200000"]
+    assert row(lines, "θ₁, swing shank (rad)") == ["0.300000"]
+    assert row(lines, "θ̇₁, swing leg (rad/s)") == ["1.000000"]
+    assert row(lines, "θ̇₁, swing shank (rad/s)") == ["1.200000"]
 
 
 def test_without_a_gait_the_reason_is_the_answer():

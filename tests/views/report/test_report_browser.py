@@ -313,3 +313,29 @@ def test_on_paper_the_player_is_stills_and_everything_is_unfolded(page):
     assert page.evaluate("getComputedStyle(document.querySelector('.scenes')).display") == "none"
     assert page.evaluate("document.querySelectorAll('details:not([open])').length") == 0
     page.call("Emulation.setEmulatedMedia", media="")
+
+
+def test_the_walk_begins_on_the_first_printed_page(browser, folder):
+    browser.open(folder / "report.html", width=680, height=1009)  # A4 without its margins of 15 mm
+    browser.evaluate("dispatchEvent(new Event('beforeprint'))")
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    assert browser.evaluate("document.querySelector('.stills').getBoundingClientRect().bottom") < 1009
+    assert browser.evaluate("getComputedStyle(document.querySelector('.player')).breakInside") == "auto"
+    assert browser.evaluate("getComputedStyle(document.querySelector('.stills')).breakInside") == "avoid"
+    browser.call("Emulation.setEmulatedMedia", media="")
+
+
+def test_nobody_is_told_on_paper_to_reload_the_page(browser, folder_with_pending):
+    browser.open(folder_with_pending / "report.html")
+    assert "reload it" in browser.evaluate("document.querySelector('header').innerText")
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    text = browser.evaluate("document.querySelector('header').innerText")
+    assert "Not computed yet when this page was written: plot." in text
+    assert "reload" not in text.lower()
+    browser.call("Emulation.setEmulatedMedia", media="")
+
+
+@pytest.fixture
+def folder_with_pending(tmp_path):
+    write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, pending=("plot",))
+    return tmp_path

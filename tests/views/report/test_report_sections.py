@@ -308,10 +308,10 @@ def test_both_sets_of_equations_stand_side_by_side():
 def test_the_coordinates_of_any_walker_have_their_signs():
     names = ("theta_1", "theta_1_shank", "theta_torso", "dtheta_1_shank", "q_7")
     assert [coordinate(name) for name in names] == [
-        "θ₁ (rad)",
-        "θ₁, shank (rad)",
+        "θ₁, swing leg (rad)",
+        "θ₁, swing shank (rad)",
         "θ, torso (rad)",
-        "θ̇₁, shank (rad/s)",
+        "θ̇₁, swing shank (rad/s)",
         "q_7 (rad)",
     ]
 

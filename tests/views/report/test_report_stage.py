@@ -85,15 +85,25 @@ def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
     left_out = [LeftOut("compare", "not yet"), LeftOut("tune", "the config has no contact block")]
     write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, left_out, ("compare", "accuracy"))
     page = Page((tmp_path / "report.html").read_text())
-    assert any("Still being computed: compare, accuracy." in text for text in page.said("p"))
-    assert sum("Still being computed: " in text for text in page.said("p")) == 3
+    assert any("Not computed yet when this page was written: compare, accuracy." in text for text in page.said("p"))
+    assert sum("Not computed yet: " in text for text in page.said("p")) == 2
     assert "not yet" not in page.text
     assert [attrs for attrs in page.all("figure") if "data-player" in attrs]
 
 
 def test_a_drawing_made_early_says_what_it_waits_for(tmp_path):
     run(tmp_path, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("compare", STILL_COMPUTED)])
-    assert "Still being computed: compare." in Page((tmp_path / "report.html").read_text()).text
+    assert "when this page was written: compare." in Page((tmp_path / "report.html").read_text()).text
+
+
+def test_an_early_page_stays_true_when_its_command_is_stopped(tmp_path):
+    folder = tmp_path / "stopped"
+    folder.mkdir()
+    run(folder, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("plot", STILL_COMPUTED)])
+    html = (folder / "report.html").read_text()
+    assert "till being computed" not in html
+    assert "If nothing runs any more, <code>walkerlab report -c stopped</code> computes the rest" in html
+    assert "<code>walkerlab status -c stopped</code> shows what runs" in html
 
 
 def test_a_page_that_there_is_nothing_for_any_more_is_removed(tmp_path):

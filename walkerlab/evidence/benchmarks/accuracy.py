@@ -16,6 +16,7 @@ from walkerlab.evidence.benchmarks.ladder import (
     complete_ascents,
     make_row,
     omitted_tolerances,
+    unit_name,
 )
 from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, second_end
 from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial
@@ -25,6 +26,7 @@ from walkerlab.labels import labels_of
 from walkerlab.physics.hybrid.recorded_walk import with_scaled_rates
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.rigid import rigid_walker
@@ -39,7 +41,9 @@ OMISSIONS_OFF_COMPASS = (
 START_RATE_FACTOR = 0.98  # factor on the gait's angular velocities, so that no step repeats the previous one
 
 
-def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
+def run(
+    config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
+) -> Content:
     """Measure every method on every scene, with reference solutions and postponed library runs in `jobs` processes."""
     # all other runs are timed one after another, with nothing else running
     trials: list[Trial] = []
@@ -52,16 +56,19 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     for trial in trials_of_scene(config, inputs):
         progress.start(f"accuracy: {trial.name}", len(trial.methods))
         try:
-            second_ends.append(second_end(trial))
+            unit = unit_name(trial.name, "second end")
+            if unit not in checkpoint.kept:
+                checkpoint.keep(unit, second_end(trial).packed())
+            second_ends.append(End.unpack(checkpoint.kept[unit]))
         except WalkEndsError as problem:
             left_out.append(omitted_scene(trial, problem))
             continue
         trials.append(trial)
         for method in trial.methods:
-            ascents.append(ascend(trial, method))
+            ascents.append(ascend(trial, method, checkpoint))
             progress.advance()
     progress.start("accuracy: long runs")
-    first_ends, ascents = complete_ascents(trials, ascents, jobs, long_runs=compass)
+    first_ends, ascents = complete_ascents(trials, ascents, checkpoint, jobs, long_runs=compass)
     references: dict[str, Reference] = {}
     for trial, first, second in zip(trials, first_ends, second_ends, strict=True):
         if isinstance(first, WalkEndsError):

@@ -1,5 +1,8 @@
 """Runs of one method on one scene, tolerance by tolerance: timing, budgets and stopping criteria."""
 
+from __future__ import annotations
+
+import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +15,9 @@ import numpy as np
 from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end
 from walkerlab.evidence.benchmarks.trials import Trial, TrialRun
 from walkerlab.labels import Label
+from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS
+from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
 from walkerlab.pipeline.workers import in_order
 
 # sizes of runs, in right-hand sides
@@ -23,6 +28,7 @@ WARM_UP_BUDGET = 2_000  # enough to compile and load everything
 MAX_REPEATS, REPEAT_TIME_S = 7, 0.3
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
 LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
+OUTCOMES = tuple(outcome.label for outcome in Outcome)
 ERROR_LABEL = Label("1", "largest difference of the end state from the reference, SI units", absent=0.0)
 
 
@@ -31,6 +37,20 @@ class MethodRun:
     tolerance: float
     result: TrialRun
     walls_s: tuple[float, ...]
+
+    def packed(self) -> Numbers:
+        """Return the numbers that `unpack` takes, for a checkpoint."""
+        run = self.result
+        counts = run.rhs_evaluations, run.accepted, run.rejected
+        state = run.state.tolist()
+        return [self.tolerance, OUTCOMES.index(run.outcome), *counts, len(state), *state, *self.walls_s]
+
+    @classmethod
+    def unpack(cls, numbers: Numbers) -> MethodRun:
+        tolerance, outcome, *counts, size = numbers[:6]
+        end = 6 + int(size)
+        run = TrialRun(OUTCOMES[int(outcome)], np.array(numbers[6:end]), *map(int, counts))
+        return cls(tolerance, run, tuple(numbers[end:]))
 
 
 @dataclass(frozen=True)
@@ -67,15 +87,23 @@ class MethodRow:
         return int(self.error is not None)
 
 
-def ascend(trial: Trial, method: str) -> Ascent:
-    """Run a method at tighter and tighter tolerances until a run is too expensive."""
+def unit_name(*parts: object) -> str:
+    """Name a measurement in a checkpoint; one from another machine is not resumed, because run times are compared."""
+    return "/".join(map(str, (platform.node(), *parts)))
+
+
+def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
+    """Run a method at tighter and tighter tolerances until a run is too expensive; resume runs of the checkpoint."""
     ladder, short, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
     if method not in METHODS or not METHODS[method].compiled:
         ladder, short, last = LIBRARY_LADDER, min(SHORT_RUN_BUDGET, RUN_BUDGET), LAST_RUN_SIZE
     trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     runs: list[MethodRun] = []
     for tolerance in ladder:
-        run = measure(trial, method, tolerance, short)
+        unit = unit_name(trial.name, method, tolerance)
+        if unit not in checkpoint.kept:
+            checkpoint.keep(unit, measure(trial, method, tolerance, short).packed())
+        run = MethodRun.unpack(checkpoint.kept[unit])
         if run.result.outcome == "budget-exhausted" and short < RUN_BUDGET:
             return Ascent(trial, method, ladder, tuple(runs), unfinished=True)
         runs.append(run)
@@ -85,25 +113,33 @@ def ascend(trial: Trial, method: str) -> Ascent:
 
 
 def complete_ascents(
-    trials: Sequence[Trial], ascents: Sequence[Ascent], jobs: int, long_runs: bool = True
+    trials: Sequence[Trial], ascents: Sequence[Ascent], checkpoint: Checkpoint, jobs: int, long_runs: bool = True
 ) -> tuple[list[End | WalkEndsError], list[Ascent]]:
     """Compute each trial's first reference end (or why it is missing) and, with `long_runs`, the postponed runs."""
     # longest first: the last trial is near the rigid limit, where the explicit reference method takes the most steps
-    ends = [partial(try_first_end, trial) for trial in reversed(trials)]
-    postponed = [
-        partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)])
-        for ascent in ascents
-        if ascent.unfinished and long_runs
-    ]
-    calls: list[Callable[[], Any]] = [*ends, *postponed]
-    results = in_order(calls, jobs)
-    first_ends: list[End | WalkEndsError] = [next(results) for _ in trials][::-1]
-    return first_ends, [
-        replace(ascent, runs=(*ascent.runs, next(results)), unfinished=False)
-        if ascent.unfinished and long_runs
-        else ascent
-        for ascent in ascents
-    ]
+    calls: dict[str, Callable[[], End | WalkEndsError | MethodRun]] = {
+        unit_name(trial.name, "first end"): partial(try_first_end, trial) for trial in reversed(trials)
+    }
+    for ascent in ascents:
+        if ascent.unfinished and long_runs:
+            call = partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)])
+            calls[unit_name(ascent.trial.name, ascent.method, "long run")] = call
+    todo = {unit: call for unit, call in calls.items() if unit not in checkpoint.kept}
+    ends: dict[str, End | WalkEndsError] = {}
+    for unit, result in zip(todo, in_order(list(todo.values()), jobs), strict=True):
+        if isinstance(result, WalkEndsError):
+            ends[unit] = result
+        else:
+            checkpoint.keep(unit, result.packed())
+
+    def completed(ascent: Ascent) -> Ascent:
+        unit = unit_name(ascent.trial.name, ascent.method, "long run")
+        if unit not in calls:
+            return ascent
+        return replace(ascent, runs=(*ascent.runs, MethodRun.unpack(checkpoint.kept[unit])), unfinished=False)
+
+    units = [unit_name(trial.name, "first end") for trial in trials]
+    return [ends.get(unit) or End.unpack(checkpoint.kept[unit]) for unit in units], [*map(completed, ascents)]
 
 
 def try_first_end(trial: Trial) -> End | WalkEndsError:

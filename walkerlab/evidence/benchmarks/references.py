@@ -1,5 +1,7 @@
 """Reference end states that methods are compared with, and their uncertainty."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +10,16 @@ from walkerlab.evidence.benchmarks import taylor_reference
 from walkerlab.evidence.benchmarks.trials import RigidTrial, Trial
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.outcome import Outcome
+from walkerlab.physics.solvers.registry import METHODS
 from walkerlab.physics.solvers.system import Floats
+from walkerlab.pipeline.store.checkpoint import Numbers
 
 REFERENCE_RUN_BUDGET = 20_000_000  # right-hand sides, enough for the million explicit steps that stiff ground takes
 # on stiff ground the error of an explicit step is all rounding: a tighter tolerance would only shrink the step
 TIGHTEST_CONTACT = {"dop853": 1e-12, "radau5": 1e-11}
 TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
+
+END_METHODS = (taylor_reference.TAYLOR_METHOD, *METHODS)
 
 
 @dataclass(frozen=True)
@@ -24,6 +30,15 @@ class End:
     state: Floats
     tolerance: float = 0.0  # relative tolerance; 0 for Taylor series at machine precision
     rhs_evaluations: int = 0  # 0 if they are not counted
+
+    def packed(self) -> Numbers:
+        """Return the numbers that `unpack` takes, for a checkpoint."""
+        return [END_METHODS.index(self.method), self.tolerance, self.rhs_evaluations, *self.state.tolist()]
+
+    @classmethod
+    def unpack(cls, numbers: Numbers) -> End:
+        method, tolerance, rhs_evaluations, *state = numbers
+        return cls(END_METHODS[int(method)], np.array(state), tolerance, int(rhs_evaluations))
 
 
 @dataclass(frozen=True)

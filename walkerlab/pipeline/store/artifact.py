@@ -44,10 +44,16 @@ class OtherLayout(Damaged):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Stored(Content):
-    """Content of an artifact with its identity and provenance."""
+class Identified(Content):
+    """Content of a result, stored or not, with its identity."""
 
     identity: Identity
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stored(Identified):
+    """Content of an artifact with its identity and provenance."""
+
     provenance: Provenance
     seal: str  # sha256 of the file, provenance and timings included
 

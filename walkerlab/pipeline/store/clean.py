@@ -7,12 +7,13 @@ from pathlib import Path
 from walkerlab.pipeline.store.artifact import Damaged, read
 from walkerlab.pipeline.store.files import TEMPORARY, storing
 from walkerlab.pipeline.store.index import indexed_files
-from walkerlab.pipeline.store.runfolder import LOCK, RECORD, RunFolder
+from walkerlab.pipeline.store.runfolder import LOCK, RECORD, WORKER, RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
 """Patterns of the files that drawing stages write, needed if their index is lost."""
 CHUNKS, FIGURES = "sweep-chunks", "figures"
 SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
+STATE_FILES = (RECORD, LOCK, WORKER)
 STATE_ENDINGS = (".h5", ".parts")
 COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
@@ -36,7 +37,7 @@ def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
         folder = RunFolder.at(place)
         if folder.record() is None and not any(place.glob("*.h5")):
             continue
-        is_state = resolved.parent == place and (resolved.suffix in STATE_ENDINGS or resolved.name in (RECORD, LOCK))
+        is_state = resolved.parent == place and (resolved.suffix in STATE_ENDINGS or resolved.name in STATE_FILES)
         if is_state or resolved in {file.resolve() for file in files_of(folder, stages)}:
             return folder
     return None

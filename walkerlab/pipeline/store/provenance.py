@@ -50,11 +50,10 @@ class Provenance:
 
 def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
     """Begin the provenance of a stage that starts now in this process."""
-    program = Path(sys.argv[0]).name
     now = utc_now()
     return Provenance(
         config=to_yaml(config),
-        command_line=shlex.join(["walkerlab" if program == "__main__.py" else program, *map(as_text, sys.argv[1:])]),
+        command_line=command_line(),
         seed=config.seed,
         started_utc=now,
         ended_utc=now,
@@ -65,6 +64,12 @@ def begin(config: Config, input_digests: Mapping[str, str]) -> Provenance:
         git_commit=git_commit(),
         input_digests=dict(input_digests),
     )
+
+
+def command_line() -> str:
+    """Return the command line of this process."""
+    program = Path(sys.argv[0]).name
+    return shlex.join(["walkerlab" if program == "__main__.py" else program, *map(as_text, sys.argv[1:])])
 
 
 def utc_now() -> str:

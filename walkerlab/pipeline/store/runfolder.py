@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import datetime
 import json
 import os
 import shlex
@@ -13,7 +14,7 @@ from pathlib import Path
 from walkerlab.errors import LockedError
 from walkerlab.pipeline.store.files import make_folder, read_bounded, remove_leftovers, storing, write_atomically
 
-RECORD, LOCK = ".run.json", ".lock"
+RECORD, LOCK, WORKER = ".run.json", ".lock", ".worker.json"
 RECORD_BYTES = 1 << 20
 """Maximum size of a run record."""
 
@@ -26,6 +27,19 @@ class Record:
     source: str  # origin of the config, as in `RunFolder`
     config: str  # resolved config of the results, as YAML text
     changes: tuple[str, ...] = ()  # changes of the config, as in `RunFolder`
+
+
+@dataclass(frozen=True)
+class Worker:
+    """Process that holds the lock of a run folder."""
+
+    command: str  # its command line
+    process: int
+    since_utc: str  # ISO 8601
+
+    def __str__(self) -> str:
+        since = datetime.datetime.fromisoformat(self.since_utc).astimezone()
+        return f"`{self.command}` (process {self.process}, since {since:%Y-%m-%d %H:%M:%S})"
 
 
 @dataclass(frozen=True)
@@ -86,6 +100,20 @@ class RunFolder:
         """Write the run record; raises StorageError if that fails."""
         write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
+    def worker(self) -> Worker | None:
+        """Return the process that works in the folder; None if there is none, or if its command is unknown."""
+        try:
+            worker = Worker(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
+        except (OSError, ValueError, TypeError, RecursionError):
+            return None
+        # Imported here: a folder without this file is not locked.
+        from filelock import FileLock, Timeout
+
+        # A killed process leaves its file, but not its lock.
+        with contextlib.suppress(Timeout, OSError), FileLock(self.path / LOCK, timeout=0):
+            return None
+        return worker
+
     @contextlib.contextmanager
     def locked(self, wait: bool = True, say: Callable[[str], None] | None = None) -> Iterator[None]:
         """Hold the folder's lock, which the system releases when this process ends.
@@ -100,22 +128,30 @@ class RunFolder:
         # Imported here: a run that reuses everything needs no lock.
         from filelock import FileLock, Timeout
 
+        from walkerlab.pipeline.store.provenance import command_line, utc_now
+
         make_folder(self.path)
         lock = FileLock(self.path / LOCK)
         with storing(self.path / LOCK):
             try:
                 lock.acquire(timeout=0)
             except Timeout:
-                message = f"another walkerlab process is working in {self.path}"
+                message = f"{self.worker() or 'another walkerlab process'} is working in {self.path}"
                 if not wait:
-                    raise LockedError(f"{message}.", "Leave out --no-wait to wait for it.") from None
+                    advice = "Leave out --no-wait to wait for it, or choose another folder with --name NAME."
+                    raise LockedError(f"{message}.", advice) from None
                 if say is not None:
-                    say(f"waiting: {message}")
+                    say(f"waiting: {message} (`--name NAME` chooses another folder)")
                 lock.acquire()
         try:
             remove_leftovers(self.path)
+            worker = Worker(command_line(), os.getpid(), utc_now())
+            with contextlib.suppress(OSError):  # only messages of other processes need this file
+                (self.path / WORKER).write_text(json.dumps(asdict(worker)), encoding="utf-8")
             yield
         finally:
+            with contextlib.suppress(OSError):
+                (self.path / WORKER).unlink()
             lock.release()
 
 

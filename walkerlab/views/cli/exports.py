@@ -255,10 +255,14 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
 class Film:
     """Options of an animation."""
 
-    model: str  # stage whose walk is shown
+    model: str  # stage whose walk is shown, or BOTH
     steps: int | None  # number of steps shown, from the first; None lets `film_times` choose
     rate: int  # frames per second
     slower: float  # slow-motion factor
+
+
+BOTH = "both"
+"""Name of a film that shows both models in one picture."""
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
@@ -282,18 +286,22 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     # Imported here: a file that cannot be written is refused before drawing code is loaded.
     from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, sticks_of
 
-    with results_to_show(folder, [film.model], console.warn) as results:
-        walk = the_result(results, folder, film.model)
-        why = FILM_NEEDS[film.model].missing_in(results, {})
-        if why is not None:
-            raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
+    rigid, contact = MODEL_NAMES
+    shown, *behind = [contact, rigid] if film.model == BOTH else [film.model]
+    with results_to_show(folder, [shown, *behind], console.warn) as results:
+        walk, *others = (the_result(results, folder, model) for model in (shown, *behind))
+        for model in (shown, *behind):
+            why = FILM_NEEDS[model].missing_in(results, {})
+            if why is not None:
+                raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
         sticks = sticks_of(walk)
+        other = sticks_of(others[0]) if others else None
         times = film_times(sticks, film.steps, film.rate, film.slower)
         line = console.begin("animate", f"{times.size} pictures")
         line.start("drawing", int(times.size))
 
         def count_pictures() -> Iterator[Any]:
-            for picture in pictures(sticks, times, walk.groups.get("terrain")):
+            for picture in pictures(sticks, times, walk.groups.get("terrain"), other):
                 yield picture
                 line.advance()
 

@@ -163,7 +163,12 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name."),
         ] = None,
         output: Output = None,
-        model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose walk; {FIRST_WALK}.")] = None,
+        model: Annotated[
+            str | None,
+            typer.Option(
+                metavar="STAGE|both", help=f"Whose walk; both shows both models in one picture; {FIRST_WALK}."
+            ),
+        ] = None,
         steps: Annotated[
             int | None,
             typer.Option(min=1, help="Steps to show, from the first. Default: 4; for a fall, the last 4 and the fall."),
@@ -171,11 +176,11 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
         slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
     ) -> None:
-        """Animate a run's walk."""
+        """Animate a run's walk, or the walks of both models in one picture."""
         from walkerlab.pipeline.runs import run_named
-        from walkerlab.views.cli.exports import Film, walk_in, write_film
+        from walkerlab.views.cli.exports import BOTH, Film, walk_in, write_film
         from walkerlab.views.cli.target import Target
 
         folder = run_named(run, request.runs)
-        film = Film(walk_in(folder, model), steps, rate, slower)
+        film = Film(BOTH if model == BOTH else walk_in(folder, model), steps, rate, slower)
         print(write_film(folder, Target(to, output), film, request.console))

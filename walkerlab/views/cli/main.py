@@ -50,15 +50,31 @@ def tolerate_output_errors() -> None:
         getattr(sys, name).reconfigure(errors="backslashreplace")
 
 
+GROUPS = {
+    "Start": ("fixedpoint", "explore", "init", "draw", "report", "open"),
+    "Walk": ("simulate", "contact-sim", "animate", "plot", "export"),
+    "Explore families of gaits": ("continuation", "sweep", "basin", "robustness", "design"),
+    "Measure and compare": (
+        "compare", "diff", "recorded-walk", "identify", "plan", "tune", "engines", "accuracy", "stability",
+        "stability-maps", "known-problems",
+    ),
+    "Keep house": ("status", "show", "schema", "rerun", "clean"),
+}  # fmt: skip
+"""Commands by purpose, in the order of the help; a command that is in no group is listed with the last one."""
+
+
 class Commands(TyperGroup):
     """Command group whose help shows the full purpose of each command, which click would truncate."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
-        with formatter.section("Commands"):
-            formatter.write_dl(
-                [(name, str(command.help).split("\n\n")[0]) for name, command in commands.items() if command]
-            )
+        purposes = {name: str(command.help).split("\n\n")[0] for name, command in commands.items() if command}
+        grouped = [name for names in GROUPS.values() for name in names]
+        others = [name for name in purposes if name not in grouped]
+        for title, names in GROUPS.items():
+            shown = [*names, *(others if title == [*GROUPS][-1] else [])]
+            with formatter.section(title):
+                formatter.write_dl([(name, purposes[name]) for name in shown if name in purposes])
 
 
 def program(graph: Graph = PIPELINE) -> typer.Typer:

@@ -12,6 +12,7 @@ from walkerlab.pipeline.results import UP_TO_DATE, Step
 from walkerlab.pipeline.runs import RunSummary, config_of, run_named, runs_in
 from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
 from walkerlab.pipeline.store.content import Variable
+from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 from walkerlab.views.report.tables import aligned
@@ -46,16 +47,20 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
         }
         for step in steps
     ]
+    folders = [folder] if listed is None else [RunFolder.at(path) for path in sorted(request.runs.glob("*/"))]
+    working = {place.path: worker for place in folders if (worker := place.worker()) is not None}
     status: dict[str, Any] = {
         "run_dir": str(folder.path),
         "changes": list(folder.changes),
+        "running": [{"run_dir": str(path), **asdict(worker)} for path, worker in working.items()],
         "current": error is None,
         "stages": rows,
     }
     names = [step.stage.name for step in steps]
     table = aligned([["stage", "state", "why"], *map(list, zip(names, map(state_of, steps), whys(steps), strict=True))])
     changed = [f"changed: {', '.join(folder.changes)}"] if folder.changes else []
-    lines = [f"{folder.path}:", *changed, *table]
+    running = [f"running in {path}: {worker}" for path, worker in working.items()]
+    lines = [*running, f"{folder.path}:", *changed, *table]
     if listed is not None:
         status["runs"] = [vars(run_summary) | {"run_dir": str(run_summary.run_dir)} for run_summary in listed]
     if listed:

@@ -49,10 +49,19 @@ def is_narrow() -> bool:
     return bool(matplotlib.rcParams["figure.figsize"][0] < NARROW_BELOW)
 
 
+class ShownFigure(Figure):
+    """Figure that notebooks show as a picture, even if they have not set up matplotlib."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        self.savefig(file, format="png", dpi=PNG_DPI)
+        return file.getvalue()
+
+
 def blank(height: float) -> Figure:
     """Create a figure of the style's width; `height` (in) is for the default width and shrinks less than the width."""
     width = matplotlib.rcParams["figure.figsize"][0]
-    figure = Figure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
+    figure = ShownFigure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 

@@ -7,14 +7,14 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from walkerlab.pipeline.store.artifact import Stored
-from walkerlab.views.figures.canvas import Drawing, files_of, styled
+from walkerlab.pipeline.store.artifact import Identified
+from walkerlab.views.figures.canvas import Drawing, files_of, settle, styled
 from walkerlab.views.figures.style import POINT
 from walkerlab.views.prose import Prose, f, percent
 
 WORDS = Prose(Path(__file__).parent / "words", (f, percent), {})
 
-Results = Mapping[str, Stored]
+Results = Mapping[str, Identified]
 """Results by stage."""
 Drawn = tuple[Figure, tuple[Any, ...]]
 """A figure, and the arguments of its caption template."""
@@ -90,6 +90,13 @@ class Illustration:
             figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)
         return Drawing(svg, png, self.say("caption", *caption_values))
+
+    def figure(self, results: Results) -> Figure:
+        """Draw the figure for a notebook or a script, laid out."""
+        with styled():
+            figure, _ = self.draw(results)
+            settle(figure)
+        return figure
 
     def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
         """Return the figure as a file of the given kind and width (pt); raster parts use `dpi`."""

@@ -17,7 +17,7 @@ from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from walkerlab.outcome import outcome_of
-from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.pipeline.store.footholds import FAR, ground_levels
 from walkerlab.views.figures.canvas import add_legend, blank, entry, styled
@@ -129,7 +129,7 @@ class Sticks:
         return at_strikes, np.abs(self.time[:, None] - np.concatenate(between)).argmin(axis=0)
 
 
-def sticks_of(result: Stored, under: str = "") -> Sticks:
+def sticks_of(result: Identified, under: str = "") -> Sticks:
     """Read the joint positions of a stored walk; `under` is the prefix of its groups."""
     asked = result.identity.config_slice
     trajectory, walker = result[f"{under}trajectory"], asked["walker"]
@@ -336,38 +336,54 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
     axes.text(0.99, 0.97, f"below: ground heights × {times:g}", color=VERMILLION, **corner)
 
 
-def pictures(sticks: Sticks, at: Array, pads: Group | None = None) -> Iterator[NDArray[np.uint8]]:
-    """Yield an RGB frame (height, width, 3) for each time `at` (s)."""
-    looks: list[dict[str, Any]] = [{"color": look.colour, "linestyle": look.style} for look in LEGS]
-    lines = [(sticks.leg(leg), look) for leg, look in enumerate(looks)]
+def moving_lines(sticks: Sticks, at: Array) -> list[Array]:
+    """Return lines (times, points, 2) in the picture's plane: both legs, then their soles and the torso, if any."""
+    lines = [sticks.leg(leg) for leg in range(2)]
     if sticks.has_soles:
-        lines += [(sticks.sole(leg), {"color": look.colour}) for leg, look in enumerate(LEGS)]
+        lines += [sticks.sole(leg) for leg in range(2)]
     if sticks.head is not None:
-        lines.append((np.stack((sticks.hip, sticks.head), axis=1), {"color": BLACK}))
-    points = np.concatenate([line for line, _ in lines], axis=1)
-    flat = points.reshape(points.shape[0], -1)
+        lines.append(np.stack((sticks.hip, sticks.head), axis=1))
     # interpolate linearly; both sides of a heel strike are samples, so no interval spans one
-    places = np.stack([np.interp(at, sticks.time, column) for column in flat.T], axis=1)
-    shown = sticks.in_plane(places.reshape(at.size, *points.shape[1:]))
-    ends = np.cumsum([line.shape[1] for line, _ in lines])[:-1]
+    flat = [line.reshape(line.shape[0], -1) for line in lines]
+    places = [np.stack([np.interp(at, sticks.time, column) for column in line.T], axis=1) for line in flat]
+    return [sticks.in_plane(place.reshape(at.size, -1, 2)) for place in places]
+
+
+def pictures(
+    sticks: Sticks, at: Array, pads: Group | None = None, other: Sticks | None = None
+) -> Iterator[NDArray[np.uint8]]:
+    """Yield an RGB frame (height, width, 3) for each time `at` (s).
+
+    other  walk of the rigid model, drawn in grey behind that of the contact model
+    """
+    lines = moving_lines(sticks, at)
+    looks: list[dict[str, Any]] = [{"color": look.colour, "linestyle": look.style} for look in LEGS]
+    soles: list[dict[str, Any]] = [{"color": look.colour} for look in LEGS if sticks.has_soles]
+    looks = [*looks, *soles, {"color": BLACK}][: len(lines)]
+    behind = [] if other is None else moving_lines(other, at)
+    shown = np.concatenate([line.reshape(-1, 2) for line in (*lines, *behind)])
     with styled():
         figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        left, bottom, right, top = surrounding(shown.reshape(-1, 2), sticks.leg_length)
+        left, bottom, right, top = surrounding(shown, sticks.leg_length)
         axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
         draw_ground(axes, sticks, pads)
         draw_relief(axes, sticks)
-        parts = [axes.plot([], [], **look, linewidth=2.2)[0] for _, look in lines]
+        grey = [axes.plot([], [], color=GREY, alpha=0.6, linewidth=4.5)[0] for _ in behind]
+        parts = [axes.plot([], [], **look, linewidth=2.2)[0] for look in looks]
         (hip,) = axes.plot([], [], linestyle="none", marker="o", markersize=6.0, color=BLACK)
         (push,) = axes.plot([], [], color=PURPLE, linewidth=5.0, solid_capstyle="round", zorder=9)
         clock = axes.text(0.01, 0.97, "", transform=axes.transAxes, va="top")
-        for time, places in zip(at, shown, strict=True):
-            for line, joint in zip(parts, np.split(places, ends), strict=True):
-                line.set_data(*joint.T)
-            hip.set_data(*places[:1].T)
+        if other is not None:
+            names = "contact model in colour, rigid model in grey"
+            axes.text(0.99, 0.97, names, transform=axes.transAxes, va="top", ha="right")
+        for index, time in enumerate(at):
+            for line, places in zip((*grey, *parts), (*behind, *lines), strict=True):
+                line.set_data(*places[index].T)
+            hip.set_data(*lines[0][index, :1].T)
             leg = sticks.pushing(float(time))
-            own = np.split(places, ends)[leg or 0]
+            own = lines[leg or 0][index]
             mark = np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1])))
             push.set_data(*(([], []) if leg is None else mark.T))
             over = sticks.ending and time >= sticks.time[-1]

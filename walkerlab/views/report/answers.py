@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from markupsafe import escape
+
 from walkerlab.labels import join_words, unit_by_name
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.registration import later
@@ -33,6 +35,23 @@ def answer(stage: str, summary: Summary) -> list[str]:
     if not summary:
         return []
     return lay_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(describe_summary(summary, short=True))
+
+
+def answer_html(stage: str, summary: Summary) -> str:
+    """Return the answer as HTML; for a stage that is not in `ANSWERS`, its lines as they are."""
+    # Imported here: terminals need no templates.
+    from walkerlab.views.report.page import environment, to_markup
+
+    if stage not in ANSWERS:
+        return f"<pre>{escape(chr(10).join(answer(stage, summary)))}</pre>"
+    template = environment().get_template("blocks/table.html.j2")
+    blocks = (block for block in ANSWERS[stage](summary) if block)
+    return "\n".join(
+        template.render(block=block, anchor=f"{stage}-{index}")
+        if isinstance(block, Table)
+        else f"<p>{to_markup(block)}</p>"
+        for index, block in enumerate(blocks)
+    )
 
 
 def lay_out(blocks: Iterable[str | Table]) -> list[str]:

@@ -12,6 +12,8 @@ from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
 COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 """Coordinates of a compass; results of other walkers store the names of their coordinates."""
+ROLES = {"1": "swing", "2": "stance"}
+"""What each leg does in the step that begins in a gait's state."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """Sets of equations: stored name and display name."""
 
@@ -72,7 +74,14 @@ def state_at(place: int, gait: Mapping[str, Any]) -> float:
 
 
 def coordinate(name: str) -> str:
-    return f"{symbol(name)} ({'rad/s' if name.startswith('d') else 'rad'})"
+    """Label a coordinate just after heel strike: 'theta_1' is 'θ₁, swing leg (rad)'."""
+    unit = "rad/s" if name.startswith("d") else "rad"
+    match = COORDINATE_NAME.fullmatch(name)
+    role = ROLES.get(match["index"] or "") if match else None
+    if match is None or role is None:
+        return f"{symbol(name)} ({unit})"
+    letter, _, _ = symbol(name).partition(",")
+    return f"{letter}, {role} {match['body'] or 'leg'} ({unit})"
 
 
 def symbol(name: str) -> str:

@@ -547,7 +547,8 @@ function play(root, firstScene, firstTracks) {
   };
   find(".live").hidden = false;
   root.classList.add("scripted");
-  new ResizeObserver(fit).observe(root);
+  // As wide as the figure, which has no box of its own on a phone.
+  new ResizeObserver(fit).observe(find(".controls"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
   // Users who prefer reduced motion start at a quarter of the speed.
   if (matchMedia("(prefers-reduced-motion: reduce)").matches) find(".speed").value = "0.25";
