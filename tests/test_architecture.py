@@ -46,6 +46,7 @@ LAYERS = (
     "labels",
     "registration",
     "outcome",
+    "private_files",
     "errors",
 )
 WINGS = ("evidence", "views", "pipeline", "exchange", "scene", "physics", "config")
@@ -111,7 +112,7 @@ def test_imports_run_downward(path):
 @pytest.mark.parametrize("path", sorted((PACKAGE / "physics").rglob("*.py")), ids=named)
 def test_physics_knows_no_config_no_file_and_no_study(path):
     wings = {layer.partition(".")[0] for layer in imported_layers(path)}
-    assert wings <= {"physics", "outcome", "errors", "code_digest"}
+    assert wings <= {"physics", "outcome", "errors", "code_digest", "private_files"}
     libraries = {name.partition(".")[0] for name in imported_modules(path)}
     assert not libraries & {"h5py", "ruamel", "pydantic", "typer", "matplotlib"}
 

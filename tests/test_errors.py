@@ -32,3 +32,11 @@ def test_a_failure_survives_the_way_from_a_worker_process() -> None:
     sent = errors.NoAnswer("no gait", "less slope")
     got = pickle.loads(pickle.dumps(sent))
     assert (type(got), got.message, got.advice) == (errors.NoAnswer, "no gait", "less slope")
+
+
+def test_a_failure_quotes_no_character_that_controls_a_terminal() -> None:
+    name = "hip\x1b[2J\x1b]0;gone\x07\r\u202e\x9b1m, Hüfte\n\tfoot"
+    error = errors.ConfigError(f"no column {name}", f"Name it: {name}")
+    told = "hip\\x1b[2J\\x1b]0;gone\\x07\\r\\u202e\\x9b1m, Hüfte\n\tfoot"
+    assert str(error) == error.message == error.as_json()["message"] == f"no column {told}"
+    assert error.advice == f"Name it: {told}"

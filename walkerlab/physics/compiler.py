@@ -4,13 +4,15 @@ The module uses private names of numba. If the installed version lacks some, `ab
 the public interface, with the same results.
 """
 
+import contextlib
 import functools
 import gc
 import hashlib
 import importlib
+import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -18,6 +20,7 @@ from typing import Any
 import numba
 
 from walkerlab.physics.kernel_cache import PACKAGE, cache_folder, lock_of, watchers
+from walkerlab.private_files import make_private_folder
 
 # Compiling makes objects by the million and leaves few behind: at Python's thresholds, looking through them takes a
 # twelfth of the time.
@@ -43,8 +46,8 @@ def private_class(name: str, *members: str) -> Any:
 
 CompileResultCacheImpl = private_class("numba.core.caching.CompileResultCacheImpl", "_locator_classes", "locator")
 FunctionCache = private_class("numba.core.caching.FunctionCache", "_impl_class", "load_overload", "save_overload")
-IndexDataCacheFile = private_class("numba.core.caching.IndexDataCacheFile", "_load_index")
-IPythonCacheLocator = private_class("numba.core.caching.IPythonCacheLocator", "from_function")
+IndexDataCacheFile = private_class("numba.core.caching.IndexDataCacheFile", "_load_index", "_open_for_write")
+IPythonCacheLocator = private_class("numba.core.caching.IPythonCacheLocator", "from_function", "get_cache_path")
 UserProvidedCacheLocator = private_class(
     "numba.core.caching.UserProvidedCacheLocator", "from_function", "get_suitable_cache_subpath"
 )
@@ -97,7 +100,14 @@ if absent:
     )
 
 
-class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
+class PrivateFolder:
+    """Part of a locator that creates its folder for this user alone."""
+
+    def ensure_cache_path(self) -> None:
+        make_private_folder(Path(self.get_cache_path()))  # type: ignore[attr-defined]
+
+
+class KernelLocator(PrivateFolder, UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
     """Locator of kernels in `cache_folder`; it identifies a source file by its content, not by its age or folder."""
 
     def __init__(self, py_func: Any, py_file: str) -> None:
@@ -115,14 +125,27 @@ class KernelLocator(UserProvidedCacheLocator):  # type: ignore[misc, valid-type]
         return super(UserProvidedCacheLocator, cls).from_function(py_func, py_file)
 
 
-class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
-    """Cache in `cache_folder` for kernels from files, and in IPython's folder for kernels from notebook cells."""
+class CellLocator(PrivateFolder, IPythonCacheLocator):  # type: ignore[misc, valid-type]
+    """Locator of kernels from notebook cells."""
 
-    _locator_classes = (KernelLocator, IPythonCacheLocator)
+    def get_cache_path(self) -> str:
+        return str(cache_folder() / "notebook")
+
+
+class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc, valid-type]
+    """Cache in `cache_folder` for kernels from files and from notebook cells."""
+
+    _locator_classes = (KernelLocator, CellLocator)
 
 
 class KernelIndex(IndexDataCacheFile):  # type: ignore[misc, valid-type]
     """Index of a kernel's stored code; empty if it holds types that this process cannot import."""
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        with super()._open_for_write(filepath) as file:
+            os.fchmod(file.fileno(), 0o600)
+            yield file
 
     # Numba reads the types of all stored versions of a kernel, including types that another program defined.
 

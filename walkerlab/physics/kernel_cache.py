@@ -2,6 +2,7 @@
 
 Numba's cache does not notice changes in a function that a kernel calls from another file. The folder's name therefore
 contains a digest of all sources that kernels can use, so stale code never runs. Caches of other programs are untouched.
+Compiled code is loaded only from folders and files that no other user may have written.
 """
 
 import contextlib
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.code_digest import Sources, digest_of
+from walkerlab.private_files import is_foreign, make_private, make_private_folder, may_be_foreign
 
 PHYSICS = Path(__file__).parent
 PACKAGE = PHYSICS.parent
@@ -70,7 +72,7 @@ def processor_name() -> str:
 
 
 def cache_root() -> Path:
-    """Return the folder of compiled code: $WALKERLAB_CACHE or the user's cache if writable, else a temporary folder."""
+    """Return the folder of compiled code: $WALKERLAB_CACHE or the user's cache if usable, else a temporary folder."""
     chosen = os.environ.get("WALKERLAB_CACHE")
     usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
     return _first_usable((Path(chosen), usual) if chosen else (usual,))
@@ -78,18 +80,33 @@ def cache_root() -> Path:
 
 @functools.cache
 def _first_usable(candidates: tuple[Path, ...]) -> Path:
-    for folder in candidates:
-        with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                break
-    else:
-        folder = Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
+    refusals = {folder: _refusal(folder) for folder in candidates}
+    usable = [folder for folder in candidates if not refusals[folder]]
+    folder = usable[0] if usable else Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
     if folder != candidates[0]:
-        lost = "" if folder in candidates else ", where later processes do not find it"
-        message = f"{candidates[0]} is not writable: compiled code is kept in {folder}{lost}"
+        lost = "" if usable else ", where later processes do not find it"
+        message = f"{candidates[0]} {refusals[candidates[0]]}: compiled code is kept in {folder}{lost}"
         warnings.warn(f"{message}. Set WALKERLAB_CACHE to choose another folder.", CacheWarning, stacklevel=3)
     return folder
+
+
+def _refusal(root: Path) -> str:
+    """Return why compiled code cannot be kept in a folder, which is created if necessary; empty if it can."""
+    try:
+        make_private_folder(root)
+        folder = root.resolve()
+        generations = list(folder.glob("kernels-*"))
+        # a folder that holds anything else is not ours alone: others may need it
+        if folder.stat().st_uid == os.geteuid() and len(generations) == len(list(folder.iterdir())):
+            folder.chmod(0o700)
+        if may_be_foreign(folder):
+            return "is open to other users or belongs to another user"
+        if any(map(is_foreign, generations)):
+            return "holds compiled code of other users"
+        with tempfile.TemporaryFile(dir=folder):
+            return ""
+    except OSError:
+        return "is not writable"
 
 
 @functools.cache
@@ -101,10 +118,28 @@ def cache_folder() -> Path:
     root, host = cache_root(), processor_name()
     compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
     folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
-    if not folder.is_dir():
-        folder.mkdir(exist_ok=True)
+    if os.path.lexists(folder):
+        folder = _closed_to_others(folder)
+        folder.mkdir(0o700, exist_ok=True)
+    else:
+        folder.mkdir(0o700, exist_ok=True)
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
     os.utime(folder)
+    return folder
+
+
+def _closed_to_others(folder: Path) -> Path:
+    """Close a folder to other users and delete code that they may have written; return it, or if that fails another."""
+    try:
+        deleted = make_private(folder)
+    except OSError as error:
+        refused = error.filename or folder
+        folder = Path(tempfile.mkdtemp(prefix="walkerlab-cache-"))
+        message = f"{refused} may belong to another user and cannot be deleted: compiled code is kept in {folder}."
+    else:
+        message = f"{deleted[0]}: other users may have written this code. It is compiled again." if deleted else ""
+    if message:
+        warnings.warn(message, CacheWarning, stacklevel=3)
     return folder
 
 
@@ -128,4 +163,4 @@ def lock_of(name: str) -> Any:
     # imported here because a process that finds everything compiled needs no lock
     from filelock import FileLock
 
-    return FileLock(cache_folder() / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock")
+    return FileLock(cache_folder() / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.lock", mode=0o600)

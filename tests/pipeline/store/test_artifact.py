@@ -131,7 +131,7 @@ def test_every_array_has_unit_name_and_dimension_scales(tmp_path, content, ident
 def test_root_says_where_the_result_comes_from(tmp_path, content, identity, origin):
     artifact.write(tmp_path / "a.h5", content, identity, origin)
     with h5py.File(tmp_path / "a.h5") as file:
-        root = dict(file.attrs)
+        root = {name: value.decode() if isinstance(value, bytes) else value for name, value in file.attrs.items()}
     assert root["stage_key"] == identity.key
     assert json.loads(root["input_keys"]) == {"fixedpoint": "a" * 64}
     assert root["config"].startswith("name: paper\n")

@@ -219,6 +219,26 @@ def test_the_job_that_slurm_is_given_asks_for_what_was_said(tmp_path, monkeypatc
     assert "/opt/python -u -m submitit" in job
 
 
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_pickled_jobs_are_for_this_user_alone(tmp_path):
+    pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
+    run, jobs = tmp_path / "run", tmp_path / "run" / "jobs"
+    local = {"cluster": "local"}
+    jobs.mkdir(parents=True)
+    for name, mode in (("earlier.pkl", 0o664), ("foreign.pkl", 0o666)):
+        (jobs / name).touch()
+        (jobs / name).chmod(mode)
+    with ENGINES["slurm"].opened(Order(folder=run, options=local)) as pool:
+        assert pool.submit(os.getpid).result(timeout=60)
+    assert stat.S_IMODE(jobs.stat().st_mode) == 0o700
+    assert stat.S_IMODE((jobs / "earlier.pkl").stat().st_mode) == 0o600
+    assert not (jobs / "foreign.pkl").exists()
+    run.chmod(0o777)
+    with pytest.raises(ConfigError, match="is open to other users") as refused:
+        ENGINES["slurm"].opened(Order(folder=run, options=local)).__enter__()
+    assert f"chmod o-w {run}" in refused.value.advice
+
+
 def test_an_engine_that_is_not_there_or_not_installed_is_said_so(monkeypatch):
     with pytest.raises(ConfigError, match="unknown engine; choose from local, dask, slurm"):
         engine_named("cloud")

@@ -359,6 +359,20 @@ def test_a_report_that_is_being_made_ends_with_a_server_that_is_killed(tmp_path)
         time.sleep(0.05)
 
 
+def test_a_job_imports_nothing_from_the_folder_in_which_the_server_was_started(tmp_path):
+    one = Served(tmp_path)
+    try:
+        (tmp_path / "signal.py").write_text(f"open({str(tmp_path / 'imported')!r}, 'w')")
+        assert one.asked("/api/job", {"kind": "report"})[0] == 200
+        deadline = time.monotonic() + 30
+        while not one.asked("/api/job")[1]["said"]:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert not (tmp_path / "imported").exists()
+    finally:
+        one.close()
+
+
 def at_work_for(folder):
     """Commands that run for a folder of runs."""
     return [file for file in Path("/proc").glob("[0-9]*/cmdline") if f"{folder / 'runs'}\0--json" in text_of(file)]

@@ -12,7 +12,7 @@ from walkerlab.config.canonical import canonical_json
 from walkerlab.pipeline.store import hdf5
 from walkerlab.pipeline.store.content import Attribute, Content, Digest, Group, Variable
 from walkerlab.pipeline.store.files import file_digest, read_bounded, refuse_full_disk, replacing, write_atomically
-from walkerlab.pipeline.store.key import SCHEMA_VERSION, Identity
+from walkerlab.pipeline.store.key import READABLE, SCHEMA_VERSION, Identity
 from walkerlab.pipeline.store.provenance import Provenance
 
 NOT_THERE = "not there yet"
@@ -183,7 +183,7 @@ def root_attributes(content: Content, identity: Identity, provenance: Provenance
 
 def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
     """Build an artifact from a file's parts; raises Damaged if its digest or key does not match."""
-    if root.get("schema_version") != SCHEMA_VERSION:
+    if root.get("schema_version") not in READABLE:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}
     if "" in groups:

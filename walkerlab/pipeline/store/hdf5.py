@@ -15,7 +15,10 @@ from walkerlab.pipeline.store.content import Attribute, Group, Variable
 BARE_DIMENSION = "This is a netCDF dimension but not a netCDF variable."
 CONVENTIONS = "CF-1.11"
 """Metadata conventions of the files, for netCDF readers."""
-TEXT = h5py.string_dtype()
+ENCODING = "_Encoding"
+"""Attribute by which xarray decodes text."""
+MIN_TEXT_BYTES = 2
+"""Minimum length of text in arrays; netCDF readers join texts of one byte along the last dimension."""
 MAX_LEVELS = 16
 STRINGS_AT_ONCE = 64
 LEAST_BYTES = 32
@@ -25,11 +28,12 @@ LEAST_BYTES = 32
 def image(content: Mapping[str, Group], root: Mapping[str, Attribute]) -> bytes:
     """Build an HDF5 file in memory, so that only an ordinary write, not the HDF5 library, can fail on a full disk."""
     # No file named "image" is created: the memory driver has no backing store.
-    with h5py.File("image", "w", driver="core", backing_store=False) as file:
-        file.attrs.update(root)
+    with h5py.File("image", "w", driver="core", backing_store=False, track_order=True) as file:
+        write_attributes(file, root)
         for path, group in sorted(content.items()):
-            target = file.require_group(path) if path else file
-            target.attrs.update(group.attrs)
+            target = file.create_group(path, track_order=True) if path else file
+            if path:
+                write_attributes(target, group.attrs)
             write_variables(target, sorted(group.variables.items(), key=lambda item: item[1].dims != (item[0],)))
         file.flush()
         return bytes(file.id.get_file_image())
@@ -42,9 +46,9 @@ def write_in_turn(
 
     Raises OSError if that fails.
     """
-    with h5py.File(path, "w") as file:
+    with h5py.File(path, "w", track_order=True) as file:
         write_variables(file, variables)
-        file.attrs.update(root())
+        write_attributes(file, root())
 
 
 class GroupOnDisk(Group):
@@ -62,7 +66,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
         """Read the names and addresses of the datasets at the root."""
         self.file = file
         with h5py.File(file) as opened:
-            members = dict(opened)
+            members = {name: opened[name] for name in sorted(opened)}
             self._by_address = names_of(members)
             self._names = [
                 name
@@ -94,20 +98,50 @@ def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> N
             continue
         for axis, (dim, size) in enumerate(zip(variable.dims, variable.values.shape, strict=True)):
             if dim not in target:
-                target.create_dataset(dim, shape=(size,), dtype="i1").make_scale(f"{BARE_DIMENSION}{size:10d}")
+                bare = target.create_dataset(dim, shape=(size,), dtype="i1", track_order=True)
+                bare.make_scale(f"{BARE_DIMENSION}{size:10d}")
             dataset.dims[axis].attach_scale(target[dim])
 
 
 def write_variable(target: Any, name: str, variable: Variable) -> Any:
     """Write one array with its labels."""
     kind = variable.values.dtype.kind
+    values = encoded(variable.values) if kind == "O" else variable.values
     # booleans are stored as bytes and marked as xarray marks them, since netCDF has no boolean type
-    dtype = {"O": TEXT, "f": "<f8", "i": "<i8", "b": "i1"}[kind]
-    dataset = target.create_dataset(name, data=variable.values, dtype=dtype)
+    dtype = {"O": values.dtype, "f": "<f8", "i": "<i8", "b": "i1"}[kind]
+    dataset = target.create_dataset(name, data=values, dtype=dtype, track_order=True)
     marks = {mark: 1 for mark in ("timing", "missing") if getattr(variable, mark)}
     labels = {"units": variable.units, "long_name": variable.long_name}
-    dataset.attrs.update(labels | ({"dtype": "bool"} if kind == "b" else {}) | marks)
+    of_type = {"O": {ENCODING: "utf-8"}, "b": {"dtype": "bool"}}.get(kind, {})
+    write_attributes(dataset, {**labels, **of_type, **marks})
     return dataset
+
+
+def text_bytes(values: NDArray[Any]) -> int:
+    """Return the length in bytes at which each string of an array is stored."""
+    return max([MIN_TEXT_BYTES, *(len(text.encode()) for text in {"", *values.ravel().tolist()})])
+
+
+def stored_bytes(values: NDArray[Any]) -> int:
+    """Return the size of an array in a file."""
+    return values.size * text_bytes(values) if values.dtype.kind == "O" else values.nbytes
+
+
+def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
+    """Encode an array of strings as UTF-8 of one length, padded with NUL."""
+    # Not marked as UTF-8, because Octave loads only text that is marked as ASCII, and stops at any other.
+    texts = [text.encode() for text in values.ravel().tolist()]
+    return np.array(texts, f"S{text_bytes(values)}").reshape(values.shape)
+
+
+def write_attributes(holder: Any, attributes: Mapping[str, Attribute]) -> None:
+    """Write attributes in order; text is UTF-8 of fixed length, as in every netCDF file."""
+    for name, value in attributes.items():
+        if isinstance(value, str):
+            data = value.encode()
+            holder.attrs.create(name, data, dtype=h5py.string_dtype("utf-8", max(len(data), 1)))
+        else:
+            holder.attrs[name] = value
 
 
 def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
@@ -140,7 +174,7 @@ def walk_groups(parent: Any, path: str, budget: Budget) -> Iterator[tuple[str, G
         raise ValueError("its groups are nested too deeply")
     variables: dict[str, Variable] = {}
     members: dict[str, Any] = {}
-    for name in parent:
+    for name in sorted(parent):
         budget.spend(LEAST_BYTES)
         if not isinstance(parent.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"it holds a link, {name!r}")
@@ -201,7 +235,19 @@ def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """Read the strings of a dataset, a few at a time, so that the budget stops many references to one long string."""
+    """Read the strings of a dataset; those of layout 2 have variable lengths."""
+    if h5py.check_string_dtype(dataset.dtype).length is None:
+        return read_variable_strings(dataset, budget)
+    texts = np.asarray(dataset[()])
+    # equal strings share one object, since a short string takes far more memory than in the file
+    decoded = {text: text.decode() for text in set(texts.ravel().tolist())}
+    values = np.empty(texts.shape, dtype=object)
+    values.ravel()[:] = [decoded[text] for text in texts.ravel().tolist()]
+    return values
+
+
+def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
+    """Read strings a few at a time, so that the budget stops many references to one long string."""
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
     values = np.empty(dataset.shape, dtype=object)
@@ -223,8 +269,7 @@ def read_attributes(holder: Any) -> dict[str, Attribute]:
         is_known = declared.dtype in (np.dtype("<f8"), np.dtype("<i8"), np.dtype("?")) or is_text(declared.dtype)
         if declared.shape != () or not is_known:
             raise ValueError(f"its attribute {name!r} has a type that walkerlab does not write")
-        value = holder.attrs[name]
-        attributes[name] = value if isinstance(value, str) else value.item()
+        attributes[name] = read_text(holder, name) if is_text(declared.dtype) else holder.attrs[name].item()
     return attributes
 
 
@@ -241,6 +286,4 @@ def read_text(holder: Any, name: str, default: str | None = None) -> str:
 
 
 def is_text(dtype: Any) -> bool:
-    """Whether a type in a file is variable-length text."""
-    text = h5py.check_string_dtype(dtype)
-    return text is not None and text.length is None
+    return h5py.check_string_dtype(dtype) is not None

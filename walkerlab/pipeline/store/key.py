@@ -8,8 +8,10 @@ from typing import Any, Final
 
 from walkerlab.config.canonical import canonical_json
 
-SCHEMA_VERSION = 2
-"""Version of the artifacts' layout; raise it when older files must no longer be read."""
+SCHEMA_VERSION = 3
+"""Version of the artifacts' layout."""
+READABLE: Final = (2, SCHEMA_VERSION)
+"""Versions of the layout that can be read; in version 2 text has variable length."""
 DIGEST: Final = re.compile("[0-9a-f]{64}")
 
 

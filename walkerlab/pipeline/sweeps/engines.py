@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.errors import ConfigError
+from walkerlab.pipeline.store.files import storing
 from walkerlab.pipeline.workers import ONE_THREAD, SizedExecutor, WorkerPool
+from walkerlab.private_files import make_private, make_private_folder, may_be_foreign
 
 GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
 
@@ -110,7 +112,7 @@ def slurm(order: Order) -> Iterator[JobExecutor]:
     python = options.pop("python", None)
     try:
         job_runner = submitit.AutoExecutor(
-            order.folder / "jobs", cluster=cluster, **({"slurm_python": python} if python else {})
+            private_jobs_folder(order.folder), cluster=cluster, **({"slurm_python": python} if python else {})
         )
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
@@ -123,6 +125,26 @@ def slurm(order: Order) -> Iterator[JobExecutor]:
             with contextlib.suppress(OSError):  # the job may have ended meanwhile
                 if not job.done():
                     job.cancel(check=False)
+
+
+def private_jobs_folder(run_folder: Path) -> Path:
+    """Create a folder for pickled jobs and results, or close it to other users; they are run when they are loaded.
+
+    Raises ConfigError if other users may replace it, StorageError if it cannot be created or closed.
+    """
+    jobs = run_folder / "jobs"
+    with storing(jobs):
+        make_private_folder(run_folder)
+        if may_be_foreign(run_folder.resolve()):
+            raise ConfigError(
+                f"--engine slurm: {run_folder} is open to other users or belongs to another user, and jobs are loaded "
+                "from there.",
+                f"Choose another folder with --runs, or close this one: chmod o-w {run_folder}",
+            )
+        if jobs.exists():
+            make_private(jobs)
+        make_private_folder(jobs)
+    return jobs
 
 
 class JobExecutor(SizedExecutor):

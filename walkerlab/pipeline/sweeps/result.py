@@ -16,6 +16,7 @@ from walkerlab.pipeline.headlines import LAST_OF, headlines
 from walkerlab.pipeline.store.artifact import InTurn
 from walkerlab.pipeline.store.content import Content, Variable
 from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.pipeline.store.hdf5 import stored_bytes
 from walkerlab.pipeline.sweeps.chunk import Chunk
 from walkerlab.pipeline.sweeps.question import SweptStage, described
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
@@ -30,8 +31,8 @@ OWN: Final = {
 }
 """Columns that every point has in addition to the stage's quantities."""
 STATES: Final = ("state", "start_state", "final_state")
-TEXT_BYTES: Final = 6
-"""Size of a short string in a file, relative to the size of its pointer in memory."""
+MAX_REASON: Final = 500
+"""Maximum length of a reason; all points have room for the longest, since text in files has a fixed length."""
 
 
 class SweepVariable:
@@ -104,7 +105,8 @@ class Merge:
         rows = []
         for row in rows_of_sweep:
             numbers = json.loads(row.numbers)
-            own = {"outcome": numbers.get("outcome") or row.status, "status": row.status, "reason": row.reason}
+            reason = row.reason if len(row.reason) <= MAX_REASON else f"{row.reason[: MAX_REASON - 1]}…"
+            own = {"outcome": numbers.get("outcome") or row.status, "status": row.status, "reason": reason}
             last = {name: numbers[list_name][-1] for name, list_name in LAST_OF.items() if list_name in numbers}
             rows.append({**numbers, **last, **own})
         self.has_row[indices] = True
@@ -146,7 +148,7 @@ class Merge:
         summary |= {"endings": ended} if ended else {}
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: column for name, column in parameters.items() if column.dims == (name,)}
-        size = sum(column.values.nbytes * (TEXT_BYTES if column.text else 1) for column in self.columns.values())
+        size = sum(stored_bytes(column.values) for column in self.columns.values())
         # a quantity that is also a parameter is stored as its coordinate
         names = sorted({*parameters, *self.columns})
         variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)

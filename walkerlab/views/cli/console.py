@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from walkerlab.errors import escape_controls
+
 if TYPE_CHECKING:
     from rich.live import Live
     from rich.table import Table
@@ -102,6 +104,7 @@ class Console:
         self._say(f"warning: {text}")
 
     def _say(self, text: str) -> None:
+        text = escape_controls(text)
         with self._lock, contextlib.suppress(BrokenPipeError):
             self._said_at = time.monotonic()
             if self._live is not None:

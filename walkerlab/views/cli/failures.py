@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.errors import StoppedError, StorageError, WalkerlabError, add_run_options
+from walkerlab.errors import StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
 from walkerlab.pipeline.interrupts import raise_on
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def print_result(
     if request.as_json:
         print_json(value if error is None else value | {"error": error.as_json()})
     else:
-        sys.stdout.writelines(f"{line}\n" for line in lines)
+        sys.stdout.writelines(f"{escape_controls(line)}\n" for line in lines)
     if error is not None:
         print_error(error, request.typed_for)
         raise typer.Exit(error.exit_code)

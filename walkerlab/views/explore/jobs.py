@@ -80,7 +80,7 @@ class Job:
 
     def _command(self, *words: str) -> dict[str, Any]:
         """Run a command and return its JSON output; RuntimeError with its last message if it fails."""
-        command = [sys.executable, "-c", JOB_PROGRAM, *words]
+        command = [sys.executable, "-P", "-c", JOB_PROGRAM, *words]
         lines = []
         # stdout goes to a file, since a pipe would fill while only stderr is read
         with tempfile.TemporaryFile("w+") as output:

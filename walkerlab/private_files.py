@@ -1,0 +1,45 @@
+"""Files that only this user may write, because Python runs what they hold: compiled code and pickles."""
+
+import contextlib
+import os
+import shutil
+import stat
+from pathlib import Path
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a file, folder or link belongs neither to this user nor to root."""
+    return path.lstat().st_uid not in (os.geteuid(), 0)
+
+
+def may_be_foreign(path: Path) -> bool:
+    """Whether another user, except root, may have written a file or a folder. Links may lead to one."""
+    mode = path.lstat().st_mode
+    return is_foreign(path) or stat.S_ISLNK(mode) or bool(mode & stat.S_IWOTH)
+
+
+def make_private_folder(folder: Path) -> None:
+    """Create a folder, and parents that do not exist, for this user alone."""
+    for each in (*reversed(folder.parents), folder):
+        each.mkdir(0o700, exist_ok=True)
+
+
+def make_private(path: Path) -> list[Path]:
+    """Close a file, or a folder with all that it holds, to other users; delete and return what may be foreign.
+
+    Raises OSError if something that may be foreign cannot be deleted.
+    """
+    if may_be_foreign(path):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+        return [path]
+    status = path.lstat()
+    if status.st_uid == os.geteuid() and status.st_mode & 0o077:
+        path.chmod(status.st_mode & 0o700)
+    deleted = []
+    for each in list(path.iterdir()) if stat.S_ISDIR(status.st_mode) else ():
+        with contextlib.suppress(FileNotFoundError):  # another process may have deleted it
+            deleted += make_private(each)
+    return deleted
