@@ -37,6 +37,15 @@ def answer(stage: str, summary: Summary) -> list[str]:
     return lay_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(describe_summary(summary, short=True))
 
 
+def further_tables(stage: str, summary: Summary) -> list[str]:
+    """Return lines that complete an answer, as `--verbose` shows them; empty if the answer is complete."""
+    if stage != "robustness" or not summary:
+        return []
+    from walkerlab.views.report.sections import robustness
+
+    return ["", *lay_out(robustness.filled_tables(summary)[robustness.FIRST_TABLES :])]
+
+
 def lay_out(blocks: Iterable[str | Table]) -> list[str]:
     lines: list[str] = []
     after_table = False
@@ -54,7 +63,7 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     """Describe the gait, with both sets of equations side by side if their displayed digits differ."""
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
-        return [f"No gait on a slope of {slope}: {summary['reason']}."]
+        return [f"No gait on a slope of {slope}: {summary['reason']}."] if "reason" in summary else []
     driven = f", driven by {join_words(summary['driven_by'])}," if summary.get("driven_by") else ""
     driven += f"{'' if driven else ','} with {join_words(summary['springs'])}," if summary.get("springs") else ""
     head = (
@@ -208,7 +217,10 @@ def starts(summary: Summary) -> list[str | Table]:
 def robustness_answer(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections import robustness
 
-    return [*robustness.findings(summary), *robustness.tables(summary)]
+    tables = robustness.filled_tables(summary)
+    more = len(tables) - robustness.FIRST_TABLES
+    tail = f"The option -v shows {count(more, 'more table')}." if more > 0 else ""
+    return [*robustness.findings(summary), *tables[: robustness.FIRST_TABLES], tail]
 
 
 def best_walker(summary: Summary) -> list[str | Table]:
