@@ -109,7 +109,7 @@ def ranks(row: Mapping[str, Any]) -> bool:
 
 def filled_tables(summary: Mapping[str, Any]) -> list[Table]:
     """Return the tables that have rows."""
-    return [each for each in tables(summary) if each.rows]
+    return [each for each in tables(summary) if each]
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
