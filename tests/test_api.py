@@ -75,8 +75,8 @@ def test_what_the_command_line_warns_of_is_a_warning_to_who_calls(ask, tmp_path)
 
 
 def test_a_start_that_is_moved_in_memory_is_told():
-    with pytest.warns(UserWarning, match="^start: theta_1 moved from 0.5 to "):
-        walkerlab.simulate(slope_deg=1, start=[0.5, 0.17, -0.6, -0.86], strides=1)
+    with pytest.warns(UserWarning, match="^start: theta_1 moved from -0.2 to "):
+        walkerlab.simulate(slope_deg=1, start=[-0.2, 0.17, -0.6, -0.86], strides=1)
 
 
 def test_a_run_from_python_is_the_run_of_the_command_line(tmp_path):

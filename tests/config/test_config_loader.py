@@ -14,8 +14,9 @@ from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.problems import beyond_scope
 from walkerlab.config.reference import keys
-from walkerlab.config.schema import Config, Contact
+from walkerlab.config.schema import Config, Contact, state_of
 from walkerlab.config.walkers import contact_to_add
+from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError
 
 Write = Callable[..., Path]
@@ -75,28 +76,84 @@ def test_loading_imports_nothing_but_what_reads_and_types_a_config() -> None:
     assert loaded <= {"walkerlab", *needed}
 
 
-def test_theta_1_is_replaced_so_that_both_feet_stand_on_the_slope(loaded: Loaded) -> None:
-    result = loaded("slope_deg: 2\nstart: [0.5, 0.17, -0.6, -0.8]\n")
+def test_a_theta_1_that_is_slightly_off_is_moved_so_that_both_feet_stand_on_the_slope(loaded: Loaded) -> None:
+    result = loaded("slope_deg: 2\nstart: [-0.245, 0.17, -0.6, -0.8]\n")
     assert list(result.config.start) == pytest.approx([-2 * math.radians(2) - 0.17, 0.17, -0.6, -0.8], abs=1e-15)
     assert len(result.warnings) == 1
-    assert re.search(r"mine\.yaml:2:8: start: theta_1 moved from 0\.5 to -0\.2398", result.warnings[0])
+    assert re.search(r"mine\.yaml:2:8: start: theta_1 moved from -0\.245 to -0\.2398", result.warnings[0])
+
+
+@pytest.mark.parametrize("slope_deg", [1, 2, 5])
+def test_a_theta_1_of_null_is_computed_for_every_slope(loaded: Loaded, slope_deg: float) -> None:
+    result = loaded("start: [null, 0.17, -0.6, -0.8]\n", [f"slope_deg={slope_deg}"])
+    swing = -2 * math.radians(slope_deg) - 0.17
+    assert list(result.config.start) == pytest.approx([swing, 0.17, -0.6, -0.8], abs=1e-15)
+    assert result.warnings == ()
+
+
+@pytest.mark.parametrize("theta_1", [0, 6.1, -0.25, -0.229])
+def test_a_theta_1_that_is_far_off_is_refused_with_both_remedies(write: Write, theta_1: float) -> None:
+    path = write(f"slope_deg: 2\nstart: [{theta_1}, 0.17, -0.6, -0.8]\n")
+    with pytest.raises(ConfigError, match=r"mine\.yaml:2:8: start: theta_1 is .* but must be -0\.23981") as caught:
+        load(path)
+    assert "null for theta_1" in caught.value.advice
+    assert f"{{instant: mid-step, state: [{theta_1}, 0.17, -0.6, -0.8]}}" in caught.value.advice
+
+
+def test_a_start_in_mid_step_stays_as_it_is_and_is_written_and_read_again(loaded: Loaded) -> None:
+    config = loaded("slope_rad: 0.0525\nstart: {instant: mid-step, state: [0, 0, 2.0, -0.4]}\n").config
+    assert state_of(config.start) == (0.0, 0.0, 2.0, -0.4)
+    assert loaded(to_yaml(config)).config == config
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        ("{instant: mid-step, state: [0, 0, 2]}", "has 3 values; this walker needs 4"),
+        ("{instant: mid-swing, state: [0, 0, 2, 1]}", "'mid-swing' is not allowed"),
+        ("{instant: mid-step, state: [0, 0, null, 1]}", "null is not a number"),
+        ("{instant: mid-step}", "needs the keys instant: mid-step and state"),
+        ("{instant: mid-step, state: [0, 0, 2, 1], strides: 2}", "needs the keys instant: mid-step and state"),
+        ("[-0.2, null, -0.6, -0.8]", "null is not a number"),
+    ],
+)
+def test_a_start_that_is_neither_a_state_nor_in_mid_step_is_refused(refused: Refused, start: str, said: str) -> None:
+    assert said in refused(f"start: {start}\n")
+
+
+def test_only_values_that_follow_from_others_can_be_computed(refused: Refused) -> None:
+    message = refused("extends: torso\nslope_deg: 1\nstart: [null, null, null, -0.6, -0.8, null]\n")
+    assert "value 2 is null, but only theta_1 and theta_torso and dtheta_torso can be computed here" in message
 
 
 def test_what_follows_others_in_a_start_follows_them_at_their_rates_and_this_is_said(loaded: Loaded) -> None:
-    result = loaded("extends: torso\nslope_deg: 1\nstart: [0.5, 0.17, -0.2, -0.6, -0.8, 0.4]\n")
     swing = -2 * math.radians(1) - 0.17
-    assert list(result.config.start) == pytest.approx([swing, 0.17, -math.radians(1), -0.6, -0.8, -0.7], abs=1e-15)
+    right = [swing, 0.17, -math.radians(1), -0.6, -0.8, -0.7]
+    result = loaded("extends: torso\nslope_deg: 1\nstart: [-0.2, 0.17, -0.017, -0.6, -0.8, -0.702]\n")
+    assert list(result.config.start) == pytest.approx(right, abs=1e-15)
     said = [re.search(r"start: (\w+) moved from \S+ to \S+ (\S+),", line) for line in result.warnings]
     assert [one.groups() for one in said if one] == [
         ("theta_1", "rad"), ("theta_torso", "rad"), ("dtheta_torso", "rad/s")
     ]  # fmt: skip
+    computed = loaded("extends: torso\nslope_deg: 1\nstart: [null, 0.17, null, -0.6, -0.8, null]\n")
+    assert list(computed.config.start) == pytest.approx(right, abs=1e-15)
+    assert computed.warnings == ()
 
 
-def test_a_start_with_knees_has_its_swing_leg_straight_and_this_is_said(loaded: Loaded) -> None:
-    result = loaded("extends: kneed\nstart: [-0.28, 0.19, -0.4, -0.05, -1.1, -0.3]\n")
+def test_a_start_with_knees_has_its_swing_leg_straight_and_this_is_said(loaded: Loaded, refused: Refused) -> None:
+    result = loaded("extends: kneed\nstart: [null, 0.19, -0.285, -0.05, -1.1, -0.3]\n")
     assert result.config.start[2] == result.config.start[0]
     assert result.config.start[5] == -0.3  # the knee is free
-    assert "theta_1_shank moved from -0.4" in result.warnings[-1]
+    assert "theta_1_shank moved from -0.285" in result.warnings[-1]
+    assert "theta_1_shank is -0.4 but must be" in refused(
+        "extends: kneed\nstart: [null, 0.19, -0.4, -0.05, -1.1, -0.3]\n"
+    )
+
+
+def test_in_mid_step_a_knee_may_be_bent_but_not_beyond_straight(loaded: Loaded, refused: Refused) -> None:
+    bent = "extends: kneed\nstart: {instant: mid-step, state: [0.1, -0.1, -0.4, 1.0, -1.1, 1.0]}\n"
+    assert state_of(loaded(bent).config.start)[2] == -0.4
+    assert "knees do not bend beyond straight" in refused(bent.replace("-0.4", "0.4"))
 
 
 PARTS = """walker:
@@ -116,7 +173,7 @@ PARTS = """walker:
 
 
 def test_a_coupled_part_follows_by_its_weights_in_a_start(loaded: Loaded) -> None:
-    start = loaded(PARTS + "start: [-0.2, 0.2, 0.5, -0.4, -0.8, 0.5]\n").config.start
+    start = loaded(PARTS + "start: [-0.2, 0.2, null, -0.4, -0.8, null]\n").config.start
     assert list(start) == pytest.approx([-0.2, 0.2, 0.1, -0.4, -0.8, -0.7], abs=1e-15)
 
 
@@ -194,7 +251,7 @@ def test_the_papers_own_start_stands_on_its_slope_and_nothing_is_said(loaded: Lo
 
 
 def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
-    once = loaded("slope_deg: 3\nstart: [0, 0.3, 0, 0]\n").config
+    once = loaded("slope_deg: 3\nstart: [null, 0.3, 0, 0]\n").config
     state = list(once.start)
     assert loaded(f"slope_rad: {once.slope_rad!r}\nstart: {state}\n").config.start == once.start
 
@@ -242,7 +299,7 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
         ("name: 7\n", r"7 is not text"),
         ("walker: 3\n", r"3 is not a block of keys"),
         ("contact: [1]\n", r"\[1\] is not a block of keys; allowed: a block of keys, or null"),
-        ("start: [1, 2]\n", r"start: \[1, 2\] has too few values; allowed: fixed-point, or four numbers"),
+        ("start: [1, 2]\n", r"start: \[1, 2\] has too few values; allowed: fixed-point, four numbers"),
         ("start: [1, 2, 3, 4, 5]\n", r"has 5 values; this walker needs 4"),
         ("start: [1, 2, 3, x]\n", r"1:18: start: 'x' is not a number"),
         ("start: fixedpoint\n", r"did you mean fixed-point\?"),

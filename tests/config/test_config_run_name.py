@@ -89,7 +89,7 @@ def test_a_run_name_is_one_safe_path_component(
     name = name_of(
         f"slope_deg={slope!r}",
         f"contact.stiffness={stiffness!r}",
-        f"start=[0.0, {start[0]!r}, {start[1]!r}, 0.0]",
+        f"start=[null, {start[0]!r}, {start[1]!r}, 0.0]",
         strides=strides,
     )
     assert re.fullmatch(r"paper(@[A-Za-z0-9._,=-]+)?", name)

@@ -12,6 +12,7 @@ from walkerlab.config import schema
 from walkerlab.config.fields import Block, annotation_of, leaves
 from walkerlab.config.loader import load
 from walkerlab.config.schema import METHODS, CompassWalker, Config, Contact, SolverSettings
+from walkerlab.config.walkers import Kneed, Shank
 from walkerlab.errors import ConfigError
 
 
@@ -74,6 +75,8 @@ def test_every_key_has_a_meaning_a_source_and_a_unit_if_it_is_a_number(field: An
         (CompassWalker, {"leg_mass_kg": 1e-6}),
         (CompassWalker, {"leg_mass_kg": 1e3}),
         (CompassWalker, {"leg_inertia_kg_m2": 0.4}),
+        (CompassWalker, {"leg_length_m": 1e-3}),
+        (Kneed, {"shank": Shank(length_m=0.553), "foot_radius_m": 0.56}),
         (CompassWalker, {"foot_radius_m": 0.0}),
         (CompassWalker, {"foot_radius_m": 0.4999}),
         (Config, {"gravity_m_s2": 1.62}),
@@ -119,6 +122,7 @@ def test_the_extremes_are_admitted(block: type[Block], values: dict[str, Any]) -
         (CompassWalker, {"leg_inertia_kg_m2": -1e-9}),
         (CompassWalker, {"foot_radius_m": -1e-9}),
         (CompassWalker, {"foot_radius_m": 0.5}),
+        (Kneed, {"foot_radius_m": 1.0}),
         (CompassWalker, {"type": "kneed"}),
         (Config, {"gravity_m_s2": 0.0}),
         (Config, {"gravity_m_s2": -9.81}),

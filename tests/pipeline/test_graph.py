@@ -125,6 +125,11 @@ def test_pads_at_the_rigid_step_length_need_the_gait_whatever_the_start():
     assert needed("contact-sim", EXPLICIT, "contact.pad_pitch=rigid") == ["fixedpoint", "contact-sim"]
 
 
+@pytest.mark.parametrize("terrain", ["plane", "after-mid-swing"])
+def test_a_given_start_needs_no_gait_on_ground_without_pads(terrain):
+    assert needed("contact-sim", EXPLICIT, f"contact.terrain={terrain}") == ["contact-sim"]
+
+
 def test_two_stages_of_one_name_are_refused():
     with pytest.raises(ValueError, match="the same name"):
         Graph(Stage("a", "m", "", object), Stage("a", "n", "", object))

@@ -14,6 +14,10 @@ Quantity = Literal[
     "gait_sensitivity_norm",
     "gait_sensitivity_norm_scaled",
     "cost_of_transport",
+    "largest_step_down_m",
+    "largest_step_up_m",
+    "largest_push_forward_N_s",
+    "largest_push_backward_N_s",
 ]
 _NAMES: Final = ", ".join(get_args(Quantity))
 Bounds = dict[str, list[float]]

@@ -57,7 +57,7 @@ def check_ground(case: Case, config: Config, lines: Mapping) -> None:
     if config.contact is None:
         where = lines.keys.get("contact", lines.position)
         raise problem_error(where, f"contact: case {case.name} needs a contact block but has none", "model: rigid")
-    if isinstance(config.start, str):
+    if not isinstance(config.start, tuple):
         return
     # Steps are judged by the length of the start's step even where it lays no pads, so it must not be 0.
     by_start = config.contact.pad_pitch == "rigid" or config.contact.terrain == "after-mid-swing"

@@ -209,9 +209,16 @@ class RobustnessConfig(FixedPointConfig, ContactConfig, Protocol):
     def robustness(self) -> Robustness: ...
 
 
+class StepsToTake(Protocol):
+    @property
+    def steps(self) -> int: ...
+
+
 class DesignConfig(FixedPointConfig, ContactConfig, Protocol):
     @property
     def design(self) -> Design | None: ...
+    @property
+    def robustness(self) -> StepsToTake: ...
 
 
 class IdentifyConfig(FixedPointConfig, ContactConfig, Protocol):

@@ -13,7 +13,7 @@ from pydantic_core import PydanticUndefined
 from walkerlab.config.fields import annotation_of, bounds_of, leaves, leaves_of_other_kinds, type_words
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short_number
-from walkerlab.config.problems import suggestion
+from walkerlab.config.problems import nearest
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
@@ -96,9 +96,11 @@ def select_keys(selection: str) -> list[KeyReference]:
         if not selection or any(f"{name}.".startswith(f"{selection}.") for name in (key.key, plain[key]))
     ]
     if not matches:
-        names = {".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)}
-        near = suggestion(selection, names) or suggestion(selection, {name.split(".")[-1] for name in names})
-        raise ConfigError(f"the config has no key {selection}.{near}", "`walkerlab schema` lists every key")
+        names = [".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)]
+        by_end = {name.split(".")[-1]: name for name in reversed(names)}
+        near = nearest(selection, names) or by_end.get(nearest(selection, by_end), "")
+        meant = f" Did you mean {near}?" if near else ""
+        raise ConfigError(f"the config has no key {selection}.{meant}", "`walkerlab schema` lists every key")
     everywhere = {key for key in matches if key.key == plain[key]}
     return [key for key in matches if key in everywhere or replace(key, key=plain[key]) not in everywhere]
 

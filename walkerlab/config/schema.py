@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from types import SimpleNamespace
 from typing import Annotated, Any, Final, Literal, get_args
 
-from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from walkerlab.config.basin import Basin
 from walkerlab.config.contact import Contact
@@ -66,19 +66,44 @@ class SlopeInDegrees(Block):
 SwingAngle = Annotated[float, Field(ge=-10.0, le=10.0)]  # follows from the other angle and the slope: -2 phi - theta_2
 StanceAngle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi)]
 Rate = Annotated[float, Field(ge=-1e6, le=1e6)]
-State = tuple[SwingAngle, StanceAngle, Rate, Rate]
+# null in place of an angle or rate that follows from the others
+State = tuple[SwingAngle | None, StanceAngle, Rate, Rate]
+LongState = tuple[Rate | None, ...]  # states of walkers with more bodies than two legs
 
 
-LongState = tuple[Rate, ...]  # states of walkers with more bodies than two legs
+MID_STEP: Final = "mid-step"
+
+
+class MidStep(BaseModel):
+    """Start between two heel strikes, which is walked as it is."""
+
+    model_config = Block.model_config
+
+    instant: Literal["mid-step"]
+    state: tuple[Rate, ...] = Field(strict=False)
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+
+def state_of(start: Any) -> tuple[float, ...]:
+    """Return the state of a start that is not the fixed point."""
+    return start.state if isinstance(start, MidStep) else tuple(start)
+
+
+def kind_of_start(value: Any) -> str:
+    """Return the tag of the kind of start that a value is."""
+    if isinstance(value, list | tuple):
+        return "state" if len(value) <= 4 else "long"
+    return MID_STEP if isinstance(value, dict | MidStep) else "word"
 
 
 Start = Annotated[
     Annotated[Literal["fixed-point"], Tag("word")]
     | Annotated[State, Field(strict=False), Tag("state")]
-    | Annotated[LongState, Field(strict=False), Tag("long")],
-    Discriminator(
-        lambda value: "word" if not isinstance(value, list | tuple) else "state" if len(value) <= 4 else "long"
-    ),
+    | Annotated[LongState, Field(strict=False), Tag("long")]
+    | Annotated[MidStep, Tag(MID_STEP)],
+    Discriminator(kind_of_start),
 ]
 
 
@@ -220,10 +245,12 @@ class Config(Block):
     start: Start = key(
         "fixed-point",
         "rad, rad, rad/s, rad/s",
-        "fixed-point, or the state just after heel strike: [theta_1, theta_2, dtheta_1, dtheta_2], where leg 1 "
-        "swings and leg 2 stands; theta_1 is replaced so that both feet stand on the slope",
+        "fixed-point, or the state just after a heel strike: [theta_1, theta_2, dtheta_1, dtheta_2], where leg 1 "
+        "swings, leg 2 stands and a theta_1 of null is computed so that both feet stand on the slope; or a state in "
+        "mid-step",
         "eq. 11",
-        bounds="fixed-point, or four numbers: angles up to 2 pi, velocities up to 1e6",
+        bounds="fixed-point, four numbers (angles up to 2 pi, velocities up to 1e6), or "
+        "{instant: mid-step, state: [...]}",
     )
     strides: int = key(5, "1", "strides to walk, one stride is two steps", ge=1, le=10_000)
     ground: Footholds = Footholds()
@@ -247,6 +274,13 @@ class Config(Block):
         "push_off", "walker", lambda value, walker: why_no_push_off(walker) if value.impulse_N_s else ""
     )
     _stands = check_against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
+
+    @field_validator("start", mode="before")
+    @classmethod
+    def _mid_step_has_both_keys(cls, value: Any) -> Any:
+        if isinstance(value, dict) and value.keys() != MidStep.model_fields.keys():
+            raise meaning_error("needs the keys instant: mid-step and state: [...], and no others")
+        return value
 
     @field_validator("equations")
     @classmethod

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -13,8 +13,16 @@ from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of,
 from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, read_layers
 from walkerlab.config.layers import merge_layers
 from walkerlab.config.numbers import DECIMAL_COMMA, short_number
-from walkerlab.config.problems import Problem, beyond_scope, format_node, nearest, printable, problems_error
-from walkerlab.config.schema import Config, SlopeInDegrees
+from walkerlab.config.problems import (
+    Problem,
+    beyond_scope,
+    format_node,
+    nearest,
+    printable,
+    problem_error,
+    problems_error,
+)
+from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
 from walkerlab.config.walkers import Kneed, PartsWalker, followers
@@ -48,6 +56,7 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
+FAR_OFF: Final = 0.01  # rad or rad/s; a stated value of a start that is off by more is refused
 BY_UNITS: Final = {"units": "si, and set the other values of the block too"}
 JUDGED_BY: Final = {
     **dict.fromkeys(BOUNDS_SI, BY_UNITS),
@@ -78,34 +87,70 @@ def validate_tree(tree: Mapping) -> Config:
     return config
 
 
-def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
-    """Move the start onto its constraints, and describe the changes.
+class FollowingValue(NamedTuple):
+    """Value of a start that follows from others."""
 
-    Both feet stand on the slope (theta_1 + theta_2 = -2 phi), knees are straight, and coupled bodies, such as a torso
-    on the legs' bisector, have the angles and rates of their coupling. For walkers of parts only couplings are applied.
+    name: str
+    value: float
+    unit: str
+    because: str
+
+
+def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
+    """Compute the values of the start that follow from others, and describe small changes of stated values.
+
+    Raises ConfigError with a position for a missing value that does not follow, or a stated value that is far off.
     """
     if isinstance(config.start, str):
         return config, ()
-    walker, start = config.walker, list(config.start)
-    bodies, why = len(start) // 2, {}
-    if not isinstance(walker, PartsWalker):
-        start[0] = -2 * (config.slope_rad + walker.lean_rad) - start[1]
-        why[0] = "theta_1", f"so that both feet stand on the slope of {short_number(config.slope_rad)} rad"
-    if isinstance(walker, Kneed):
-        start[2] = start[0]
-        why[2] = "theta_1_shank", "so that the leg is straight"
+    stated: Sequence[float | None] = config.start.state if isinstance(config.start, MidStep) else config.start
+    where, start, moved = tree.entries["start"].position, list(stated), list[str]()
+    following = following_values(config, stated)
+    for place, value in enumerate(stated):
+        if value is None and place not in following:
+            names = " and ".join(each.name for each in following.values()) or "no value"
+            raise problem_error(where, f"start: value {place + 1} is null, but only {names} can be computed here")
+    for place, (name, value, unit, because) in following.items():
+        before, start[place] = stated[place], value
+        if before is None or abs(value - before) <= MOVED_RAD:
+            continue
+        change = f"start: {name} {{}} {short_number(before)} {{}} {short_number(value)} {unit}, {because}"
+        if abs(value - before) > FAR_OFF:
+            as_it_is = ", ".join("null" if each is None else short_number(each) for each in stated)
+            midway = f", or start: {{instant: mid-step, state: [{as_it_is}]}} to walk this state as it is"
+            advice = f"Write null for {name} to compute it{midway if name.startswith('theta_1') else ''}."
+            raise problem_error(where, change.format("is", "but must be"), advice=advice)
+        moved.append(str(Problem(where, change.format("moved from", "to"))))
+    if not isinstance(config.start, MidStep):
+        return config.model_copy(update={"start": tuple(start)}), tuple(moved)
+    if isinstance(config.walker, Kneed) and config.start.state[2] > config.start.state[0] + MOVED_RAD:
+        raise problem_error(where, "start: theta_1_shank is above theta_1, but knees do not bend beyond straight")
+    midway_start = config.start.model_copy(update={"state": tuple(start)})
+    return config.model_copy(update={"start": midway_start}), tuple(moved)
+
+
+def following_values(config: Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
+    """Return the values of a start that follow from others, by their place.
+
+    Just after a heel strike both feet stand on the slope (theta_1 + theta_2 = -2 phi) and knees are straight, except
+    for walkers of parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and rates of
+    their coupling.
+    """
+    walker, bodies = config.walker, len(stated) // 2
+    values, following = [0.0 if value is None else value for value in stated], dict[int, FollowingValue]()
+    if not isinstance(config.start, MidStep) and not isinstance(walker, PartsWalker):
+        values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
+        because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
+        following[0] = FollowingValue("theta_1", values[0], "rad", because)
+        if isinstance(walker, Kneed):
+            values[2] = values[0]
+            following[2] = FollowingValue("theta_1_shank", values[0], "rad", "so that the leg is straight")
     for place, (name, of) in followers(walker).items():
-        for first, theta in ((0, "theta"), (bodies, "dtheta")):
-            start[first + place] = sum(weight * start[first + body] for body, weight in of.items())
-            why[first + place] = f"{theta}_{name.split()[0]}", f"because the {name} follows other bodies"
-    moved = [
-        f"start: {name} moved from {short_number(config.start[place])} to {short_number(start[place])} "
-        f"{'rad' if place < bodies else 'rad/s'}, {because}"
-        for place, (name, because) in why.items()
-        if abs(start[place] - config.start[place]) > MOVED_RAD
-    ]
-    where = tree.entries["start"].position
-    return config.model_copy(update={"start": tuple(start)}), tuple(str(Problem(where, text)) for text in moved)
+        for first, theta, unit in ((0, "theta", "rad"), (bodies, "dtheta", "rad/s")):
+            value = sum(weight * values[first + body] for body, weight in of.items())
+            because = f"because the {name} follows other bodies"
+            following[first + place] = FollowingValue(f"{theta}_{name.split()[0]}", value, unit, because)
+    return following
 
 
 def check_bodies(config: Config, tree: Mapping) -> None:
@@ -160,7 +205,8 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
         beyond = beyond_scope(word)
         text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
         return Problem(position, text, f"one of {', '.join(kinds)}", "" if beyond else nearest(word, kinds))
-    if len(location) > 1 and location[1] in kinds:  # pydantic inserts the kind of block that it tried
+    # pydantic inserts the kind of value that it tried
+    if len(location) > 1 and location[1] in (*kinds, MID_STEP):
         location = (location[0], *location[2:])
     if what == "extra_forbidden":
         return _unknown_key(location, tree)

@@ -132,11 +132,12 @@ class CompassWalker(_Legged):
     hip_mass_kg: float = mass(10.0, "M_H, mass at the hip", "Table 1", 0.0)
     leg_inertia_kg_m2: float = inertia(0.0, "one leg", "section 4: point masses")
     foot_radius_m: float = key(
-        0.001,
+        lambda data: min(0.001, data.get("leg_length_m", 1.0) / 10),
         "m",
         "radius of the ball foot of the contact model, 0 is a point; its centre is L - r from the hip",
         "section 4: 'beveled with a radius of 1 mm'",
         bounds="from 0 to below leg_length_m / 2",
+        default_in_words="0.001, at most leg_length_m / 10",
         ge=0.0,
     )
     torso: Torso | None = None
@@ -229,7 +230,7 @@ class Kneed(_Legged):
     shank: Shank = Shank()
     hip_mass_kg: float = mass(0.5, "mass at the hip", HSU_CHEN, 0.0)
     foot_radius_m: float = key(
-        0.0, "m", "radius of the sole's arc, 0 is a point", HSU_CHEN, bounds="from 0 to below shank.length_m", ge=0.0
+        0.0, "m", "radius of the sole's arc, 0 is a point", HSU_CHEN, bounds="from 0 to below hip to sole", ge=0.0
     )
     foot_centre_ahead_m: float = offset(
         0.0, "the arc's centre, or the point, ahead of the shank's line, perpendicular to it", MCGEER
@@ -238,7 +239,14 @@ class Kneed(_Legged):
     torso: Torso | None = None
     hip: Hip = Hip()
 
-    _arc = check_arc("shank.length_m", "shank", lambda shank: shank.length_m)
+    @field_validator("foot_radius_m")
+    @classmethod
+    def _arc_below_the_hip(cls, value: float, info: ValidationInfo) -> float:
+        if {"thigh", "shank"} <= info.data.keys():
+            leg = info.data["thigh"].length_m + info.data["shank"].length_m
+            if value >= leg:
+                raise meaning_error(f"must be below thigh.length_m + shank.length_m, {leg:g}")
+        return value
 
     @property
     def leg_length_m(self) -> float:

@@ -46,8 +46,9 @@ def gait_unless_start_is_given(config: StartConfig) -> tuple[str, ...]:
 
 
 def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
-    """Require the fixed point if the start state or the pad pitch comes from it."""
-    pitch_of_gait = config.contact is not None and config.contact.pad_pitch == "rigid"
+    """Require the fixed point if the start state or the pitch of pads comes from it."""
+    ground = config.contact
+    pitch_of_gait = ground is not None and ground.terrain == "checkerboard" and ground.pad_pitch == "rigid"
     return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
 
 

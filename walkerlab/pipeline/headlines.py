@@ -48,7 +48,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
 MOST: Final = 13
 OF_WALKS: Final = (
     "work_per_step_J.", "numerical_error.", "end_time_s", "rhs_evaluations", "accepted_steps", "rejected_steps",
-    "energy_balance_residual_J", "slope_rad",
+    "energy_balance_residual_J", "slope_rad", "repeats_after", "leaves_gait_at",
 )  # fmt: skip
 QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
     "fixedpoint": (

@@ -13,7 +13,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.physics.mechanics.rigid import group_bodies, knee_position, on_level_ground
 from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope
-from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import PARTS_DOCS, assembly_of, drive_parameters, knee_locked_at_strike
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
     from walkerlab.config.schema import Equations, Output
 
+FIRST_STEP = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 CACHED_LEVEL_WALKERS = 16  # a family over slopes reuses its walker on level ground
 
 
@@ -76,3 +77,12 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 def state_names(config: RigidConfig) -> tuple[str, ...]:
     angles = tuple(f"theta_{name}" for name in group_bodies(assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))
+
+
+def first_step_length(config: RigidConfig, start: State) -> float:
+    """Return the length (m) of the rigid model's first step from a state, or half a leg if it does not complete it.
+
+    This is the reference length of a walk that starts in mid-step, where the feet are not a step apart.
+    """
+    first = take_walk(rigid_walker(config), FIRST_STEP, start, 1)
+    return float(first.lengths_m[0]) if first.steps else 0.5 * config.walker.leg_length_m

@@ -375,6 +375,34 @@ def test_a_gait_of_three_steps_is_born_in_a_fold():
     assert fold.value == pytest.approx(0.0676036, abs=1e-6)
 
 
+# slope, and section coordinates of the simplest walker's gaits of six steps there
+SIX_STEPS = [
+    (0.0184722331, [0.23890028, -0.21595813, -0.24810845]),
+    (0.019, [0.24535244, -0.21996040, -0.25474270]),
+    (0.019, [0.24554239, -0.21990045, -0.25472983]),
+]
+
+
+@pytest.mark.parametrize(("least", "most", "seed"), [(0.009, 0.0185, 0), (0.012, 0.019, 1), (0.012, 0.019, 2)])
+def test_six_step_gaits_of_the_simplest_walker_begin_at_a_fold_and_none_repeats_sooner(least, most, seed):
+    follower = BranchFollower(map_of(simplest_walker, most - least), ValueSpan(least, most))
+    slope, z = SIX_STEPS[seed]
+    (branch,) = follower.family([Seed(np.array(z), slope, 6)], 6)
+    values = {one.kind: one.value for one in branch.bifurcations}
+    assert values == pytest.approx({"fold": 0.0183105072, "flip": 0.0183378227}, abs=1e-9)
+    assert branch.values.min() >= values["fold"] - 1e-12
+    for point in branch.points:
+        assert min(np.abs(step.z - point.z).max() for step in point.steps[:-1]) > 1e-4
+    assert [end.value for end in branch.ends] == [most, most]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_family_that_is_found_on_both_arms_of_its_fold_is_listed_once(order):
+    follower = BranchFollower(map_of(simplest_walker, 0.007), ValueSpan(0.012, 0.019))
+    (branch,) = follower.family([Seed(np.array(z), slope, 6) for slope, z in SIX_STEPS[1:][::order]], 6)
+    assert {one.kind for one in branch.bifurcations} == {"fold", "flip"}
+
+
 def test_curves_of_flips_pass_through_flips_located_for_other_masses():
     def map_at(hip_mass):
         return map_of(lambda slope: paper_walker(slope)._replace(hip_mass=hip_mass), 0.1)

@@ -317,3 +317,34 @@ def test_the_same_config_gives_the_same_bits(paper):
     again = run()
     assert again.summary == paper.summary
     np.testing.assert_array_equal(again["trajectory"]["angle"], paper["trajectory"]["angle"])
+
+
+def test_a_start_in_mid_step_goes_on_as_the_whole_walk_does():
+    free = ("contact.terrain=after-mid-swing", "strides=1", "outputs=[]")
+    slope = ("slope_rad=0.0525", *free)
+    middle = run("start={instant: mid-step, state: [0, 0, 2.0, -0.4]}", *slope, inputs=()).summary
+    late = simulate_from([0.0, 0.0, 2.0, -0.4], 0.3, 0.0525)
+    end = run(f"start={{instant: mid-step, state: {late}}}", *slope, inputs=()).summary
+    assert (middle["outcome"], end["outcome"]) == ("walked", "walked")
+    # between both starts the feet sink and slip a little, which the rigid walk does not
+    assert end["touch_times_s"][0] + 0.3 == pytest.approx(middle["touch_times_s"][0], abs=0.003)
+    assert end["step_lengths_m"][0] == pytest.approx(middle["step_lengths_m"][0], abs=0.005)
+
+
+def simulate_from(state, time_s, slope_rad):
+    """State of the rigid walk from a state, some time later in its first step."""
+    config = load(None, [f"slope_rad={slope_rad}", f"start={{instant: mid-step, state: {state}}}"]).config
+    walk = simulate.run(only(config, PIPELINE["simulate"].takes), {}, Silent()).groups["trajectory"].variables
+    place = int(np.searchsorted(walk["time"].values, time_s))
+    samples = [walk[name].values[place - 1 : place + 1] for name in ("angle", "velocity")]
+    share = (time_s - walk["time"].values[place - 1]) / np.diff(walk["time"].values[place - 1 : place + 1])[0]
+    return [float(x) for rows in samples for x in rows[0] + share * (rows[1] - rows[0])]
+
+
+def test_the_pad_pitch_has_no_effect_where_there_are_no_pads():
+    start = "start=[-0.2042, 0.1694, -0.605819, -0.861041]"
+    walks = [
+        run(start, "contact.terrain=after-mid-swing", "strides=1", *pitch, inputs=()).summary["touch_times_s"]
+        for pitch in ((), ("contact.pad_pitch=0.3",))
+    ]
+    assert walks[0] == walks[1]

@@ -12,6 +12,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.orbits.design import DesignProblem, Point, count_optima, search_from_starts
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.gradients import gait_quantities
+from walkerlab.physics.orbits.robustness import LARGEST, largest_disturbance
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
@@ -188,3 +189,48 @@ def test_a_settled_walk_with_knees_and_torque_costs_what_its_gait_does():
         ways.append(walk.touch_along_m[-1])
         costs.append(walk.driven.cost_of_transport(1.0))
     assert np.subtract(*costs) / np.subtract(*ways) == pytest.approx(cost, rel=1e-5)
+
+
+def largest_at(slope_deg):
+    config = load(Path("slope-3deg"), [f"slope_deg={slope_deg!r}"]).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    subject = find_model_gait("rigid", config, gait, lambda _: None)
+    return {name: largest_disturbance(subject.at(exact=False), *LARGEST[name], 50) for name in LARGEST}
+
+
+def test_the_largest_step_up_is_maximised_and_robustness_is_compared_with_the_starts():
+    found = run("slope-3deg", "design.maximise=largest_step_up_m", "design.over={slope_deg: [3, 3.8]}", "design.starts=1")
+    grid = [largest_at(slope)["largest_step_up_m"] for slope in np.linspace(3.4, 3.7, 3).tolist()]
+    assert found["value"] >= max(grid) - 1e-5
+    best = largest_at(found["best"]["slope_deg"])
+    rows = {row["quantity"]: row for row in found["robustness"]}
+    assert list(rows) == ["gait_sensitivity_norm", *LARGEST]
+    assert found["value"] == pytest.approx(best["largest_step_up_m"], rel=1e-3)
+    for name, of_start in largest_at(3).items():
+        assert rows[name]["start"] == pytest.approx(of_start, rel=1e-3)
+        assert rows[name]["best"] == pytest.approx(best[name], rel=1e-3)
+
+
+def test_a_largest_push_is_kept_within_its_bounds():
+    asked = ("design.minimise=speed_m_s", "design.over={slope_deg: [1, 2.5]}", "design.starts=1")
+    found = run("slope-3deg", *asked, "design.keep={largest_push_backward_N_s: [0.75, 9]}")
+    assert found["best"]["slope_deg"] == pytest.approx(1.52, abs=0.03)
+    assert largest_at(found["best"]["slope_deg"])["largest_push_backward_N_s"] == pytest.approx(0.75, abs=1e-4)
+
+
+def test_an_optimum_that_is_less_robust_than_the_start_says_in_what():
+    rows = [
+        {"quantity": "gait_sensitivity_norm", "start": 16.3, "best": 7.2},
+        {"quantity": "largest_step_down_m", "start": 0.0129, "best": 0.0226},
+        {"quantity": "largest_step_up_m", "start": 0.0114, "best": 0.0073},
+        {"quantity": "largest_push_forward_N_s", "start": 0.567, "best": 0.181},
+        {"quantity": "largest_push_backward_N_s"},
+    ]
+    found = {
+        "quantity": "gait_sensitivity_norm", "sense": "least", "model": "rigid", "value": 7.2, "start_value": 16.3,
+        "best": {"slope_deg": 2.0}, "constraints": [], "on_bound": [], "multipliers_meet": False,
+        "without_gait": 0, "evaluations": 9, "optima": 1, "starts": 1, "robustness": rows,
+    }  # fmt: skip
+    said = " ".join(" ".join(answer("design", found)).split())
+    assert "less robust than the start: largest_step_up_m and largest_push_forward_N_s are worse" in said
+    assert "largest_step_up_m 0.0114 0.0073" in said

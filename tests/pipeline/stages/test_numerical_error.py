@@ -35,8 +35,10 @@ def test_the_error_is_of_the_size_of_that_against_a_far_tighter_walk(stage, mode
     loose = walk(stage, f"solver.{model}.rtol=1e-4", f"solver.{model}.atol=1e-6", "outputs=[]", "strides=2")
     right = walk(stage, f"solver.{model}.rtol=1e-10", f"solver.{model}.atol=1e-12", "outputs=[]", "strides=2")
     error = loose["numerical_error"]
-    assert list(error) == [*keys, "end_time_s"]
+    assert list(error) == [*keys, "end_time_s", "of_steps"]
+    assert list(error["of_steps"]) == list(keys)
     for key, of in keys.items():
+        assert max(error["of_steps"][key]) == pytest.approx(error[key], rel=0.05)  # two digits
         true = max(abs(a - b) for a, b in zip(loose[of], right[of], strict=True))
         # what the second walk leaves of the first one's error, at an order of five or more: some 2 % of it
         assert error[key] == pytest.approx(true, rel=0.2)
@@ -90,10 +92,24 @@ def test_where_the_second_walk_ends_otherwise_there_is_a_reason_and_no_number():
 def test_the_largest_change_counts_wherever_it_is():
     again = WALKED | {"step_periods_s": [0.7, 0.75], "step_lengths_m": [0.2, 0.3], "end_time_s": 1.45}
     expected = {"step_period_s": 0.05, "step_length_m": 0.1, "end_time_s": 0.05}
-    assert change(WALKED, again) == pytest.approx(expected)
+    found = change(WALKED, again)
+    assert found.pop("of_steps") == {"step_period_s": [0.0, 0.05], "step_length_m": [0.1, 0.1]}
+    assert found == pytest.approx(expected)
     knees = {"knee_strike_times_s": [0.4, None, 1.2]}
     later = change(WALKED | knees, again | {"knee_strike_times_s": [0.4, None, 1.5]})
+    assert later.pop("of_steps")["knee_strike_time_s"] == [0.0, None, 0.3]
     assert later == pytest.approx(expected | {"knee_strike_time_s": 0.3})
+
+
+def test_the_steps_of_a_cycle_are_compared_with_the_same_steps_whenever_they_come():
+    cycle, periods = [0.5, 0.9, 0.6, 0.8], {}
+    for name, first in (("one", 0), ("other", 3)):
+        periods[name] = [0.7, 0.7, *(cycle[(first + step) % 4] for step in range(16))]
+    walks = [WALKED | {"steps": 18, "step_periods_s": each, "step_lengths_m": [0.3] * 18} for each in periods.values()]
+    settled = [walk | {"repeats_after": 4} for walk in walks]
+    assert change(*settled)["of_steps"]["step_period_s"][2:] == [0.0] * 16
+    # walks that do not repeat are compared step by step, and keep the largest change so far
+    assert change(*walks)["of_steps"]["step_period_s"][1:5] == [0.0, 0.3, 0.4, 0.4]
 
 
 @pytest.mark.parametrize("stage", MODULES)

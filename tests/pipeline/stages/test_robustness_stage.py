@@ -19,7 +19,8 @@ from walkerlab.pipeline.stages import fixedpoint, robustness
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.views.report.answers import answer
+from walkerlab.views.report.answers import answer, further_tables
+from walkerlab.views.report.sections import robustness as robustness_section
 from walkerlab.views.report.sections.robustness import tables
 
 # design contract, section 4
@@ -144,7 +145,7 @@ def test_a_push_says_whether_the_ground_then_pushes(rigid, both):
 
 
 def test_what_moves_the_gait_is_ranked_over_both_models(both):
-    lines = [line.split() for line in "\n".join(answer("robustness", both.summary)).splitlines() if " slope_" in line]
+    lines = [line.split() for line in further_tables("robustness", both.summary) if " slope_" in line]
     shares = [abs(float(line[-1].replace("\N{MINUS SIGN}", "-"))) for line in lines]
     assert {line[0] for line in lines} == {"rigid", "contact"}
     assert len(shares) > 4
@@ -228,3 +229,13 @@ def test_contact_is_not_asked_for_without_its_block():
     with pytest.raises(ConfigError, match="contact"):
         run("rigid-only", "robustness.model=both")
     assert {row["model"] for row in run("rigid-only", "slope_deg=3", *FEW).summary["gaits"]} == {"rigid"}
+
+
+def test_the_terminal_shows_two_tables_and_the_rest_on_request(both):
+    shown, rest = answer("robustness", both.summary), further_tables("robustness", both.summary)
+    heads = [line for line in shown if line.startswith("model ")]
+    others = [line for line in rest if line.startswith("model ")]
+    assert (len(heads), len(others)) == (2, len(robustness_section.filled_tables(both.summary)) - 2)
+    assert others
+    assert not {*heads} & {*others}
+    assert shown[-1].startswith(f"The option -v shows {len(others)} more table")

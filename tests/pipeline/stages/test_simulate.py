@@ -1,20 +1,25 @@
 """The simulate stage: physical legs, what outputs ask for, and outcomes."""
 
 import json
+import math
+import re
 import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from walkerlab.config.ground import Footholds
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.hybrid import recorded_walk
+from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, simulate
+from walkerlab.scene.rigid import rigid_scene
 from walkerlab.views.report.answers import answer
 
 # design contract, section 4
@@ -217,3 +222,75 @@ def test_a_long_walk_needs_memory_for_its_steps_only():
     table = sum(variable.values.nbytes for variable in result["steps"].variables.values())
     # the table, its frozen copy, and the summary's lists; beside it, of the second walk, its table and lists
     assert peak < 5 * table
+
+
+def test_a_start_in_mid_step_is_walked_as_it_is():
+    summary = run(slope_rad=0.0525, start={"instant": "mid-step", "state": [0.0, 0.0, 2.0, -0.4]}).summary
+    assert summary["outcome"] == "walked"
+    assert summary["step_periods_s"][:3] == pytest.approx([0.417227, 0.747143, 0.722175], abs=1e-6)
+    assert summary["start_state"] == [0.0, 0.0, 2.0, -0.4]
+
+
+@pytest.mark.parametrize("name", ["paper", "torso", "kneed-round-feet"])
+def test_a_walk_goes_on_the_same_way_from_any_of_its_states_in_mid_step(name):
+    config = load(Path(name), ["strides=2"]).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    scene = rigid_scene(config, Footholds(), ("states",))
+    whole = scene.walk(tuple(gait["state"]), 3, EXACT_STEPS, sampled=True)
+    first = np.flatnonzero(whole.samples.time_s < whole.touch_time_s[0] - 1e-9)[1::9]
+    for place in (*first, first[-1]):
+        rest = scene.walk(tuple(whole.samples.state[place]), 3, EXACT_STEPS)
+        begun = whole.samples.time_s[place]
+        assert rest.touch_time_s + begun == pytest.approx(whole.touch_time_s, abs=1e-9)
+        assert np.diff(rest.touch_along_m) == pytest.approx(np.diff(whole.touch_along_m), abs=1e-9)
+        if whole.samples.bent[place]:
+            assert rest.knee_strike_time_s[0] + begun == pytest.approx(whole.knee_strike_time_s[0], abs=1e-9)
+        elif rest.knee_strike_time_s is not None:
+            assert np.isnan(rest.knee_strike_time_s[0])
+
+
+def test_a_start_in_mid_step_on_uneven_ground_is_judged_by_its_first_step():
+    midway = {"instant": "mid-step", "state": [0.0, 0.0, 2.0, -0.4]}
+    summary = run(slope_rad=0.0525, start=midway, ground={"heights_m": [0.0, -0.001, 0.001]}).summary
+    assert summary["outcome"] == "walked"
+
+
+SIMPLEST = {"type": "compass", "leg_length_m": 1.0, "foot_to_mass_m": 1e-9, "leg_mass_kg": 1e-9, "hip_mass_kg": 1.0}
+
+
+def test_a_walk_that_leaves_an_unstable_gait_says_so_and_shows_the_cycle_in_full_digits():
+    summary = run(
+        walker=SIMPLEST | {"foot_radius_m": 0.0},
+        gravity_m_s2=1.0,
+        slope_rad=0.018,
+        strides=100,
+        contact=None,
+        outputs=[],
+    ).summary
+    assert summary["repeats_after"] == 4
+    assert 20 < summary["leaves_gait_at"] < 80
+    right = [3.66771, 4.04720, 3.75628, 4.06775]
+    last = summary["step_periods_s"][-4:]
+    assert sorted(last) == pytest.approx(sorted(right), abs=1e-5)
+    errors = summary["numerical_error"]["of_steps"]["step_period_s"]
+    assert max(errors[-4:]) < 1e-8
+    assert max(errors) > 1e-3  # of the steps on which the walk leaves the gait
+    head = answer("simulate", summary)[0]
+    assert f"the last takes {last[-1]:.6f} s" in head
+    said = " ".join(answer("simulate", summary)[1:3])
+    assert "begins on an unstable gait and leaves it" in said
+    assert "In the end it repeats every 4 steps" in said
+
+
+def test_a_walk_that_settles_on_a_gait_of_two_steps_says_that_it_alternates():
+    summary = run(slope_rad=math.radians(4.7), strides=150, outputs=[]).summary
+    assert summary["repeats_after"] == 2
+    said = " ".join(answer("simulate", summary)[1:3])
+    assert re.search(
+        r"In the end it alternates between steps of 0\.(787082 and 0\.715713|715713 and 0\.787082) s", said
+    )
+
+
+def test_a_walk_on_a_stable_gait_leaves_none_and_repeats_every_step(paper):
+    assert (paper.summary["repeats_after"], paper.summary["leaves_gait_at"]) == (1, None)
+    assert "In the end" not in " ".join(answer("simulate", paper.summary))

@@ -117,7 +117,7 @@ def test_a_long_walk_is_a_few_short_lines(stage):
     assert lines[0].endswith("walks all 20000 steps; the last takes 0.7000 s and is 0.3700 m long.")
     assert max(map(len, lines)) <= 120
     assert len(lines) < 12
-    assert row(lines, "period (s)") == [*["0.7000"] * 6, "…", *["0.7000"] * 2]
+    assert row(lines, "period (s)") == [*["0.7000"] * 4, "…", *["0.7000"] * 6]
 
 
 def test_periods_and_lengths_have_the_digits_that_their_numerical_error_leaves():
@@ -226,8 +226,8 @@ def test_how_far_a_start_may_change_is_told_in_signs():
 
 
 def test_long_rows_keep_their_ends():
-    assert elide(list(range(12))) == list(range(12))
-    assert elide(list(range(100))) == [0, 1, 2, 3, 4, 5, "…", 98, 99]
+    assert elide(list(range(11))) == list(range(11))
+    assert elide(list(range(100))) == [0, 1, 2, 3, "…", 94, 95, 96, 97, 98, 99]
     (line,) = describe_summary({"values": list(range(1000))}, short=True)
     assert line.split()[:5] == ["values", "0", "1", "2", "3"]
     assert "(1000 values" in line

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 from walkerlab.config.fields import Block
 from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.reader import read
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import Config, state_of
 from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.tree import plain
 from walkerlab.config.walkers import has_knees
@@ -104,8 +104,7 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
     values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}
     values |= {path: attrgetter(path)(config) / factor for path, factor in changes.get("over", {}).items()}
     if "start" in changes or "slope" in changes:
-        state, rotation = config.start, config.slope_rad - slope
-        assert not isinstance(state, str), "the start is spelled out"
+        state, rotation = state_of(config.start), config.slope_rad - slope
         n = len(state) // 2
         values |= {"slope_rad": slope, "start": (*(x + rotation for x in state[:n]), *(start * x for x in state[n:]))}
     for path, value in values.items():

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from walkerlab.config.fields import Block, annotation_of
 from walkerlab.config.reads import RigidConfig
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import Config, MidStep, state_of
 from walkerlab.physics.orbits.similarity import Units
 
 B = TypeVar("B", bound=Block)
@@ -49,8 +49,10 @@ def scaled(config: Config, by: Units) -> Config:
         "push_off": scaled_block(config.push_off, by),
     }
     if not isinstance(config.start, str):
-        n = len(config.start) // 2
-        changes["start"] = (*config.start[:n], *(rate / by.time for rate in config.start[n:]))
+        state, n = state_of(config.start), len(config.start) // 2
+        values = (*state[:n], *(rate / by.time for rate in state[n:]))
+        midway = isinstance(config.start, MidStep)
+        changes["start"] = MidStep(instant="mid-step", state=values) if midway else values
     if config.contact is not None:
         si, pitch = config.contact.in_si(), config.contact.pad_pitch
         ground = {

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from walkerlab.config.reads import WalksConfig
+from walkerlab.config.schema import MidStep, state_of
 from walkerlab.config.stability import Case
 from walkerlab.evidence.verification.masses import RigidMasses
 from walkerlab.evidence.verification.momentum import MEASURE, momentum_finding
@@ -22,7 +23,7 @@ from walkerlab.physics.solvers.stepping import ACCEPTED, RHS
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_gait, contact_scene, start_state, wants_own_pitch
 from walkerlab.scene.parts import assembly_of
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import first_step_length, rigid_walker
 
 CENTRE_HEIGHT = 1  # index of the height of the centre of mass in the free walker's state
 STRIKE_TOLERANCE = 1e-9  # largest relative error of the conditions at a heel strike
@@ -154,7 +155,10 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
             return None
         state, length = as_state(gait.state), float(gait.step_length)
     else:
-        state, length = config.start, abs(float(swing_foot(walker, config.start)[1]))
+        state = as_state(state_of(config.start))
+        length = abs(float(swing_foot(walker, state)[1]))
+        if isinstance(config.start, MidStep):
+            length = first_step_length(config, state)
     if case.model == "rigid":
         speed = walker.leg_length * max(abs(rate) for rate in state[len(state) // 2 :])
         energy = float(walker.mass * (walker.gravity * walker.leg_length + 0.5 * speed**2))

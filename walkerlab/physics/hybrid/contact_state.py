@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.physics.ground.knees import FLEXED, extension
+from walkerlab.physics.ground.knees import FLEXED, extension, extension_rate
 from walkerlab.physics.ground.terrain import cell_at, has_ground_in_cell, starts_with_ground
 from walkerlab.physics.ground.walker import (
     BENT,
@@ -37,6 +37,8 @@ from walkerlab.physics.solvers.system import State
 
 # release of the trailing knee: not due, due when the leading foot stops sinking in, due when the push-off ends
 NOT_DUE, AT_COMPRESSION, AT_PULSE_END = range(3)
+STRAIGHT_KNEE = 1e-9  # rad or rad/s, largest difference between thigh and shank of a straight leg
+ON_GROUND = 1e-9  # largest difference between the feet's heights in leg lengths with both on the ground
 START_ROUNDING = 1e-14  # relative rounding error of a start's coordinates and velocities
 
 
@@ -72,10 +74,11 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
     feet, terrain = feet_motion(walker.whole, y), ground.terrain
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
+    sides, at_zero = initial_sides(walker, feet, stance, y)
     for foot in range(2):
         on_pad = has_ground_in_cell(int(cells[foot]))
-        has_ground[foot] = on_pad and starts_with_ground(terrain, foot == stance)
-    sides, at_zero = initial_sides(walker, feet, stance, y)
+        coming_down = sides[foot * PER_FOOT + HEIGHT] > 0 and (sides[PASSING] > 0) == (foot == 1)
+        has_ground[foot] = on_pad and (starts_with_ground(terrain, foot == stance) or coming_down)
     return WalkState(
         ground=ground,
         touch_time=np.zeros(steps),
@@ -101,12 +104,19 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
 
 
 def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.int8]:
-    """Return the state of each knee (2,) at the start: locked in the stance leg, released or bent in the swing leg."""
-    knee = np.full(2, RELEASED, np.int8)
+    """Return the state of each knee (2,) at the start: locked in the stance leg, released or bent in the swing leg.
+
+    A straight swing leg whose foot is not on the ground is in the part of its swing after its knee has locked.
+    """
+    knee, swing, whole = np.full(2, RELEASED, np.int8), 1 - stance, walker.whole
     if walker.kneed:
         knee[stance] = LOCKED
-        if extension(walker.whole, 1 - stance, y) < -FLEXED:
-            knee[1 - stance] = BENT
+        if extension(whole, swing, y) < -FLEXED:
+            knee[swing] = BENT
+        straight = max(abs(extension(whole, swing, y)), abs(extension_rate(whole, swing, y))) < STRAIGHT_KNEE
+        heights = [foot.height for foot in feet_motion(whole, y)]
+        if straight and abs(heights[0] - heights[1]) > ON_GROUND * abs(whole.foot_y[0]).max():
+            knee[swing] = LOCKED
     return knee
 
 

@@ -14,7 +14,9 @@ from walkerlab.physics.hybrid.rigid_walk import (
     EVENTS,
     LONGEST_SWING,
     SHORTEST_LANDING,
+    STRAIGHT_KNEE,
     hip_above_fall,
+    knee_angle,
     new_heel_strikes,
     walk,
 )
@@ -41,6 +43,7 @@ from walkerlab.physics.solvers.system import State
 STEPS_AT_ONCE = 64
 BUDGET_OF_A_STEP = 50_000  # evaluations of the right-hand side; the tightest tolerance needs about 700
 MAX_FRICTION = 1.0  # friction coefficient, about as for rubber on dry concrete
+ON_GROUND = 1e-9  # height in leg lengths up to which the swing foot starts on the ground
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 
@@ -133,6 +136,10 @@ def take_walk(
     if rises.any():
         judged_by = abs(swing_foot(walker, start)[1]) if step_length is None else step_length
         recorder.nearest = SHORTEST_LANDING * judged_by
+    height = swing_foot(walker, start)[0]
+    if abs(height) > ON_GROUND * walker.leg_length:  # a start in mid-step, where no foot leaves the ground
+        rises[0] = -height
+        recorder.locked = walker.kneed and is_straight(walker, start)
     if hip_above_fall(walker, start) < 0.0:
         return recorder.finished(Outcome.REJECTED)
     status = Outcome.WALKED
@@ -144,6 +151,12 @@ def take_walk(
     return recorder.finished(status)
 
 
+def is_straight(walker: RigidModel, start: State) -> bool:
+    """Whether thigh and shank of the swing leg have the same angle and rate."""
+    knees = (knee_angle(walker, start, first) for first in (0, len(start) // 2))
+    return all(abs(knee) < STRAIGHT_KNEE for knee in knees)
+
+
 class Recorder:
     """Recorder of a walk, which simulates blocks of steps and accumulates their records."""
 
@@ -153,6 +166,7 @@ class Recorder:
         self.start = self.state = start
         self.heights: Array | None = None
         self.nearest = 0.0
+        self.locked = False  # whether the swing leg's knee is locked from the start
         self.time, self.steps, self.grid_index = 0.0, 0, 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS, len(walker.zero_state))
@@ -173,6 +187,8 @@ class Recorder:
         if self.sampled:  # enough samples for the longest steps
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
+        if self.locked and self.steps == 0:
+            seen.knee_time[0] = -1.0
         observer = new_observer(times, self.numbers)
         clear_counts(self.method)
         self.method.counts[BUDGET] = min(steps * BUDGET_OF_A_STEP, self.budget - int(self.counts[RHS]))
@@ -188,7 +204,7 @@ class Recorder:
         for name in ("strike_loss", "forward_work", "energy_integral", "duration"):
             total[name] += part[name]
         strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
-        knees = seen.knee_time + self.time
+        knees = np.where(seen.knee_time < 0.0, np.nan, seen.knee_time + self.time)
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
         for blocks, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
@@ -239,8 +255,8 @@ class Recorder:
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
         state = np.concatenate((observer.states[:count][kept], before, after))
         step = np.concatenate((self.steps + observer.steps[:count][kept], swing, swing + 1))
-        # a knee that has not struck yet is free
-        until = np.append(np.where(knees > self.time, knees, np.inf), np.inf)
+        # a knee that has not struck yet is free, unless it is locked from the start
+        until = np.append(np.where(np.isnan(knees), -np.inf, np.where(knees > self.time, knees, np.inf)), np.inf)
         bent = time < until[step - self.steps] if self.kneed else np.zeros(time.size, np.bool_)
         order = np.argsort(time)
         return Samples(time[order], state[order], step[order], bent[order])

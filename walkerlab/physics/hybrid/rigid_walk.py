@@ -55,6 +55,7 @@ SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground 
 # fraction of a swing's first solver step at which the search for a knee strike starts; before 1e-9, rounding makes a
 # straight knee at rest cross zero
 SEARCH_START = 1e-6
+STRAIGHT_KNEE = 1e-9  # rad or rad/s, largest difference between thigh and shank of a straight leg
 # event functions, rows of the finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
 LEG_RATE = 4  # row of the legs' relative angular velocity, not an event
@@ -144,7 +145,8 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
     fall, knee_strike = first_crossing(finder, HIP_FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
-        knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if at_start else 0.0, at_start)
+        straight = at_start and abs(finder.values[KNEE, 0]) < STRAIGHT_KNEE
+        knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if straight else 0.0, straight)
     return strike, fall, knee_strike
 
 
@@ -158,7 +160,7 @@ def take_step(
     returns its outcome and the time at which it ended. The time of a knee strike is written into `strikes`.
     """
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
-    phase = BENT if model.shank != NO_SHANK else STRAIGHT
+    phase = BENT if model.shank != NO_SHANK and strikes.knee_time[step] >= 0.0 else STRAIGHT
     behind, rise = -strikes.rise[step], strikes.rise[step + 1]
     while True:
         system = Mode(model, phase, behind, rise)
@@ -271,7 +273,8 @@ class HeelStrikes(NamedTuple):
     time: Any  # (steps,) s
     before: Any  # (steps, m) states just before the strikes
     after: Any  # (steps, m) states just after the strikes, with the legs' roles exchanged
-    knee_time: Any  # (steps,) s, times of the knee strikes; empty without knees
+    # (steps,) s, times of the knee strikes; input: negative if a knee is locked from the start; empty without knees
+    knee_time: Any
     rise: Any  # (steps + 1,) m, input: rise of each foothold from the one before, beginning with the present foothold
     nearest: float  # m, a foot that lands less than this ahead of the stance foot ends the walk; 0 on even ground
     lift: Any  # (steps + 1, columns) m, input: derivative of each rise in each column's direction

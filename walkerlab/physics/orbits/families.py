@@ -89,6 +89,11 @@ class GaitBranch:
         return np.array([point.value for point in self.points])
 
     @property
+    def reach(self) -> float:
+        """Distance that the parameter covers along the branch."""
+        return float(np.abs(np.diff(self.values)).sum())
+
+    @property
     def stable_ranges(self) -> tuple[tuple[float, float], ...]:
         stretches: list[list[float]] = []
         values = [self.ends[0].value]  # values on the current stable stretch
@@ -153,8 +158,7 @@ class BranchFollower:
                 continue
             gait = start.evaluated.data
             like = [branch for branch in branches if branch.period == seed.steps]
-            sooner = any(np.abs(step.z - gait.z).max() < SAME_STATE for step in gait.steps[:-1])
-            if sooner or any(self.lies_on(branch, gait) for branch in like):
+            if steps_to_repeat(gait) < seed.steps or any(self.lies_on(branch, gait) for branch in like):
                 continue
             rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
             branch_ahead = self.trace(rising, seed.steps)
@@ -167,9 +171,10 @@ class BranchFollower:
                     (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
                     (*reversed(behind.crossings), *branch_ahead.crossings),
                 )
-            # `lies_on` misses gaits between a branch's flip and first point, so look for that point on the new branch
-            if not any(self.lies_on(branch_ahead, branch.points[0]) for branch in like):
-                branches.append(branch_ahead)
+            # `lies_on` misses gaits beyond a branch's ends, so look for the branch's own gaits on the new one
+            within = [branch for branch in like if self.covers(branch_ahead, branch)]
+            if all(branch.reach < branch_ahead.reach and branch not in previous for branch in within):
+                branches = [*(branch for branch in branches if branch not in within), branch_ahead]
         for branch in branches:  # the list grows during the loop
             if 2 * branch.period <= periods and branch not in previous:
                 branches.extend(self.follow_doubled(branch, branches))
@@ -191,6 +196,12 @@ class BranchFollower:
                 return True
         return False
 
+    def covers(self, branch: GaitBranch, other: GaitBranch) -> bool:
+        """Whether a gait well inside another branch, a quarter of the way along it, lies on a branch."""
+        # half of the way along may be a fold, near which gaits of both arms are hardly distinct
+        covered = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
+        return self.lies_on(branch, other.points[int(np.searchsorted(covered, 0.25 * other.reach))])
+
     def follow_doubled(self, parent: GaitBranch, previous: Iterable[GaitBranch]) -> list[GaitBranch]:
         branches: list[GaitBranch] = []
         for flip in parent.bifurcations:
@@ -202,7 +213,8 @@ class BranchFollower:
             if start is not None:
                 branch = self.trace(start, 2 * parent.period)
                 first = BranchEnd(flip.value, f"flip of the gait of {parent.period} {steps_word(parent.period)}")
-                branches.append(replace(branch, ends=(first, branch.ends[1])))
+                if not any(self.covers(other, branch) for other in like):
+                    branches.append(replace(branch, ends=(first, branch.ends[1])))
         return branches
 
     def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
@@ -258,13 +270,20 @@ class BranchFollower:
         first = BranchEnd(points[0].value, end.reason if end.reason == CLOSED_LOOP else "start")
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
-    def multiplier_check(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
-        """Return a check that multipliers near the unit circle move little, so that no pair of crossings is missed."""
+    def check_after(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
+        """Return a check of the next point: multipliers near the unit circle move little, and all steps are needed."""
+        # A pair of crossings is missed if multipliers move far. A gait of fewer steps solves the equations too, and a
+        # long step may reach it. Its branch meets this one only at a flip, where a multiplier of the cycle is 1.
         critical = [m for m in last.evaluated.data.multipliers if 1.0 / CRITICAL_RANGE < abs(m) < CRITICAL_RANGE]
 
         def near(point: CurvePoint[Cycle]) -> bool:
-            after = point.evaluated.data.multipliers
-            return all(min(abs(m - new) for new in after) < MAX_MULTIPLIER_CHANGE for m in critical)
+            gait = point.evaluated.data
+            moves = (min(abs(m - new) for new in gait.multipliers) for m in critical)
+            if any(move >= MAX_MULTIPLIER_CHANGE for move in moves):
+                return False
+            repeats_after = steps_to_repeat(gait)
+            at_flip = bool(np.abs(gait.multipliers - 1.0).min() < MAX_MULTIPLIER_CHANGE)
+            return repeats_after == len(gait.steps) or (2 * repeats_after == len(gait.steps) and at_flip)
 
         return near
 
@@ -273,7 +292,7 @@ class BranchFollower:
     ) -> tuple[CurvePoint[Cycle], float, BranchEnd | None] | BranchEnd:
         """Return the next point, step length and, if reached, the branch's end; only the end if no point follows."""
         # A step out of the span is cut at its edge, because there may be no walker beyond.
-        ahead, acceptable = last.x + step * last.tangent, self.multiplier_check(last)
+        ahead, acceptable = last.x + step * last.tangent, self.check_after(last)
         edge = self.span.nearest(equations.value(ahead))
         if edge != equations.value(ahead):
             if abs(edge - equations.value(last.x)) <= EDGE_TOLERANCE * self.span.size:
@@ -322,6 +341,11 @@ def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float
 
 def steps_word(n: int) -> str:
     return "step" if n == 1 else "steps"
+
+
+def steps_to_repeat(gait: Cycle) -> int:
+    """Return the number of steps after which a gait repeats, a divisor of the number of steps that it has."""
+    return next(n for n, step in enumerate(gait.steps, 1) if np.abs(step.z - gait.z).max() < SAME_STATE)
 
 
 def half_cycle_difference(gait: Cycle) -> Floats:

@@ -15,9 +15,9 @@ Transactions on Robotics 23 (2007).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,13 @@ from walkerlab.physics.solvers.system import Floats
 
 Disturbance = Literal["floor-drop", "hip-push"]
 DISTURBANCES: tuple[Disturbance, ...] = ("floor-drop", "hip-push")
+LARGEST: Final[Mapping[str, tuple[Disturbance, float]]] = {
+    "largest_step_down_m": ("floor-drop", 1.0),
+    "largest_step_up_m": ("floor-drop", -1.0),
+    "largest_push_forward_N_s": ("hip-push", 1.0),
+    "largest_push_backward_N_s": ("hip-push", -1.0),
+}
+"""Disturbance and sign of each largest disturbance that a gait survives."""
 INDICATORS = ("step_period", "step_length", "speed")
 DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks
 CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
@@ -124,24 +131,31 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
     return None if norm is None else (norm, D[0])
 
 
-def largest_survived(stands: Callable[[float], bool], unit: float) -> float:
+def largest_survived(stands: Callable[[float], bool], unit: float, width: float = BISECTION_WIDTH) -> float:
     """Return the size up to which every disturbance is survived, at most MAX_DISTURBANCE times `unit`."""
     steps = round(MAX_DISTURBANCE / SEARCH_GRID)
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
     if low == steps:
         return MAX_DISTURBANCE * unit
     below, above = low * SEARCH_GRID * unit, (low + 1) * SEARCH_GRID * unit
-    while above - below > BISECTION_WIDTH * unit:
+    while above - below > width * unit:
         middle = 0.5 * (below + above)
         below, above = (middle, above) if stands(middle) else (below, middle)
     return below
 
 
-def largest_disturbance(gait: GaitOnMap, disturbance: Disturbance, sign: float, steps: int) -> float:
+def largest_disturbance(
+    gait: GaitOnMap, disturbance: Disturbance, sign: float, steps: int, width: float = BISECTION_WIDTH
+) -> float:
+    """Return the largest disturbance of one sign after which a walk takes `steps` steps.
+
+    width  accuracy, as a multiple of `unit_of`
+    """
+
     def stands(size: float) -> bool:
         return walk_disturbed(gait, disturbance, sign * size, steps + 1).outcome is Outcome.WALKED
 
-    return largest_survived(stands, gait.unit_of(disturbance))
+    return largest_survived(stands, gait.unit_of(disturbance), width)
 
 
 def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], most: int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
@@ -26,7 +26,7 @@ from walkerlab.physics.orbits.design import (
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.gradients import gait_quantities
 from walkerlab.physics.orbits.newton import Effort, NotConverged
-from walkerlab.physics.orbits.robustness import GaitOnMap
+from walkerlab.physics.orbits.robustness import LARGEST, GaitOnMap, largest_disturbance
 from walkerlab.physics.orbits.step_map import gait_near, multipliers_of
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
@@ -39,6 +39,9 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
 
 SOLVED: Final = Effort(1e-10)
+DIFFERENCE: Final = 5e-3  # gap of the difference quotients of largest disturbances, as a fraction of the bounds' range
+FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances, so that searches are not lost in its noise
+ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
 MEETING: Final = 1e-3  # gap between the magnitudes of the two largest multipliers below which they count as meeting
 LABELS: Final = {
     "to": Label("", "parameter of the config"),
@@ -88,6 +91,8 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     assert best.point is not None
     ends = count_optima(question, searches)
     start = {} if own_gait is None else {"start_value": own_gait.numbers[quantity], "start": dict(own_gait.numbers)}
+    progress.start("design: robustness at the start and at the optimum")
+    robust = {"start": {} if own_gait is None else gaits.robustness_at(own), "best": gaits.robustness_at(best.x)}
     # 12 digits, so that a bound appears as typed
     optimum = {key: float(f"{value:.12g}") for key, value in zip(design.over, best.x, strict=True)}
     answer = {
@@ -109,6 +114,9 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
         "optima": ends,
         "starts": design.starts,
         "multipliers_meet": best.point.apart < MEETING,
+        "robustness": [
+            {"quantity": name, **{place: of[name] for place, of in robust.items() if name in of}} for name in ROBUSTNESS
+        ],
     }
     rows = [
         {"to": key, "start": float(begins), "best": value}
@@ -162,7 +170,13 @@ class Gaits:
         progress: Progress,
     ) -> None:
         self.config, self.model, self.parameters, self.progress = config, design.model, parameters, progress
-        self.wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
+        wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
+        self.wanted, self.largest, self.steps = (
+            wanted - LARGEST.keys(),
+            wanted & LARGEST.keys(),
+            config.robustness.steps,
+        )
+        self.gaps = [DIFFERENCE * (high - low) for low, high in design.over.values()]
         self.counts = np.zeros(2, int)  # numbers of evaluations: all, and those without a gait
         self.sections: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
         self.length = float(gait["step_length_m"])
@@ -194,14 +208,16 @@ class Gaits:
             return None
         standpoint, numbers = match
         self.z, subject, by_key = standpoint.z, replace(subject, z=standpoint.z), []
-        for parameter in self.parameters:
+        numbers |= self.largest_disturbances(subject, self.largest)
+        for parameter, gap in zip(self.parameters, self.gaps, strict=True):
             of_key = subject.gradients(parameter, self.wanted)
             if any(name not in of_key for name in self.wanted):
                 return None
-            by_key.append({name: of_key[name].value or 0.0 for name in self.wanted})
+            smooth = {name: of_key[name].value or 0.0 for name in self.wanted}
+            by_key.append(smooth | self.differentiate_largest(subject, numbers, parameter, gap))
         moduli = np.sort(np.abs([value for value in multipliers_of(standpoint.A) if value.imag >= 0.0]))
         apart = float(moduli[-1] - moduli[-2]) if moduli.size > 1 else 1.0
-        gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in self.wanted}
+        gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in (*self.wanted, *self.largest)}
         return Point(numbers, gradients, apart)
 
     def near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
@@ -212,3 +228,40 @@ class Gaits:
         standpoint = standpoint_before._replace(z=cycle.z, A=cycle.DP)
         numbers = gait_quantities(standpoint, self.wanted)
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (standpoint, numbers)
+
+    def largest_disturbances(self, subject: ModelUnderTest, names: Collection[str]) -> dict[str, float]:
+        """Find the largest disturbances that a gait survives, by the names of `LARGEST`."""
+        gait = subject.at(exact=False)
+        return {name: largest_disturbance(gait, *LARGEST[name], self.steps, FINE_WIDTH) for name in names}
+
+    def differentiate_largest(
+        self, subject: ModelUnderTest, numbers: Mapping[str, float], parameter: Parameter, gap: float
+    ) -> dict[str, float]:
+        """Differentiate the largest disturbances by a parameter, from gaits at values `gap` below and above.
+
+        If there is no gait on one side, the difference to the gait in the middle is taken.
+        """
+        if not self.largest:
+            return {}
+        places = {0.0: numbers}
+        for off in (-gap, gap):
+            changed = parameter.config_at(subject.config, parameter.value_in(subject.config) + off)
+            beside = None if changed is None else replace(subject, config=changed)
+            match = None if beside is None else self.near(beside.at(), subject.z)
+            if beside is not None and match is not None:
+                places[off] = self.largest_disturbances(replace(beside, z=match[0].z), self.largest)
+        first, last = min(places), max(places)
+        return {
+            name: (places[last][name] - places[first][name]) / (last - first) if last > first else 0.0
+            for name in self.largest
+        }
+
+    def robustness_at(self, x: Floats) -> dict[str, float]:
+        """Return the quantities of `ROBUSTNESS` at parameter values with a gait; empty if the gait is unstable."""
+        config = config_with(self.config, self.parameters, x.tolist())
+        assert config is not None, "a walker with a gait is valid"
+        subject = ModelUnderTest(self.model, config, self.sections[x.tobytes()], self.length)
+        numbers = gait_quantities(subject.at(), ROBUSTNESS) or {}
+        if ROBUSTNESS[0] not in numbers:
+            return {}
+        return {ROBUSTNESS[0]: numbers[ROBUSTNESS[0]], **self.largest_disturbances(subject, LARGEST)}

@@ -63,7 +63,7 @@ def advice(config: RigidConfig) -> str:
     """Return advice for a slope without a gait."""
     walk_anyway = (
         f"to walk on this slope anyway, give a start state (start: [{', '.join(state_names(config))}]), and "
-        "for the contact model a pad pitch (contact.pad_pitch: a number)"
+        "for the contact model's pads their pitch (contact.pad_pitch: a number)"
     )
     drives = "push_off.impulse_N_s or walker.hip.torque_N_m"
     if config.push_off.impulse_N_s or config.walker.hip.torque_N_m:

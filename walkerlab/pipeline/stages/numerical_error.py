@@ -1,6 +1,7 @@
 """Numerical error of a walk: the change of its quantities at tighter tolerances."""
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from walkerlab.labels import ERROR_OF_EACH_STEP
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
+from walkerlab.physics.solvers.system import Floats
 
 LEAST_RTOL: Final = 1e-14  # minimum that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
@@ -17,6 +19,7 @@ USUAL: Final = TIGHTER[100.0]
 ROUNDING: Final = 1e-6  # relative rounding error allowed in a divided tolerance
 
 Summary = Mapping[str, Any]
+Values = Sequence[float | None]
 
 
 def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tolerances], Summary]) -> dict[str, Any]:
@@ -27,8 +30,9 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
     walk        repeats the walk with other tolerances and returns its summary
 
     Returns the largest change of each step quantity, named as in `ERROR_OF_EACH_STEP`, the change of `end_time_s` (s)
-    and, for a driven walk, the change of `cost_of_transport`. `by` describes the tighter settings unless they are the
-    usual ones. If the two walks end differently, only `reason` is returned.
+    and, for a driven walk, the change of `cost_of_transport`; `of_steps` has the largest changes up to each step. `by`
+    describes the tighter settings unless they are the usual ones. If the two walks end differently, only `reason` is
+    returned.
     """
     tighter, by = tightened(tolerances)
     return change(first, walk(tighter), by)
@@ -50,17 +54,48 @@ def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
     if (first["outcome"], first["steps"]) != (again["outcome"], again["steps"]):
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
         return {"reason": f"with {by} the walk ends differently: {again['outcome']} after {steps}"}
-    changes = {}
+    changes: dict[str, Any] = {}
+    of_steps, later = dict[str, list[float | None]](), steps_later(first, again)
     for key, name in ERROR_OF_EACH_STEP.items():
-        both = zip(first.get(key) or (), again.get(key) or (), strict=False)  # the last foot may not have lifted
-        apart = [abs(before - after) for before, after in both if before is not None and after is not None]
-        if apart and any(first[key]):  # skip a list of zeros, such as the rolling of point feet
-            changes[name] = max(apart)
+        apart = step_changes(first.get(key) or (), again.get(key) or (), first.get("repeats_after") or 0, later)
+        if np.isfinite(apart).any() and any(first[key]):  # skip a list of zeros, such as the rolling of point feet
+            changes[name] = float(np.nanmax(apart))
+            of_steps[name] = [None if math.isnan(error) else float(f"{error:.2g}") for error in apart.tolist()]
     changes["end_time_s"] = abs(first["end_time_s"] - again["end_time_s"])
     # a passive walk's cost of transport is always the sine of the slope, so its change says nothing about the error
     if any(work for giver, work in first.get("work_per_step_J", {}).items() if giver != "gravity"):
         changes["cost_of_transport"] = abs(first["cost_of_transport"] - again["cost_of_transport"])
+    changes |= {"of_steps": of_steps} if of_steps else {}
     return changes if by == USUAL else {**changes, "by": by}
+
+
+def steps_later(first: Summary, again: Summary) -> int | None:
+    """Return how many steps later a repeated walk takes the steps that both repeat in the end; None if they do not."""
+    period = first.get("repeats_after") or 0
+    if not period or again.get("repeats_after") != period:
+        return None
+    cycle, other = (np.array(walk["step_periods_s"][-period:]) for walk in (first, again))
+    return min(range(period), key=lambda steps: float(np.abs(np.roll(other, -steps) - cycle).max()))
+
+
+def step_changes(first: Values, again: Values, period: int, later: int | None) -> Floats:
+    """Return the largest change of the values (steps,) up to each step; NaN where a walk has no value.
+
+    period, later  steps after which both walks repeat, and how many steps later the second one takes the same steps
+
+    Rounding decides with which step a walk begins to repeat itself, so a walk that has settled is compared with the
+    same step of the cycle, however many steps later it comes.
+    """
+    count = min(len(first), len(again))
+    values, others = (np.array(each[:count], float) for each in (first, again))
+    apart = np.abs(values - others)
+    largest = np.where(np.isnan(apart), np.nan, np.fmax.accumulate(apart))
+    if later is None or count < 2 * period:
+        return largest
+    end, steps = count - 1 - later, np.arange(count)
+    last = end - (end - steps) % period  # the last such step with a partner
+    of_cycle = np.abs(values - values[last]) + np.abs(values[last] - others[last + later])
+    return np.asarray(np.fmin(largest, of_cycle))
 
 
 def evenly_spread(count: int, wanted: int) -> list[int]:

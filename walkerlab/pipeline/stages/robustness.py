@@ -26,6 +26,7 @@ from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, RigidMap
 from walkerlab.physics.orbits.robustness import (
     DISTURBANCES,
     INDICATORS,
+    LARGEST,
     GaitOnMap,
     largest_disturbance,
     rough_walks,
@@ -204,10 +205,9 @@ def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
 
 def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """Yield the work units that search for the largest floor drop and hip push, each in both directions."""
-    for disturbance in DISTURBANCES:
-        for sign in (1.0, -1.0):
-            run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
-            yield WorkUnit(f"{subject.model} {disturbance} {sign:g}", 1, run)
+    for disturbance, sign in LARGEST.values():
+        run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
+        yield WorkUnit(f"{subject.model} {disturbance} {sign:g}", 1, run)
 
 
 def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:

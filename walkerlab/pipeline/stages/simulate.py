@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.config.reads import SimulateConfig
+from walkerlab.config.schema import MidStep
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.pipeline.progress import Progress
@@ -23,11 +24,11 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
     scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
     (length, start), steps = rigid_start(config, inputs), 2 * config.strides
-    of_gait = length if "fixedpoint" in inputs else None
+    reference = length if "fixedpoint" in inputs or isinstance(config.start, MidStep) else None
 
     def walk(tolerances: Tolerances, sampled: bool) -> RigidWalkResult:
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
-        return scene.walk(start, steps, tolerances, sampled, progress.advance, of_gait)
+        return scene.walk(start, steps, tolerances, sampled, progress.advance, reference)
 
     of_scene, of_config = partial(groups, scene), partial(summary, config)
     return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)

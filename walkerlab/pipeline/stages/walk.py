@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from walkerlab.config.reads import SceneConfig, SimulateConfig
+from walkerlab.config.schema import MidStep, state_of
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
@@ -20,17 +21,24 @@ from walkerlab.physics.energy_channels import SAMPLED
 from walkerlab.physics.hybrid.recorded_walk import as_state
 from walkerlab.physics.hybrid.walk_record import WalkRecord
 from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.physics.solvers.system import State
+from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.numerical_error import numerical_error
 from walkerlab.pipeline.store.columns import labelled, numbered
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.footholds import UNEVEN
+from walkerlab.scene.rigid import first_step_length
 
 FIRST_STEPS, LAST_STEPS = 200, 20
 """Numbers of first and last steps of a walk for which every sample is stored."""
 MAX_BETWEEN = 50_000
 """Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
+MIN_REPEATED, MAX_REPEATED = 4, 32
+"""Numbers of steps at the end of a walk that may repeat: minimum, and maximum unless a quarter of the walk is more."""
+REPEATED, SETTLED = 1e-5, 1e-2
+"""Largest difference between steps that repeat, relative to the first step, and relative to the spread of the steps."""
+ON_GAIT, OFF_GAIT = 1e-6, 1e-2
+"""Relative differences from the first step, in period or length, of steps on the same gait and of steps off it."""
 STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
 OF_STEPS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
@@ -85,11 +93,13 @@ def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Conte
     """Return the reference step length (m) and the rigid start state, from the config or the gait."""
     if "fixedpoint" in inputs:
         gait = inputs["fixedpoint"].summary
-        state = gait["state"] if config.start == "fixed-point" else config.start
+        state = gait["state"] if config.start == "fixed-point" else state_of(config.start)
         return float(gait["step_length_m"]), as_state(state)
     if config.start == "fixed-point":
         raise ValueError("neither a start state nor a fixed point")
-    state = as_state(config.start)
+    state = as_state(state_of(config.start))
+    if isinstance(config.start, MidStep):
+        return first_step_length(config, state), state
     return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
 
 
@@ -212,6 +222,35 @@ def driven_by(walk: WalkRecord) -> dict[str, Any]:
     return {"work_per_step_J": driven.per_step(walk.steps), "cost_of_transport": driven.cost_of_transport(distance)}
 
 
+def settling(walk: WalkRecord) -> dict[str, int | None]:
+    """Return how a walk on even ground settles.
+
+    repeats_after  steps after which the last steps repeat, 0 if they do not
+    leaves_gait_at  number of the step with which a walk leaves a gait on which it begins; None if it does not
+    """
+    if walk.steps < MIN_REPEATED or walk.foothold_height_m is not None:
+        return {"repeats_after": 0, "leaves_gait_at": None}
+    steps = np.column_stack((walk.periods_s / walk.periods_s[0], walk.lengths_m / walk.lengths_m[0]))
+    off = np.abs(steps - 1.0).max(axis=1)
+    left = np.flatnonzero(off > OFF_GAIT)
+    on_gait = off[1] < ON_GAIT
+    return {
+        "repeats_after": steps_to_repeat(steps[-max(MAX_REPEATED, walk.steps // 4) :]),
+        "leaves_gait_at": int(left[0]) + 1 if on_gait and left.size else None,
+    }
+
+
+def steps_to_repeat(steps: Floats) -> int:
+    """Return the number of steps after which quantities of steps (steps, n), relative to 1, repeat; 0 if never."""
+    spread = np.ptp(steps, axis=0).max()
+    for period in range(1, len(steps) // 2 + 1):
+        apart = np.abs(steps[period:] - steps[:-period]).max()
+        # a walk that settles slowly, from side to side, almost repeats after two steps
+        if apart < REPEATED and (period == 1 or apart < SETTLED * spread):
+            return period
+    return 0
+
+
 def numbers_of(walk: WalkRecord) -> dict[str, Any]:
     """Summarise a walk of either model; knee strikes only for walkers with knees."""
     strikes = walk.knee_strike_time_s
@@ -226,6 +265,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "step_lengths_m": walk.lengths_m.tolist(),
         "touch_times_s": walk.touch_time_s.tolist(),
         **knee_strikes,
+        **settling(walk),
         **driven_by(walk),
         "end_time_s": walk.end_time_s,
         "rhs_evaluations": walk.work.rhs_evaluations,

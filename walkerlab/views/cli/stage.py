@@ -11,7 +11,7 @@ from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
 from walkerlab.pipeline.runner import Options, StageReport
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
-from walkerlab.views.report.answers import answer, verdict
+from walkerlab.views.report.answers import answer, further_tables, verdict
 from walkerlab.views.report.tables import aligned
 
 SEARCHING = ("fixedpoint", "report")
@@ -59,7 +59,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     if report.artifact is None:
         return [f"{report.stage}: no result", *omission_lines(request, report)]
     # if there is no answer, its reason and advice are printed only once, as the error
-    separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice")
+    separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice", "reason")
     own = {key: value for key, value in report.summary.items() if key not in separate}
     if "html" in own:
         page = (report.run_dir / str(own["html"])).resolve()
@@ -70,6 +70,8 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
     else:
         answers = answer(report.stage, own)
+        if request.verbose:
+            answers += further_tables(report.stage, own)
         # an artifact without an answer is stored too, but is not worth pointing to
         lines = [*answers, *([""] if answers else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE:

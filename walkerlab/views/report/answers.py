@@ -26,8 +26,10 @@ Summary = Mapping[str, Any]
 Answer = Callable[[Summary], Sequence[str | Table]]
 """Function that returns the paragraphs and tables of an answer."""
 
-FIRST_VALUES = 6
-"""Number of values shown at the start of a long row."""
+FIRST_VALUES, LAST_VALUES = 4, 6
+"""Numbers of values shown at the start and at the end of a long row."""
+MAX_CYCLE = 12
+"""Maximum number of steps of a cycle whose periods a sentence lists."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
@@ -54,6 +56,15 @@ def answer_html(stage: str, summary: Summary) -> str:
     )
 
 
+def further_tables(stage: str, summary: Summary) -> list[str]:
+    """Return lines that complete an answer, as `--verbose` shows them; empty if the answer is complete."""
+    if stage != "robustness" or not summary:
+        return []
+    from walkerlab.views.report.sections import robustness
+
+    return ["", *lay_out(robustness.filled_tables(summary)[robustness.FIRST_TABLES :])]
+
+
 def lay_out(blocks: Iterable[str | Table]) -> list[str]:
     lines: list[str] = []
     after_table = False
@@ -71,7 +82,7 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     """Describe the gait, with both sets of equations side by side if their displayed digits differ."""
     slope = f"{number(summary['slope_rad'])} rad ({number(math.degrees(summary['slope_rad']), 3)}°)"
     if "state" not in summary:
-        return [f"No gait on a slope of {slope}: {summary['reason']}."]
+        return [f"No gait on a slope of {slope}: {summary['reason']}."] if "reason" in summary else []
     driven = f", driven by {join_words(summary['driven_by'])}," if summary.get("driven_by") else ""
     driven += f"{'' if driven else ','} with {join_words(summary['springs'])}," if summary.get("springs") else ""
     head = (
@@ -127,6 +138,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
     error, advised = summary.get("numerical_error"), summary.get("advice") and summary["outcome"] != WALKED_LABEL
     return [
         f"{head}.",
+        words("walks.settling", summary, cycle(summary)),
         side_by_side("", columns, step_rows, head="step"),
         side_by_side("", WALK_ROWS, {"": summary}, head=""),
         f"numerical error: {describe_error(error)}." if error else "",
@@ -142,7 +154,7 @@ def each_step(summary: Summary) -> dict[str, Summary]:
     every = {key: values for key in STEP_HEADS if (values := summary.get(key))}
     return {
         str(place): {
-            key: "…" if place == "…" else format_step(values[place - 1], key, summary)
+            key: "…" if place == "…" else format_step(place - 1, key, summary)
             for key, values in every.items()
             if place == "…" or place <= len(values)
         }
@@ -150,11 +162,21 @@ def each_step(summary: Summary) -> dict[str, Summary]:
     }
 
 
+def cycle(summary: Summary) -> list[str]:
+    """Format the periods of the steps that a walk repeats in the end, in order of their lengths; empty for one step."""
+    from walkerlab.views.report.sections.walks import format_step
+
+    steps, period = summary["steps"], summary.get("repeats_after") or 0
+    if not 1 < period <= MAX_CYCLE:
+        return []
+    return [format_step(place, "step_periods_s", summary) for place in range(steps - period, steps)]
+
+
 def elide(values: Sequence[Any]) -> list[Any]:
     """Replace the middle of a long row by '…'."""
-    if len(values) <= 2 * FIRST_VALUES:
+    if len(values) <= FIRST_VALUES + LAST_VALUES + 1:
         return list(values)
-    return [*values[:FIRST_VALUES], "…", *values[-2:]]
+    return [*values[:FIRST_VALUES], "…", *values[-LAST_VALUES:]]
 
 
 def tune(summary: Summary) -> list[str | Table]:
@@ -214,7 +236,10 @@ def starts(summary: Summary) -> list[str | Table]:
 def robustness_answer(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections import robustness
 
-    return [*robustness.findings(summary), *robustness.tables(summary)]
+    tables = robustness.filled_tables(summary)
+    more = len(tables) - robustness.FIRST_TABLES
+    tail = f"The option -v shows {count(more, 'more table')}." if more > 0 else ""
+    return [*robustness.findings(summary), *tables[: robustness.FIRST_TABLES], tail]
 
 
 def best_walker(summary: Summary) -> list[str | Table]:

@@ -46,9 +46,16 @@ ERRORS = {
 """Text and unit of each quantity that has a numerical error."""
 
 
+MUCH_SMALLER = 0.01
+"""Ratio of the last step's error to the largest one below which the answer gives both."""
+
+
 def describe_error(error: Mapping[str, Any]) -> str:
     """Describe the numerical errors of a walk and how they were measured."""
     if "reason" in error:
         return f"unknown: {error['reason']}"
     text = join_words(f"{quantity(error[key], unit, 1)} {what}" for key, (what, unit) in ERRORS.items() if key in error)
+    last = [steps[-1] for name, steps in error.get("of_steps", {}).items() if name == "step_period_s"]
+    if last and last[0] < MUCH_SMALLER * error["step_period_s"]:
+        text += f" (in the period of the last step {quantity(last[0], 's', 1)})"
     return f"{text}, by a second walk with {error.get('by', DEFAULT_CHECK)}"

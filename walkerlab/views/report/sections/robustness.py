@@ -9,6 +9,10 @@ from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 
+WORSE = 0.01
+"""Relative change of a measure of robustness from which it counts as worse."""
+FIRST_TABLES = 2
+"""Number of tables that the terminal shows by default."""
 MAX_DERIVATIVES = 12
 """Maximum number of derivatives per table."""
 BUILDER_KEYS = ("walker.", "push_off.")
@@ -58,10 +62,30 @@ CONSTRAINT_COLUMNS = (
 )
 
 
+COMPARISON_COLUMNS = (
+    Column("robustness", "quantity"),
+    Column("at the start", "start", lambda value: number(value, 4), numeric=True),
+    Column("at the optimum", "best", lambda value: number(value, 4), numeric=True),
+)
+
+
 def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
     rows = [{"to": key, "best": value} for key, value in summary["best"].items()]
     constraints = table("Constraints", CONSTRAINT_COLUMNS, summary["constraints"])
-    return [*words.parts("design.findings", summary), table("Optimum", OPTIMUM_COLUMNS, rows), constraints]
+    compared = summary.get("robustness", ())
+    worse = [row["quantity"] for row in compared if "start" in row and "best" in row and is_worse(row)]
+    return [
+        *words.parts("design.findings", summary, worse),
+        table("Optimum", OPTIMUM_COLUMNS, rows),
+        constraints,
+        table("Robustness", COMPARISON_COLUMNS, compared),
+    ]
+
+
+def is_worse(row: Mapping[str, Any]) -> bool:
+    """Whether a gait is less robust at the optimum than at the start: survives less, or is more sensitive."""
+    change = row["best"] / row["start"] - 1.0 if row["start"] else 0.0
+    return (change if row["quantity"].startswith("largest") else -change) < -WORSE
 
 
 @stage_section("robustness", "gaits")
@@ -83,6 +107,11 @@ def ranks(row: Mapping[str, Any]) -> bool:
     return row.get("relative") is not None and not row.get("why")
 
 
+def filled_tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Return the tables that have rows."""
+    return [each for each in tables(summary) if each]
+
+
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     rows = summary["sensitivity"]
     ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # both models together
@@ -93,8 +122,8 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     left = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
     return [
         table("Gait sensitivity norms", NORM_COLUMNS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
-        table("Steps on rough ground", ROUGH_COLUMNS, summary["rough_ground"], note=words("robustness.rough")),
         table("Most effective changes", DERIVATIVE_COLUMNS, first, note=words("robustness.first")),
+        table("Steps on rough ground", ROUGH_COLUMNS, summary["rough_ground"], note=words("robustness.rough")),
         table("Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", left)),
         table("Gravity, slope and ground", DERIVATIVE_COLUMNS, environment[:MAX_DERIVATIVES]),
         table("Parameters that are zero", DERIVATIVE_COLUMNS, zeros, note=words("robustness.zeros")),

@@ -124,7 +124,7 @@ def steps(results: Results) -> Section | None:
     if not series:
         return None
     every = ((results.summary(stage), key, values) for (stage, key), values in series.items())
-    written = [[format_step(value, key, summary) for value in values] for summary, key, values in every]
+    written = [[format_step(place, key, summary) for place in range(len(values))] for summary, key, values in every]
     taken = [(place, *step) for place, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
     hidden = len(taken) - HEAD_STEPS - TAIL_STEPS
     rows = taken if hidden <= 0 else [*taken[:HEAD_STEPS], *taken[-TAIL_STEPS:]]
@@ -138,8 +138,9 @@ def steps(results: Results) -> Section | None:
     return Section.of("steps", "Step by step", blocks, words("walks.periods", periods))
 
 
-def format_step(value: float | None, key: str, summary: Mapping[str, Any]) -> str:
-    """Format a quantity of a step with the decimals that its numerical error allows; slips in mm."""
-    factor = 1e3 if key == "slips_m" else 1.0
-    error = (summary.get("numerical_error") or {}).get(ERROR_OF_EACH_STEP[key])
+def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
+    """Format a quantity of step `place`, from 0, with the decimals that its numerical error allows; slips in mm."""
+    value, factor = summary[key][place], 1e3 if key == "slips_m" else 1.0
+    errors, name = summary.get("numerical_error") or {}, ERROR_OF_EACH_STEP[key]
+    error = errors["of_steps"][name][place] if name in errors.get("of_steps", ()) else errors.get(name)
     return fixed(value and factor * value, decimals_left(error and factor * error))
