@@ -48,14 +48,14 @@ def unit_ending(name: str) -> str:
 
 
 def unit_by_name(name: str) -> str:
-    """Return the unit in a name's suffix; '1' if it has none."""
-    return UNITS.get(unit_ending(name), "1")
+    """Return the unit in a name's suffix; '1' if it has none. In a dotted name, the last part with a unit has it."""
+    return next((UNITS[ending] for part in reversed(name.split(".")) if (ending := unit_ending(part))), "1")
 
 
 def axis_label(key: str) -> str:
-    """Convert a key to an axis label without unit, e.g. walker.thigh.mass_kg to 'thigh mass'."""
-    ending = unit_ending(key)
-    return key.removeprefix("walker.").removesuffix(f"_{ending}" if ending else "").replace("_", " ").replace(".", " ")
+    """Convert a key to an axis label without units, e.g. walker.thigh.mass_kg to 'thigh mass'."""
+    parts = key.removeprefix("walker.").split(".")
+    return " ".join(part.removesuffix(f"_{unit_ending(part)}").replace("_", " ") for part in parts)
 
 
 def with_unit(words: str, unit: str) -> str:

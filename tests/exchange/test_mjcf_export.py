@@ -1,4 +1,4 @@
-"""Exported MJCF: it compiles silently, survives being saved, and walks in plain MuJoCo as our contact model does."""
+"""Exported MJCF: it compiles silently, carries the walker at the law's depth, and walks as our contact model does."""
 
 import importlib.util
 import subprocess
@@ -6,16 +6,22 @@ import sys
 
 import numpy as np
 import pytest
-from exported_walkers import PADS, export_of, files_of, with_gait
+from exported_walkers import PADS, PARTS, export_of, files_of, with_gait
 
 from walkerlab.errors import ConfigError
+from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.exchange.export import export_model
+from walkerlab.exchange.mjcf import inverse_weights
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install 'walkerlab[engines]'")
 
 STEPS = 10
 TORSO = ("torso", PADS, "contact.pad_pitch=own")
 WALKERS = [("paper",), ("round-feet", PADS), TORSO]
+HEAVY_LEGS = ("paper", "walker.foot_to_mass_m=0.2", "walker.leg_inertia_kg_m2=0.2", "walker.leg_mass_kg=8")
+BY_PARTS = ("compass-by-parts",)
+SPRUNG = ("paper", "walker.hip.spring_N_m_per_rad=1", "walker.hip.damping_N_m_s_per_rad=0.02")
+WEIGHED = [*WALKERS, ("level",), HEAVY_LEGS, SPRUNG, BY_PARTS]
 
 
 def text_of(*walker):
@@ -47,6 +53,55 @@ def walked(model, steps):
     return np.array(touches)
 
 
+@pytest.fixture(params=WEIGHED, ids=" ".join)
+def weighed(request, tmp_path_factory):
+    """A walker to export: each exported type, and walkers with other masses and drives."""
+    if request.param is not BY_PARTS:
+        return request.param
+    path = tmp_path_factory.getbasetemp() / "compass-by-parts.yaml"
+    path.write_text(PARTS)
+    return (str(path),)
+
+
+def normal_force(model, foot, depth, weight):
+    """MuJoCo's force (N) on a foot at `depth` (m) in the gait's pose, if joints hold what the ground does not."""
+    data = at_start(model)
+    geom = model.geom(f"foot_{foot}").id
+    pad = next(pad for pad in range(model.ngeom) if model.geom_conaffinity[pad] == model.geom_contype[geom])
+    model.geom_contype[np.arange(model.ngeom) != geom] = 0
+    ground = model.geom_pos[pad, 2] + model.geom_size[pad, 2]
+    data.qvel[:] = 0.0
+    data.qpos[0] += model.geom_pos[pad, 0] - data.geom_xpos[geom, 0]
+    data.qpos[1] += ground + model.geom_size[geom, 0] - depth - data.geom_xpos[geom, 2]
+    mujoco.mj_forward(model, data)
+    lever = np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, lever, None, data.geom_xpos[geom], model.geom_bodyid[geom])
+    # under this force of the ground nothing would accelerate
+    data.qfrc_applied[:] = data.qfrc_bias - data.qfrc_passive - weight * lever[2]
+    mujoco.mj_forward(model, data)
+    assert data.contact.geom.tolist() == [[pad, geom]] or data.contact.geom.tolist() == [[geom, pad]]
+    force = np.zeros(6)
+    mujoco.mj_contactForce(model, data, 0, force)
+    return force[0]
+
+
+@pytest.mark.parametrize("foot", [1, 2])
+def test_each_foot_carries_the_walker_at_the_depth_of_our_law(weighed, foot):
+    scene = export_of(*weighed).scene
+    weight = scene.ours.mass * scene.ours.gravity_down
+    depth = contact_target(scene).penetration
+    assert normal_force(model_of(*weighed), foot, depth, weight) == pytest.approx(weight, rel=1e-6)
+
+
+def test_inverse_weights_are_those_that_mujoco_computes(weighed):
+    compiled = model_of(*weighed).body_invweight0[1:, 0]
+    assert inverse_weights(export_of(*weighed).model) == pytest.approx(compiled, rel=1e-9)
+
+
+def test_inverse_weights_of_the_papers_legs_follow_from_their_masses():
+    assert inverse_weights(export_of("paper").model) == pytest.approx([7.0 / 180.0, 1.0 / 12.0], rel=1e-12)
+
+
 @pytest.mark.parametrize("walker", [*WALKERS, ("level",)], ids=lambda walker: walker[0])
 def test_a_model_compiles_without_a_word_and_is_the_same_when_saved(walker, tmp_path, capfd):
     model = model_of(*walker)
@@ -67,10 +122,16 @@ def test_plain_steps_walk_ten_steps_on_the_pads(walker):
     assert export.walk.steps == STEPS
     touches = walked(model_of(*walker), STEPS)
     assert len(touches) == STEPS
-    # its contact is another law, tuned; what is left of that is about one per cent
+    # its contact is another law, tuned; what is left of that is less than half a per cent
     periods, lengths = np.diff(touches, axis=0)[-4:].T
-    assert periods == pytest.approx(export.walk.periods_s[-1], rel=0.015)
-    assert lengths == pytest.approx(export.walk.lengths_m[-1], rel=0.02)
+    assert periods == pytest.approx(export.walk.periods_s[-1], rel=0.002)
+    assert lengths == pytest.approx(export.walk.lengths_m[-1], rel=0.005)
+
+
+def test_the_papers_walker_takes_our_steps():
+    """The last step of our contact model takes .7110 s and .3608 m."""
+    touches = walked(model_of("paper"), STEPS)
+    assert np.diff(touches, axis=0)[-1] == pytest.approx([0.7111, 0.3601], abs=1e-4)
 
 
 def test_the_start_is_that_of_our_walk():
@@ -133,6 +194,7 @@ def test_the_script_of_a_driven_walker_finds_the_model_next_to_it(tmp_path, argu
     [
         (("paper", "contact.stance=pinned"), "first touch", "contact.stance=free"),
         (("paper", "contact.friction=none"), "without friction", "coulomb"),
+        (("paper", "contact.damping=0"), "needs damping", "contact.damping above 0"),
         (("round-feet",), "only after mid-swing", "checkerboard"),
         (("kneed", "strides=1"), "Knees that lock", "straight legs"),
     ],

@@ -33,6 +33,14 @@ class ConfigFile:
     changes: tuple[str, ...] = ()  # KEY=VALUE settings that made the run's config from its file
 
 
+def is_file(path: Path) -> bool:
+    """Whether a path is a file; also False for a path that the system refuses, such as one that is too long."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def builtin_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in BUILTIN_FOLDER.glob("*.yaml")))
 
@@ -40,7 +48,7 @@ def builtin_names() -> tuple[str, ...]:
 def config_to_extend(typed: str | None) -> str:
     """Return the config that a new one extends: `typed` if it is a file or a built-in name, otherwise the paper's."""
     is_config = typed is not None and (
-        typed in builtin_names() or (Path(typed).is_file() and Path(typed).suffix != ".h5")
+        typed in builtin_names() or (is_file(Path(typed)) and Path(typed).suffix != ".h5")
     )
     return str(typed) if is_config else DEFAULT
 
@@ -51,7 +59,7 @@ def builtin_config(name: str) -> ConfigFile:
 
 def find_config(path: Path) -> ConfigFile:
     """Resolve `--config`, which is an existing path or the name of a built-in config."""
-    if str(path) in builtin_names() and not path.is_file():
+    if str(path) in builtin_names() and not is_file(path):
         return builtin_config(str(path))
     return file_at(path)
 

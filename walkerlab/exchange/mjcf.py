@@ -1,10 +1,15 @@
 """MJCF export: a planar walker in MuJoCo's language, with MuJoCo's soft contact tuned to the ADAMS contact law.
 
-MuJoCo normalises contact by mass. With constant impedance d, stiffness K and damping B (solref -K, -B), a loaded
-contact accelerates by a = (1 - d) a_0 - B v - K r, where a_0 is the acceleration without contact. A ball of any mass
-therefore rests at a penetration of (1 - d) g / K, and a foot creeps at (1 - d) a_0 / (impratio B).
+MuJoCo scales a contact by w, the sum of `body_invweight0` (1/kg) of its two bodies. With constant impedance d,
+stiffness K and damping B (solref -K, -B), a foot rests at a penetration of (1 - d) w N / K under a load N, and creeps
+at (1 - d) w T / (impratio B) under a tangential load T. So a solref of (-w k, -w c) makes any foot a spring k and a
+damper c, whose forces are divided by 1 - d.
 
-Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters.
+w is 1/mass for a free ball. For a link of a walker it is a mean over three directions in the model's zero position, and
+differs between equal legs. With the flag `diagexact` (MuJoCo 3.10), MuJoCo uses a contact's own inverse mass instead.
+
+Source: MuJoCo documentation, Computation: constraint model, and Modeling: solver parameters; MuJoCo 4.0.0,
+engine_setconst.c, function set0.
 """
 
 from __future__ import annotations
@@ -15,12 +20,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
+
 from walkerlab.config.drives import Hip
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineContact, contact_target
 from walkerlab.exchange.exported import Exported, Pad
-from walkerlab.exchange.planar import Ball, PlanarModel
+from walkerlab.exchange.planar import UPRIGHT, Ball, PlanarModel
 from walkerlab.physics.mechanics.parts import Position
+from walkerlab.physics.solvers.system import Floats
 
 MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
 IMPEDANCE = 0.1  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
@@ -46,17 +54,60 @@ FEET = (Foot("foot 0"), Foot("foot 1"))
 
 
 def contact_settings(target: EngineContact) -> dict[str, float]:
-    """Compute MuJoCo's contact settings for the target, by the formulas at the top of this module."""
-    stiffness = (1.0 - IMPEDANCE) * target.gravity / target.penetration
-    damping = 2.0 * target.damping_ratio * math.sqrt(stiffness)
+    """Compute settings of MuJoCo's contact for the target, by the formulas at the top of this module.
+
+    Exports and engines use the same settings for every foot; `foot_text` turns them into a solref.
+    Raises ConfigError for a target without damping.
+    """
+    if target.damping_ratio == 0.0:
+        raise ConfigError(
+            "MuJoCo's contact needs damping: without it, its friction has no damping either.",
+            "Set contact.damping above 0.",
+        )
+    stiffness = (1.0 - IMPEDANCE) * target.mass * target.gravity / target.penetration
+    damping = 2.0 * target.damping_ratio * math.sqrt((1.0 - IMPEDANCE) * target.gravity / target.penetration)
     creep = (1.0 - IMPEDANCE) * target.creep_load * target.gravity / damping
     return {
-        "solref_stiffness": stiffness,
-        "solref_damping": damping,
+        "stiffness_N_m": stiffness,
+        "damping_N_s_m": target.mass * damping,
         "solimp_d": IMPEDANCE,
         "impratio": creep / target.creep_velocity,
         "friction": target.friction,
     }
+
+
+def inverse_weights(model: PlanarModel) -> list[float]:
+    """Compute the `body_invweight0` (1/kg) that MuJoCo gives to the translation of each link.
+
+    It is trace(J M^-1 J^T) / 3 at the link's centre of mass in the model's zero position, or 1/mass for a single link
+    that cannot turn.
+    """
+    if model.freedoms == UPRIGHT and len(model.links) == 1:
+        return [1.0 / model.links[0].mass_kg]
+    base_rates = np.array([[float(freedom == axis) for freedom in model.freedoms] for axis in JOINT_AXES])
+    hinges: list[Floats] = []
+    centres: list[Floats] = []
+    mass_matrix = np.zeros((model.size, model.size))
+    for number, link in enumerate(model.links):
+        # rates along the ground, normal to it and of turning (3, coordinates), of the link's material at its hinge
+        hinge = np.zeros((3, model.size))
+        if link.parent < 0:
+            hinge[:, : len(model.freedoms)] = base_rates
+        else:
+            hinge += rates_at(link.parent_point_m, model.links[link.parent].point_m, hinges[link.parent])
+            hinge[2, len(model.freedoms) + number - 1] = 1.0
+        centre = rates_at(link.centre_m, link.point_m, hinge)
+        inertia = max(link.inertia_kg_m2, MIN_INERTIA)
+        mass_matrix += centre.T @ np.diag((link.mass_kg, link.mass_kg, inertia)) @ centre
+        hinges.append(hinge)
+        centres.append(centre)
+    inverse = np.linalg.inv(mass_matrix)
+    return [float(np.trace(centre[:2] @ inverse @ centre[:2].T)) / 3.0 for centre in centres]
+
+
+def rates_at(point: Position, start: Position, rates: Floats) -> Floats:
+    """Return a link's rates at `point`, from its rates at `start`; both points in the upright link's frame."""
+    return rates + np.outer((start[1] - point[1], point[0] - start[0], 0.0), rates[2])
 
 
 def option_text(model: PlanarModel, contact: Mapping[str, float] | None, more: str = "") -> str:
@@ -84,7 +135,7 @@ def body_text(
     inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
     for ball, foot in zip(model.balls, feet, strict=False):
         if contact is not None and ball.link == link_number:
-            inside += foot_text(ball, foot, contact) + (leg_text(link.point_m, ball, foot) if foot.drawn else "")
+            inside += foot_text(model, ball, foot, contact) + (leg_text(link.point_m, ball, foot) if foot.drawn else "")
     for child, hung in enumerate(model.links):
         if hung.parent == link_number:
             inside += body_text(model, child, contact, feet, hip)
@@ -104,12 +155,16 @@ def joint_texts(model: PlanarModel, link_number: int, hip: tuple[int, Hip] | Non
         yield f'<joint name="{name}" type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"{acts}/>'
 
 
-def foot_text(ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
+def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
+    """Write a foot, whose solref follows from the contact settings and the inverse weight of the foot's link."""
     (x, z), d = ball.centre_m, contact["solimp_d"]
+    inverse_weight = inverse_weights(model)[ball.link]
+    stiffness = inverse_weight * contact["stiffness_N_m"]
+    damping = inverse_weight * contact["damping_N_s_m"]
     return (
         f'<geom name="{foot.name}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} {foot.across_m!r} {z!r}" '
         f'contype="{foot.group}" conaffinity="0" condim="3" friction="{contact["friction"]!r} 0 0" priority="1" '
-        f'solref="{-contact["solref_stiffness"]!r} {-contact["solref_damping"]!r}" solimp="{d!r} {d!r} 1 0.5 1"/>'
+        f'solref="{-stiffness!r} {-damping!r}" solimp="{d!r} {d!r} 1 0.5 1"/>'
     )
 
 
@@ -197,7 +252,7 @@ def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
         f"Contact tuned to ADAMS's law under {target.mass:.6g} kg: penetration at rest {target.penetration:.4g} m, "
         f"damping ratio {target.damping_ratio:.4g}, friction coefficient {target.friction:.4g} of a sliding foot, "
         f"creep at {target.creep_velocity:.4g} m/s under a tangential load of {target.creep_load:.4g} times the normal "
-        "force."
+        "force. MuJoCo scales a contact by body_invweight0, so each foot's solref is multiplied by that of its body."
     )
     yield (
         f"Not expressed: the exponent {target.exponent:.4g} (the force is linear), damping that grows with the "

@@ -1,10 +1,11 @@
 """Resolve a `--config` argument to a config and the folder of its run."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from walkerlab.config.canonical import flatten
 from walkerlab.config.files import (
     BUILTIN_FOLDER,
     DEFAULT,
@@ -13,17 +14,22 @@ from walkerlab.config.files import (
     builtin_names,
     config_to_extend,
     find_config,
+    is_file,
 )
-from walkerlab.config.loader import LoadedConfig, load
+from walkerlab.config.loader import LoadedConfig, key_of, load
 from walkerlab.config.problems import problem_error
+from walkerlab.config.schema import Config
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.runs import config_text, find_run, read_all, stored_in
+from walkerlab.pipeline.runs import SHOWN_CHANGES, config_text, find_run, read_all, stored_in
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
+from walkerlab.pipeline.store.key import brief
 from walkerlab.pipeline.store.runfolder import RunFolder
 
 SUFFIX = ".h5"
+BUILTIN = "built-in "
+"""Begin of the source of a run with a built-in config."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +59,7 @@ def resolve(
     Raises ConfigError if `text` matches nothing or the config is invalid.
     """
     path, run = None if text is None else Path(text), None
-    if path is not None and text not in builtin_names() and not (path.is_file() and path.suffix != SUFFIX):
+    if path is not None and text not in builtin_names() and not (is_file(path) and path.suffix != SUFFIX):
         run = artifact_at(path) or run_at(str(text), runs)
     if run is not None:
         folder, earlier = run
@@ -65,6 +71,46 @@ def resolve(
     if name is not None and changes:
         source += f" with {', '.join(changes)}"
     return ResolvedRun(read, RunFolder(runs, read.run_name, source, read.changes), config_to_extend(text))
+
+
+def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
+    """Return the file of a run's config, and the changes made in it since the run as KEY OLD -> NEW.
+
+    Keys that the run sets itself are not compared. A file that does not exist has no changes.
+    """
+    source = folder.source.partition(" with ")[0]
+    is_builtin = source.startswith(BUILTIN)
+    path = BUILTIN_FOLDER / source.removeprefix(BUILTIN) if is_builtin else folder.runs_dir / source
+    file = ConfigFile(path, source if is_builtin else os.path.relpath(path))
+    if not is_file(path):
+        return file.label, []
+    try:
+        edited = load(file).config
+    except ConfigError:
+        return file.label, ["it is no longer valid"]
+    own = {key_of(change) for change in folder.changes}
+    # a setting in degrees changes the slope in radians, and angles of a start may follow from any setting
+    own |= {"slope_rad", "start"} if own else set()
+    dumps = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (config, edited))
+    before, after = (dict(flatten(dump)) for dump in dumps)
+    return file.label, [
+        f"{key} {brief(value)} -> {brief(after.get(key))}"
+        for key, value in before.items()
+        if after.get(key) != value and own.isdisjoint((key, key.partition(".")[0]))
+    ]
+
+
+def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str], None]) -> None:
+    """Warn if the file of a run's config was edited since; `config`: the run's, None if it cannot be read."""
+    if config is None:
+        return
+    file, edits = edits_since(config, folder)
+    if edits:
+        more = ", ..." if len(edits) > SHOWN_CHANGES else ""
+        warn(
+            f"{folder.path} was computed before {file} was edited ({', '.join(edits[:SHOWN_CHANGES])}{more}), and is "
+            "exported as it was; give the edited file to compute it again."
+        )
 
 
 def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
@@ -83,7 +129,7 @@ def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
 
 def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
     """Return the run of an artifact and the config stored in it; None if there is no such file."""
-    if path.suffix != SUFFIX or not path.is_file():
+    if path.suffix != SUFFIX or not is_file(path):
         return None
     folder = RunFolder.at(path.parent)
     try:
@@ -117,5 +163,5 @@ def source_of(path: Path | None, runs: Path) -> str:
     """
     file = (builtin_config(DEFAULT) if path is None else find_config(path)).path.resolve()
     if file.parent == BUILTIN_FOLDER.resolve():
-        return f"built-in {file.name}"
+        return f"{BUILTIN}{file.name}"
     return os.path.relpath(file, runs.resolve())

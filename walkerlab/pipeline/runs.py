@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.canonical import flatten
-from walkerlab.config.problems import suggestion
+from walkerlab.config.files import SHOWN_PATH
+from walkerlab.config.problems import printable, suggestion
 from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import Mapping as Tree
@@ -170,7 +171,10 @@ def find_run(text: str, runs_dir: Path) -> RunFolder | None:
     path = Path(text)
     is_name = path.name == text and text != ".."
     places = (runs_dir / path, path) if is_name else (path,)
-    return next((RunFolder.at(place) for place in places if place.is_dir()), None)
+    # the system refuses a path that is too long
+    with contextlib.suppress(OSError):
+        return next((RunFolder.at(place) for place in places if place.is_dir()), None)
+    return None
 
 
 def run_named(text: str, runs_dir: Path) -> RunFolder:
@@ -180,7 +184,10 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
         return run
     names = sorted(path.name for path in runs_dir.glob("*/"))
     near = suggestion(Path(text).name, names) or (f" Available runs: {', '.join(names)}." if names else "")
-    raise ConfigError(f"there is no run {text}.{near}", "`walkerlab report` creates the run of the paper config.")
+    raise ConfigError(
+        f"there is no run {printable(text, SHOWN_PATH)}.{near}",
+        "`walkerlab report` creates the run of the paper config.",
+    )
 
 
 def claim(folder: RunFolder, config: Config) -> None:

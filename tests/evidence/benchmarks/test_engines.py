@@ -46,6 +46,26 @@ def test_another_version_of_an_engine_makes_another_key(monkeypatch):
     assert list(differences("", before, after)) == ["programs.absent 1.0 -> 1.1"]
 
 
+def install(folder, name, version):
+    information = folder / f"{name.replace('-', '_')}-{version}.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+
+
+@pytest.mark.parametrize("installed", [{"robot-core": "4.1"}, {"robot-core": "4.1", "robot": "4.0"}, {"robot": "4.1"}])
+def test_the_version_of_an_engine_is_that_of_its_library(installed, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    for name, version in installed.items():
+        install(tmp_path, name, version)
+    assert Engine("robot", "robot", "robot-core").version == "4.1"
+
+
+def test_mujoco_may_be_installed_as_its_core_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.path", [str(tmp_path)])
+    install(tmp_path, "mujoco-core", "4.0.1")
+    assert PHYSICS_ENGINES["mujoco"].version == "4.0.1"
+
+
 @dataclass
 class LosesEverything:
     lost: TaskLost

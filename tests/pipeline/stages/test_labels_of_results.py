@@ -2,12 +2,13 @@
 
 import pytest
 
+import walkerlab
 from walkerlab.evidence.benchmarks import ladder
 from walkerlab.evidence.benchmarks.engines import rows as engines
 from walkerlab.evidence.paper import tune_limit
 from walkerlab.evidence.verification.known import Known
 from walkerlab.evidence.verification.verdict import CaseResult
-from walkerlab.labels import labels_of, unit_by_name
+from walkerlab.labels import axis_label, labels_of, unit_by_name
 from walkerlab.pipeline.stages import fixedpoint, walk
 
 CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, ladder.MethodRow, CaseResult, Known)
@@ -29,7 +30,27 @@ def test_a_name_that_ends_in_a_unit_ends_in_its_own(labels):
 
 @pytest.mark.parametrize(
     ("name", "unit"),
-    [("period_s", "s"), ("velocity_m_s", "m/s"), ("max_friction_ratio", "1"), ("slope_deg", "deg"), ("s", "1")],
-)
+    [
+        ("period_s", "s"), ("velocity_m_s", "m/s"), ("max_friction_ratio", "1"), ("slope_deg", "deg"), ("s", "1"),
+        ("dissipated_J.friction", "J"), ("gaits.0.period_s", "s"), ("bodies_kg.height_m", "m"),
+    ],
+)  # fmt: skip
 def test_the_longest_ending_that_is_a_unit_tells_it(name, unit):
     assert unit_by_name(name) == unit
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [("walker.thigh.mass_kg", "thigh mass"), ("work_per_step_J.hip_torque", "work per step hip torque"), ("s", "s")],
+)
+def test_an_axis_label_names_no_unit(name, label):
+    assert axis_label(name) == label
+
+
+@pytest.mark.parametrize(
+    ("stage", "name", "parts"), [("fixedpoint", "work_per_step_J", 5), ("contact-sim", "dissipated_J", 3)]
+)
+def test_every_part_of_an_energy_in_a_sweep_is_in_joules(stage, name, parts, tmp_path):
+    swept = walkerlab.sweep(stage, {"slope_deg": [1.0]}, set={"strides": 1}, runs=tmp_path, jobs=1)
+    units = [swept[key].attrs["units"] for key in swept if key.startswith(f"{name}.")]
+    assert units == ["J"] * parts

@@ -1,10 +1,12 @@
 """`walkerlab export RUN model` in a process of its own."""
 
 import pytest
+from conftest import Program
 
 from walkerlab.errors import NoAnswer
 from walkerlab.exchange.export import ENDINGS
 from walkerlab.views.cli import models
+from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.target import Target
 
 
@@ -62,5 +64,82 @@ def test_a_walker_without_a_gait_has_no_model(tmp_path, monkeypatch):
     answer = NoAnswer("no gait", "advice")
     monkeypatch.setattr(models, "execute", lambda *_: type("Report", (), {"no_answer": answer})())
     with pytest.raises(NoAnswer):
-        models.write_model("paper", tmp_path, Target("adm", tmp_path / "x.adm"), None, None)
+        models.write_model("paper", tmp_path, Target("adm", tmp_path / "x.adm"), None, Console(quiet=True))
     assert not list(tmp_path.glob("x.*"))
+
+
+LONG_NAME = "x" * 300
+EXPORTS = {
+    "a model": ("export", "light", "model", "--to", "mjcf"),
+    "a trajectory": ("export", "light", "trajectory", "--model", "simulate"),
+    "steps": ("export", "light", "steps", "--model", "simulate"),
+    "a figure": ("export", "light", "figure-06", "--to", "svg"),
+    "a table": ("export", "light", "table-3", "--to", "tex"),
+    "a film": ("animate", "light", "--model", "simulate", "--steps", "1", "--rate", "2"),
+}
+
+
+@pytest.fixture(scope="module")
+def edited(tmp_path_factory):
+    """A folder with a run whose config file was edited afterwards."""
+    folder = tmp_path_factory.mktemp("edited")
+    (folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
+    execute_in(folder, "compare", "-c", "light.yaml")
+    (folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\n")
+    return folder
+
+
+def execute_in(folder, *arguments):
+    return Program("walkerlab", folder)(*arguments)
+
+
+@pytest.mark.parametrize("what", EXPORTS)
+def test_an_export_of_a_run_says_that_its_config_was_edited_since(edited, what):
+    done = execute_in(edited, *EXPORTS[what])
+    assert done.returncode == 0, done.stderr
+    assert "light.yaml was edited (walker.hip_mass_kg 10.0 -> 15.0)" in done.stderr
+
+
+def test_a_model_of_an_edited_config_is_that_of_the_file(walker):
+    (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
+    walker("fixedpoint", "-c", "light.yaml")
+    (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\n")
+    done = walker("export", "light.yaml", "model", "--to", "mjcf")
+    assert "edited" not in done.stderr
+    assert "under 25 kg" in (walker.folder / "light.xml").read_text()
+
+
+def test_what_a_run_sets_itself_is_no_edit_of_its_file(walker):
+    (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
+    walker(
+        "fixedpoint", "-c", "light.yaml", "--set", "walker.hip_mass_kg=12", "--set", "slope_deg=1.1", "--name", "own"
+    )
+    (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\nslope_deg: 2\n")
+    done = walker("export", "own", "model", "--to", "mjcf")
+    assert done.returncode == 0, done.stderr
+    assert "edited" not in done.stderr
+
+
+def test_a_model_takes_settings_and_nothing_else_does(walker):
+    done = walker("export", "paper", "model", "--to", "mjcf", "--set", "walker.hip_mass_kg=15", "-o", "heavy.xml")
+    assert done.returncode == 0, done.stderr
+    assert "under 25 kg" in (walker.folder / "heavy.xml").read_text()
+    refused = walker("export", "paper", "trajectory", "--set", "walker.hip_mass_kg=15")
+    assert refused.returncode == 2
+    assert "changes only a model" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("export", LONG_NAME, "model"), ("export", LONG_NAME, "7"), ("animate", LONG_NAME), ("open", LONG_NAME),
+        ("status", LONG_NAME), ("fixedpoint", "-c", LONG_NAME), ("fixedpoint", "-c", f"{LONG_NAME}.h5"),
+        ("clean", "-c", LONG_NAME, "--yes"), ("init", f"{LONG_NAME}.yaml"), ("status", "--runs", LONG_NAME),
+    ],
+    ids=lambda arguments: " ".join(arguments).replace(LONG_NAME, "NAME"),
+)  # fmt: skip
+def test_a_name_that_is_too_long_for_the_system_is_one_message(walker, arguments):
+    done = walker(*arguments)
+    assert done.returncode == 3
+    assert done.stderr.startswith("error: ")
+    assert "Traceback" not in done.stderr

@@ -262,3 +262,11 @@ def test_what_was_left_out_is_told_to_those_who_ask(toy):
     assert (
         "left out: bounce (the config has no contact block)" in toy.alone("page", "--config", "rigid-only", "-v").stdout
     )
+
+
+def test_plot_prints_paths_from_the_folder_that_one_is_in(walker):
+    done = walker("plot", "-c", "rigid-only", "--set", "strides=1", "--runs", "results", "--name", "one")
+    assert done.returncode == 0, done.stderr
+    paths = [line.split()[0] for line in done.stdout.splitlines() if ".svg" in line]
+    assert "results/one/figures/figure-02.svg" in paths
+    assert all((walker.folder / path).is_file() for path in paths)

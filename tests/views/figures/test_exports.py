@@ -168,6 +168,11 @@ def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
     assert "figure-13" not in refused.value.advice
 
 
+def test_a_name_that_there_is_not_is_compared_with_what_the_run_has(run):
+    with pytest.raises(ConfigError, match=r"no item figure-03\. Did you mean figure-(06|07|08|09|10|11|12)\?"):
+        export_from(run, "figure-3", Target("pdf", None), 516.0, "", QUIET)
+
+
 def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:

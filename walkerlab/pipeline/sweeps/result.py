@@ -194,7 +194,7 @@ class Merge:
         elif last in self.labels:
             unit, text = self.labels[last]
         else:
-            unit, text = unit_by_name(last), axis_label(name)
+            unit, text = unit_by_name(name), axis_label(name)
         gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
         return Variable(values.reshape(self.question.shape + extra), self.question.dims + own, unit, text, missing=gaps)
 

@@ -20,6 +20,7 @@ from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.labels import join_words, with_unit
 from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.resolve import warn_of_edits
 from walkerlab.pipeline.results import FolderResults
 from walkerlab.pipeline.runs import (
     command,
@@ -28,6 +29,7 @@ from walkerlab.pipeline.runs import (
     refusing_older,
     results_in,
     results_to_show,
+    run_named,
     the_result,
 )
 from walkerlab.pipeline.store.artifact import Stored
@@ -36,6 +38,7 @@ from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.pipeline.store.files import as_text
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.console import Console
+from walkerlab.views.cli.request import Request
 from walkerlab.views.cli.target import Target, write_file
 from walkerlab.views.figures.style import EXPORT_DPI
 from walkerlab.views.report.answers import paper_table
@@ -58,6 +61,13 @@ COLUMN_WIDTHS = {1: 252.0, 2: 516.0}
 STORED_WITH = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
+
+
+def run_to_export(run: str, request: Request) -> RunFolder:
+    """Find a run, and warn if its config file was edited since; ConfigError if there is no such run."""
+    folder = run_named(run, request.runs)
+    warn_of_edits(config_of(folder), folder, request.console.warn)
+    return folder
 
 
 def export_from(
@@ -148,7 +158,7 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
     nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"Items of {folder.path}:", *names]) if names else nothing
-    near = suggestion(name, (*figures, *TABLES, STEPS, TRAJECTORY, *tables))
+    near = suggestion(name, names)
     raise ConfigError(f"this run has no item {name}.{near}", advice)
 
 

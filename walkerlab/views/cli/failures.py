@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.errors import StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
+from walkerlab.errors import ConfigError, StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
 from walkerlab.pipeline.interrupts import raise_on
 
 if TYPE_CHECKING:
@@ -53,6 +53,11 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         discard_output()
         raise typer.Exit(0) from None
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            too_long = ConfigError(f"the name {error.filename[:60]!r}... is too long.", "Choose a shorter one.")
+            print_failed(too_long)
+            print_error(too_long)
+            raise typer.Exit(too_long.exit_code) from None
         if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
             raise
         discard_output()

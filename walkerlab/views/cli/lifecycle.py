@@ -73,7 +73,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
 
         rerun_artifact(artifact, graph, request)
 
-    @command(app, "runs")
+    @command(app, "sets", "runs")
     def export(
         request: Request,
         run: RunArgument,
@@ -104,13 +104,15 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             # Imported here: only this export needs a walker.
             from walkerlab.views.cli.models import write_model
 
-            for path in write_model(run, request.runs, Target(to, output), law, request.console):
+            paths = write_model(run, request.runs, Target(to, output), law, request.console, request.settings)
+            for path in paths:
                 print(path)
             return
-        from walkerlab.pipeline.runs import run_named
-        from walkerlab.views.cli.exports import COLUMN_WIDTHS, export_from, walk_in
+        if request.sets:
+            raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
+        from walkerlab.views.cli.exports import COLUMN_WIDTHS, export_from, run_to_export, walk_in
 
-        folder, points = run_named(run, request.runs), width or COLUMN_WIDTHS[columns]
+        folder, points = run_to_export(run, request), width or COLUMN_WIDTHS[columns]
         whose = walk_in(folder, model)
         print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi))
 
@@ -177,10 +179,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
     ) -> None:
         """Animate a run's walk, or the walks of both models in one picture."""
-        from walkerlab.pipeline.runs import run_named
-        from walkerlab.views.cli.exports import BOTH, Film, walk_in, write_film
+        from walkerlab.views.cli.exports import BOTH, Film, run_to_export, walk_in, write_film
         from walkerlab.views.cli.target import Target
 
-        folder = run_named(run, request.runs)
+        folder = run_to_export(run, request)
         film = Film(BOTH if model == BOTH else walk_in(folder, model), steps, rate, slower)
         print(write_film(folder, Target(to, output), film, request.console))

@@ -1,11 +1,12 @@
 """`walkerlab export RUN model`: a run's walker with the start of its gait, for ADAMS and MuJoCo."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.export import ENDINGS, export_model, law_named
-from walkerlab.pipeline.resolve import resolve
+from walkerlab.pipeline.resolve import resolve, warn_of_edits
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.stages.walk import rigid_start
 from walkerlab.pipeline.store import artifact
@@ -14,13 +15,20 @@ from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.target import Target, write_file
 
 
-def write_model(run: str, runs: Path, target: Target, law: str | None, console: Console) -> list[Path]:
+def write_model(
+    run: str, runs: Path, target: Target, law: str | None, console: Console, sets: Sequence[str] = ()
+) -> list[Path]:
     """Write a model of a run's or config's walker, computing its gait first if necessary; return the files written.
+
+    sets  changes of the config, KEY=VALUE
 
     Raises ConfigError for an unknown run or format, or if a format cannot express the walker; NoAnswer without a gait.
     """
-    resolved = resolve(run, runs=runs)
+    resolved = resolve(run, sets, runs=runs)
     config, folder = resolved.loaded.config, resolved.folder
+    for warning in resolved.loaded.warnings:
+        console.warn(warning)
+    warn_of_edits(config, folder, console.warn)
     # MuJoCo's viewer opens files that end in .xml.
     named_mjcf = target.output is not None and target.output.suffix == ".mjcf"
     to = "xml" if target.to == "mjcf" and not named_mjcf else target.to

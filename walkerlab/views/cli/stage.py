@@ -69,7 +69,8 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
         rigid_alone = ["", why_rigid_alone(request.resolved.walker)] if request.resolved.contact is None else []
         lines = [*verdict(report.results), *answer(report.stage, own), *rigid_alone, *where]
     else:
-        answers = answer(report.stage, own)
+        drawn = [{**figure, "svg": str(report.run_dir / figure["svg"])} for figure in own.get("figures", ())]
+        answers = answer(report.stage, own | ({"figures": drawn} if drawn else {}))
         if request.verbose:
             answers += further_tables(report.stage, own)
         # an artifact without an answer is stored too, but is not worth pointing to

@@ -12,7 +12,6 @@ INTEGRATORS = {"Euler": adapter.Integrator(1, 120_000), "RK4": adapter.Integrato
 CONTACTS = {"soft": "Euler", "soft-rk4": "RK4"}
 CANNOT_EXPRESS = (
     "a force or damping that grows with a power of the penetration: contact is linear",
-    "stiffness in N/m: stiffness is scaled by the contact's effective mass",
     "static above dynamic friction: there is one coefficient",
     "point feet: a ball of half a millimetre replaces each",
     "a knee that locks rigidly at an instant: equality constraints are soft, so the walk continues in another model",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import importlib.metadata
 import importlib.util
@@ -18,8 +19,9 @@ EXTRA = "pip install 'walkerlab[engines]'"
 class Engine:
     """A physics engine with which our walks are compared."""
 
-    name: str  # name in output, of the adapter module and of the distribution
+    name: str  # name in output, of the adapter module and of the distribution to install
     module: str  # import name of its package
+    core: str = ""  # distribution of the library itself, where it can be installed alone
 
     @property
     def is_installed(self) -> bool:
@@ -32,11 +34,12 @@ class Engine:
 
     @property
     def version(self) -> str:
-        """Version of the installed package; "unknown" for a module without a distribution."""
-        try:
-            return importlib.metadata.version(self.name)
-        except importlib.metadata.PackageNotFoundError:
-            return "unknown"
+        """Version of the installed library; "unknown" for a module without a distribution."""
+        # the core comes first, because the distribution around it may be missing or have another version
+        for distribution in filter(None, (self.core, self.name)):
+            with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+                return importlib.metadata.version(distribution)
+        return "unknown"
 
     def adapter(self) -> Adapter:
         return cast("Adapter", importlib.import_module(f"walkerlab.evidence.benchmarks.engines.{self.name}"))
@@ -48,7 +51,7 @@ class Engine:
 
 PHYSICS_ENGINES = {
     engine.name: engine
-    for engine in (Engine("mujoco", "mujoco"), Engine("drake", "pydrake"), Engine("exudyn", "exudyn"))
+    for engine in (Engine("mujoco", "mujoco", "mujoco-core"), Engine("drake", "pydrake"), Engine("exudyn", "exudyn"))
 }
 
 
