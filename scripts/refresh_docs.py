@@ -98,8 +98,9 @@ def config_keys(_results: Results) -> str:
     rows.insert(1, tuple("-" * width for width in widths))
     lines = (" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
     optional = [name for name, field in Config.model_fields.items() if block_of(field) and field.default is None]
-    notes = [f"The block `{name}` may be left out; what needs it is then left out too." for name in optional]
-    return "\n".join([*(f"| {line} |" for line in lines), "", *notes, ""])
+    blocks = f"{', '.join(f'`{name}`' for name in optional[:-1])} and `{optional[-1]}`"
+    note = f"The blocks {blocks} are optional. Stages that need a missing block are skipped."
+    return "\n".join([*(f"| {line} |" for line in lines), "", note, ""])
 
 
 def gaits(results: Results) -> str:
