@@ -45,7 +45,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pictures import stale_pictures, write_pictures
 
 ROOT = Path(__file__).parent.parent
-DOCUMENTS = ("README.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")
+DOCUMENTS = ("README.md", "docs/study.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")
 EXAMPLE = re.compile(r"^(<!-- takes minutes -->\n)?```(console|pycon|yaml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
@@ -96,8 +96,9 @@ def config_keys(_results: Results) -> str:
     rows.insert(1, tuple("-" * width for width in widths))
     lines = (" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
     optional = [name for name, field in Config.model_fields.items() if block_of(field) and field.default is None]
-    notes = [f"The block `{name}` may be left out; what needs it is then left out too." for name in optional]
-    return "\n".join([*(f"| {line} |" for line in lines), "", *notes, ""])
+    blocks = f"{', '.join(f'`{name}`' for name in optional[:-1])} and `{optional[-1]}`"
+    note = f"The blocks {blocks} are optional. Stages that need a missing block are skipped."
+    return "\n".join([*(f"| {line} |" for line in lines), "", note, ""])
 
 
 def gaits(results: Results) -> str:
@@ -165,6 +166,21 @@ def paper_and_ours(results: Results) -> str:
     return table(head, rows)
 
 
+def study_in_four_rows(results: Results) -> str:
+    """Step period, step length, stability and energy of the paper and of both models."""
+    compared = results.summary("compare")
+    single = {entry["quantity"]: entry for entry in compared["paper_numbers"]}
+    cells = [
+        beside("step period (s)", compared["table3"]["t_left"], 2),
+        printed_once("step length (m)", single["length of one complete step"]),
+        printed_once("largest multiplier", single["largest eigenvalue of P of a stable gait"]),
+        beside("mean energy (J)", compared["table3"]["E_avg"], 2),
+    ]
+    rows = [[title, paper, printed, corrected, contact] for title, paper, printed, corrected, _, contact in cells]
+    head = ["", "printed (MATLAB)", "our rigid model, as printed", "corrected", "our contact model"]
+    return table(head, rows)
+
+
 def printed_once(title: str, entry: dict[str, Any]) -> list[str]:
     """A row of a number that the paper prints for both of its models in one."""
     ours = {name: "" if entry[name] is None else number(entry[name], 4) for name in OURS}
@@ -196,6 +212,7 @@ PARTS: dict[str, Callable[[Results], str]] = {
     "config-keys": config_keys,
     "gaits": gaits,
     "paper-and-ours": paper_and_ours,
+    "study-in-four-rows": study_in_four_rows,
     "errata": errata,
 }
 

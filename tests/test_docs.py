@@ -251,9 +251,11 @@ def test_every_part_has_a_maker_and_a_place():
     assert sorted(placed) == sorted(MAKER["PARTS"])
 
 
-@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.name)
-def test_the_readme_leads_to_every_page(page):
-    assert f"(docs/{page.name})" in text_of(ROOT / "README.md")
+def test_the_index_leads_to_every_page_and_the_readme_to_the_index():
+    index = text_of(ROOT / "docs" / "index.md")
+    pages = {page.name for page in (ROOT / "docs").glob("*.md")} - {"index.md"}
+    assert sorted(page for page in pages if f"({page})" not in index) == []
+    assert "(docs/index.md)" in text_of(ROOT / "README.md")
 
 
 def test_the_api_reference_has_every_name_of_the_package():
