@@ -72,6 +72,12 @@ class Screenshot:
 PICTURES: dict[str, FigurePicture | Screenshot] = {
     "figure-06.png": FigurePicture("figure-06", "contact-sim"),
     "ground-forces.png": FigurePicture("ground-forces", "contact-sim"),
+    "figure-13.png": FigurePicture(
+        "figure-13",
+        "continuation",
+        settings={"continuation.over": "slope_deg", "continuation.from": 0.01, "continuation.to": 5.7},
+        small={"continuation.from": 4.3, "continuation.to": 4.8, "continuation.periods": 2, "continuation.points": 10},
+    ),
     "figure-15.png": FigurePicture("figure-15", "basin", small={"basin.cells": [12, 12]}),
     "explore.png": Screenshot(
         "picture_of_explore.py",
@@ -79,6 +85,10 @@ PICTURES: dict[str, FigurePicture | Screenshot] = {
             *(PAGE / "explore" / "templates").iterdir(),
             *(PAGE / "report" / "templates" / name for name in ("style.css", "player.js", "blocks/player.html.j2")),
         ),
+    ),
+    "page.png": Screenshot(
+        "picture_of_page.py",
+        tuple(PAGE / "report" / "templates" / name for name in ("page.html.j2", "style.css", "blocks/player.html.j2")),
     ),
 }
 """How pictures in docs/images are drawn; pictures of longer computations have the command in their caption."""
