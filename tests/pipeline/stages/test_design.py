@@ -199,7 +199,9 @@ def largest_at(slope_deg):
 
 
 def test_the_largest_step_up_is_maximised_and_robustness_is_compared_with_the_starts():
-    found = run("slope-3deg", "design.maximise=largest_step_up_m", "design.over={slope_deg: [3, 3.8]}", "design.starts=1")
+    found = run(
+        "slope-3deg", "design.maximise=largest_step_up_m", "design.over={slope_deg: [3, 3.8]}", "design.starts=1"
+    )
     grid = [largest_at(slope)["largest_step_up_m"] for slope in np.linspace(3.4, 3.7, 3).tolist()]
     assert found["value"] >= max(grid) - 1e-5
     best = largest_at(found["best"]["slope_deg"])
