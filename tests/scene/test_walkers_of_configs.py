@@ -102,8 +102,8 @@ def test_a_kneed_walker_with_its_feet_ahead_has_the_gait_found_elsewhere():
     assert gait.spectral_radius == pytest.approx(0.3333740739, abs=1e-8)
 
 
-def test_a_start_of_a_walker_with_its_feet_ahead_is_moved_onto_the_slope():
-    start = "start=[0.0, 0.26, 0.0, -0.49, -1.157, -0.49]"
+def test_a_start_of_a_walker_with_its_feet_ahead_is_computed_on_the_slope():
+    start = "start=[null, 0.26, null, -0.49, -1.157, -0.49]"
     config = kneed_with_feet_ahead(0.2)
     moved = load(Path("kneed"), ["slope_deg=2.5", "walker.foot_radius_m=0.2", "walker.foot_centre_ahead_m=0.03", start])
     swing, stance, shank, *_ = moved.config.start

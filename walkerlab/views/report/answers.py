@@ -5,7 +5,7 @@ Each answer imports the page sections that it needs, so that other commands star
 
 import math
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -138,7 +138,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
     error, advised = summary.get("numerical_error"), summary.get("advice") and summary["outcome"] != WALKED_LABEL
     return [
         f"{head}.",
-        words("walks.settling", summary, cycle(summary)),
+        " ".join(settling(summary)),
         side_by_side("", columns, step_rows, head="step"),
         side_by_side("", WALK_ROWS, {"": summary}, head=""),
         f"numerical error: {describe_error(error)}." if error else "",
@@ -162,14 +162,21 @@ def each_step(summary: Summary) -> dict[str, Summary]:
     }
 
 
-def cycle(summary: Summary) -> list[str]:
-    """Format the periods of the steps that a walk repeats in the end, in order of their lengths; empty for one step."""
+def settling(summary: Summary) -> Iterator[str]:
+    """Yield sentences about a gait that a walk leaves, and about the cycle of steps that it repeats in the end."""
     from walkerlab.views.report.sections.walks import format_step
 
-    steps, period = summary["steps"], summary.get("repeats_after") or 0
-    if not 1 < period <= MAX_CYCLE:
-        return []
-    return [format_step(place, "step_periods_s", summary) for place in range(steps - period, steps)]
+    steps, period, left = summary["steps"], summary.get("repeats_after") or 0, summary.get("leaves_gait_at")
+    if left:
+        yield f"It begins on an unstable gait and leaves it: step {left} is the first that differs by more than 1 %."
+    if 1 < period <= MAX_CYCLE:
+        cycle = join_words(format_step(place, "step_periods_s", summary) for place in range(steps - period, steps))
+        repeats = "alternates between steps" if period == 2 else f"repeats every {period} steps,"
+        yield f"In the end it {repeats} of {cycle} s."
+    elif left and summary["outcome"] == WALKED_LABEL:
+        yield (
+            "In the end all its steps are equal." if period == 1 else "Its last steps do not repeat; a longer walk may."
+        )
 
 
 def elide(values: Sequence[Any]) -> list[Any]:
