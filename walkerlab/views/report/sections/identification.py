@@ -48,7 +48,7 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
     """Return the answer in sentences: estimates, undetermined combinations, fit, gait and the other model."""
-    verdict = next(row for row in summary["models"] if row["model"] == summary["model"])
+    verdict = verdict_of(summary)
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
     references = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
@@ -69,12 +69,21 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     singular = summary["singular_values"]
     without_effect = separable and min(singular) < NO_EFFECT * max(singular)
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
-    beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]))
-    quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary))
+    beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]), is_usable(verdict))
+    quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary), is_usable(verdict))
     return [
         *words.parts("identify.findings", summary, verdict, *parameters, *beside),
         *words.parts("identify.quality", summary, verdict, *quality),
     ]
+
+
+def verdict_of(summary: Mapping[str, Any]) -> Mapping[str, Any]:
+    verdict: Mapping[str, Any] = next(row for row in summary["models"] if row["model"] == summary["model"])
+    return verdict
+
+
+def is_usable(verdict: Mapping[str, Any]) -> bool:
+    return verdict["fit"] in ("fits", "fits-but")
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
@@ -164,8 +173,9 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
 
 def noise_in_words(summary: Mapping[str, Any]) -> str:
     """Describe the roughness of the floor and the noise of the measurement."""
-    floor = summary["noise"]["process"]["roughness_m"]
-    parts = [f"floor {number(1e3 * floor, 2)} mm rough" if floor else "an even floor"]
+    process = summary["noise"]["process"]
+    floor, share = (number(value, 2) for value in (1e3 * process["roughness_m"], 100.0 * process["share_of_leg"]))
+    parts = [f"floor {floor} mm rough, {share} % of the leg" if process["roughness_m"] else "an even floor"]
     parts += [
         f"{axis_label(name)} measured to {quantity(value, unit_by_name(name), 2)}"
         for name, value in summary["noise"]["measurement"].items()
