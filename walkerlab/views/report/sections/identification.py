@@ -16,6 +16,7 @@ NO_EFFECT = 1e-6
 """Fraction of the largest singular value below which a parameter combination counts as having no effect on any walk."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
+REFERENCES = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
     "step_length_m": "steps of {}",
     "period_s": "a period of {}",
@@ -156,7 +157,8 @@ def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str,
 def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     return capitalised(
         join_words(
-            f"the {axis_label(name)} is {with_error(row['value'], row['standard_error'], unit_by_name(name))}"
+            f"the {axis_label(name)}{REFERENCES.get(name, '')} is "
+            f"{with_error(row['value'], row['standard_error'], unit_by_name(name))}"
             for name, row in nuisances.items()
         )
     )
