@@ -247,7 +247,7 @@ def trim(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floa
 
 
 class Robust(NamedTuple):
-    """What a robust loss needs to know of each quantity."""
+    """Scatter of each quantity, and how much of its noise a fit absorbs, as a robust loss needs them."""
 
     scatter: Floats  # (quantities,) standard deviation of values without outliers
     absorbed: Floats  # (quantities,) share of the noise's variance that the fitted unknowns and floor absorb
