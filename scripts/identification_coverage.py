@@ -99,7 +99,7 @@ def coverage(truth, seeds):
         if walk is None:
             continue
         result = truth.identify(*walk)
-        if result.models[0].fit != "fits":
+        if not result.verdict.usable:
             continue
         inside.append(region_holds(result, truth.values))
         estimates.append([estimate.value for estimate in result.estimates])

@@ -31,18 +31,20 @@ def hip_over_fall(walker, y):
     return height - FALLEN_HIP * walker.leg_length
 
 
-def plain_walk(walker, y, heights, nearest=0.0):
+def plain_walk(walker, y, heights, nearest=0.0, disturb=lambda y: y, pieces=None):
     """Walk over footholds from a state y (2 n,) just after a heel strike.
 
     heights  (steps + 1,) m, the start's first
     nearest  m, ahead of the stance foot: a foot that lands nearer ends the walk
+    disturb  changes a state just after a heel strike
+    pieces   list that receives the parts of the walk, as the integrator returns them
 
     Returns (steps, 1 + 2 n) times and states after the heel strikes, the outcome, and how far ahead of the other each
     foot landed (m), the one that ended the walk too.
     """
     t, seen, ahead = 0.0, [], []
     for rise in np.diff(heights):
-        t, before, outcome = swing(walker, t, y, rise)
+        t, before, outcome = swing(walker, t, y, rise, pieces)
         if outcome is Outcome.WALKED:
             ahead.append(foot_of(walker, before)[0])
             outcome = Outcome.FELL if ahead[-1] < nearest else outcome
@@ -50,11 +52,12 @@ def plain_walk(walker, y, heights, nearest=0.0):
             return np.array(seen).reshape(len(seen), 1 + len(y)), outcome, ahead
         y = np.zeros(len(y))
         impact.strike(walker, AT_STRIKE, before, y)
+        y = disturb(y)
         seen.append((t, *y))
     return np.array(seen), Outcome.WALKED, ahead
 
 
-def swing(walker, t, y, rise):
+def swing(walker, t, y, rise, pieces=None):
     """Time and state at which a swing ends, and how: WALKED if the foot comes down ahead on a straight leg."""
     pendulum_time = np.sqrt(walker.leg_length / walker.gravity)
     kneed = walker.shank != NO_SHANK
@@ -76,12 +79,16 @@ def swing(walker, t, y, rise):
 
     strike.direction, fall.direction, knee.direction = -1, -1, 1
     strike.terminal = fall.terminal = knee.terminal = True
+    dense = {**EXACT, "dense_output": pieces is not None}
+    pieces = [] if pieces is None else pieces
     while True:
         if left_s:  # what has just been left is not met again
-            passed = solve_ivp(rate, (t, t + left_s), y, **EXACT)
+            passed = solve_ivp(rate, (t, t + left_s), y, **dense)
+            pieces.append(passed)
             t, y = passed.t[-1], passed.y[:, -1]
         events = [strike, fall, knee] if phase == BENT and kneed else [strike, fall]
-        piece = solve_ivp(rate, (t, end), y, events=events, max_step=CLOSEST_LOOK * pendulum_time, **EXACT)
+        piece = solve_ivp(rate, (t, end), y, events=events, max_step=CLOSEST_LOOK * pendulum_time, **dense)
+        pieces.append(piece)
         t, y = piece.t[-1], piece.y[:, -1]
         met = [bool(times.size) for times in piece.t_events]
         if met[1]:

@@ -159,7 +159,7 @@ def test_wrong_data_do_not_fit(name):
         assert error.message.startswith("no walk of the model can be fitted")  # noqa: PT017
         return
     assert verdict(result) in ("misfit", "not-converged")
-    assert result.models[0].reason
+    assert result.models[0].reasons
 
 
 @pytest.mark.parametrize("change", ["swapped", "mirrored"])

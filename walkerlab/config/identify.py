@@ -32,11 +32,21 @@ class Identify(Block):
         bounds="[value, standard deviation] for each key, the second above 0",
     )
     nuisance: tuple[Nuisance, ...] = key(
-        (), "", "clock and sensor properties to estimate as well", bounds=f"a list of {', '.join(get_args(Nuisance))}"
+        (),
+        "",
+        "clock and sensor properties to estimate as well; time_offset_s counts from the first heel strike",
+        bounds=f"a list of {', '.join(get_args(Nuisance))}",
     )
     model: Literal["rigid", "contact", "both"] = key("rigid", "", "model to fit")
     starts: int = key(
         1, "1", "number of starts of the fit: the config's values first, then values within 10 % of them", ge=1, le=100
+    )
+    max_walks: int = key(
+        10_000,
+        "1",
+        "number of predicted walks after which a fit ends without convergence",
+        ge=1,
+        le=10_000_000,
     )
     robustness: bool = key(
         False, "", "whether to report the identified gait's sensitivity norm (floor drop to step period)"

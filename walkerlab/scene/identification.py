@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Final
@@ -12,13 +12,13 @@ import numpy as np
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.physics.estimation.fit import FitProblem, Fitted, evaluate_at, fit
+from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measurements import MeasuredWalk
-from walkerlab.physics.estimation.mixed_model import evaluate
+from walkerlab.physics.estimation.mixed_model import estimate_noise, evaluate, products_of
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
-from walkerlab.physics.estimation.result import Estimate, Identification, ModelFit, StepTable, Uncertain
+from walkerlab.physics.estimation.result import USABLE, Estimate, Identification, ModelFit, Pull, StepTable, Uncertain
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
@@ -27,8 +27,8 @@ from walkerlab.physics.orbits.similarity import Units
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.families import scene_for
-from walkerlab.scene.parameter import R, config_with, parameter_of
+from walkerlab.scene.families import model_reads, scene_for
+from walkerlab.scene.parameter import R, config_with, parameter_keys, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
@@ -37,12 +37,17 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 Values = tuple[float, ...]
+Begin = Callable[[str, int], Callable[[], None]]
 KEPT_CONFIGS: Final = 512  # changed configs, and as many walkers of them
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
 CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
+UNTOUCHED: Final = 1e-3  # a smaller relative reduction of a prior's variance counts as no information
+STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
+LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
+DECISIVE_GAIN: Final = 3.0  # of the log-likelihood, beyond which one more parameter explains the walk better
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
@@ -91,26 +96,28 @@ def identify_walk(
     gait: Mapping[str, Any],
     question: Identify,
     note: Callable[[str], None] = lambda _: None,
+    begin: Begin = lambda _label, _rounds: lambda: None,
 ) -> Identification:
     """Fit parameters to a measured walk with each model; return the likeliest result, preferring models that fit.
 
-    gait  summary of `fixedpoint` for the config
-    note  receives messages
+    gait   summary of `fixedpoint` for the config
+    note   receives messages
+    begin  receives the name of each fit and its largest number of rounds; returns what to call at each round
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
-    results = [identify_with(model, config, measured, gait, question, note) for model in question.models]
+    results = [identify_with(model, config, measured, gait, question, note, begin) for model in question.models]
     answers = [result for result in results if isinstance(result, Identification)]
     verdicts = tuple(
-        result.models[0] if isinstance(result, Identification) else ModelFit(model, None, "not-converged", result)
+        result.models[0] if isinstance(result, Identification) else ModelFit(model, None, "not-converged", (result,))
         for model, result in zip(question.models, results, strict=True)
     )
     if not answers:
         raise NoAnswer(
-            f"no walk of the model can be fitted: {verdicts[0].reason}.",
+            f"no walk of the model can be fitted: {verdicts[0].reasons[0]}.",
             "Start from a config whose walk takes at least as many steps as the recording, or fit fewer parameters.",
         )
-    best = max(answers, key=lambda answer: (answer.models[0].fit == "fits", answer.models[0].log_likelihood))
+    best = max(answers, key=lambda answer: (answer.models[0].usable, answer.models[0].log_likelihood))
     return replace(best, models=verdicts)
 
 
@@ -121,22 +128,26 @@ def identify_with(
     gait: Mapping[str, Any],
     question: Identify,
     note: Callable[[str], None],
+    begin: Begin,
 ) -> Identification | str:
     """Fit one model; return the reason as text if no walk of the model can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
-    fits = [fit(problem, start) for start in starts_of(problem, question.starts)]
+    fits = [
+        fit(problem, start, begin(f"{model} model, start {place} of {question.starts}", MAX_ROUNDS))
+        for place, start in enumerate(starts_of(problem, question.starts), 1)
+    ]
     walked = [result for result in fits if isinstance(result, Fitted)]
     if not walked:
         return str(fits[0])
     best = max(walked, key=lambda result: (not result.why, result.evaluation.likelihood))
-    timed = in_time(best)
+    timed = in_time(best, begin)
     if timed is None:
         return describe(subject, question, best, best)
     return describe(subject, question, evaluate_at(timed.u[: best.u.size], best) or best, timed)
 
 
-def in_time(first: Fitted) -> Fitted | None:
+def in_time(first: Fitted, begin: Begin) -> Fitted | None:
     """Refit angles at their sample times, from the fit at equal phase; None for measured steps or a failed fit."""
     forecast, u = first.forecast, first.u
     if not forecast.measured.sampled:
@@ -144,7 +155,7 @@ def in_time(first: Fitted) -> Fitted | None:
     nuisances = forecast.nuisances if DELAY in forecast.nuisances else (*forecast.nuisances, DELAY)
     start = u if nuisances == forecast.nuisances else np.append(u, 0.0)
     problem = replace(first.problem, forecast=replace(forecast, in_phase=False, nuisances=nuisances))
-    fitted = fit(problem, start)
+    fitted = fit(problem, start, begin("angles at their times", MAX_ROUNDS))
     return fitted if isinstance(fitted, Fitted) and not fitted.why else None
 
 
@@ -156,7 +167,8 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
     priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
-    return FitProblem(forecast, subject.config.walker.leg_length_m, family.start, bounds, priors, question.loss)
+    leg_m, loss = subject.config.walker.leg_length_m, question.loss
+    return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
 
 
 def starts_of(problem: FitProblem, count: int) -> list[Floats]:
@@ -190,13 +202,18 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
             keys, forecast.parameters(best.u), errors, problem.start, problem.bounds, forecast.scales, strict=True
         )
     )
-    fit_word, reason = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] != "fits"), ("fits", ""))
+    pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(estimates, question.prior))
+    verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
+    if verdict[0] in USABLE:
+        reasons = (*verdict[1], *map(pull_in_words, strong(pulls)), *better_with(subject, question, best))
+        verdict = ("fits-but" if reasons else "fits"), reasons
     dof = max(1, best.data.residuals.size - best.u.size)
     walk = forecast.predict(best.u, best.heights_m)
     assert walk is not None, "a fitted walk takes all steps"
     return Identification(
         subject.model,
         estimates,
+        pulls,
         combinations,
         information,
         process_noise(best),
@@ -204,12 +221,98 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         rms_residuals(steps) | rms_residuals(best),
         best.evaluation.squares / dof,
         gait_with_errors(best, information.covariance, subject.units if question.robustness else None),
-        (ModelFit(subject.model, best.evaluation.likelihood, fit_word, reason),),
+        (ModelFit(subject.model, float(best.evaluation.likelihood), *verdict),),
         step_tables(steps),
         best,
         walk.walk,
         nuisances_with_errors(best, question.nuisance),
     )
+
+
+def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
+    """Yield how far the data would move each estimate that is at a bound, in standard errors of the free estimate."""
+    problem, scales = fitted.problem, fitted.forecast.scales
+    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True)), 1e-300))
+    for key, u, move, error, bounds, scale in zip(
+        keys, fitted.u, fitted.evaluation.move, errors, problem.bounds, scales, strict=False
+    ):
+        for bound in bounds:
+            if abs(u * scale - bound) <= AT_BOUND * scale:
+                yield Pull(key, "bound", bound, float(abs(move) / error))
+
+
+def pulls_of_priors(estimates: Sequence[Estimate], priors: Mapping[str, Sequence[float]]) -> Iterator[Pull]:
+    """Yield the distance of each prior from the walk's own estimate, in standard errors of the difference."""
+    for estimate in estimates:
+        if estimate.key in priors:
+            value, sigma = priors[estimate.key]
+            error = estimate.standard_error
+            free = 0.0 if error is None else sigma**2 - error**2
+            distance = abs(estimate.value - value) / math.sqrt(free) if free > UNTOUCHED * sigma**2 else 0.0
+            yield Pull(estimate.key, "prior", value, distance)
+
+
+def strong(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
+    return tuple(pull for pull in pulls if pull.standard_deviations > STRONG_PULL)
+
+
+def pull_in_words(pull: Pull) -> str:
+    return (
+        f"the walk pulls {pull.key} against its {pull.against} of {pull.value:g} by {pull.standard_deviations:.2g} "
+        "standard deviations"
+    )
+
+
+def better_with(subject: ModelUnderTest, question: Identify, fitted: Fitted) -> Iterator[str]:
+    """Yield the fixed parameter or nuisance that would raise the log-likelihood most if it was estimated, too.
+
+    The gain is that of a linearised step with new standard deviations. It is reduced by the share of the values that
+    the unknowns use up, since any parameter fits a short walk better.
+    """
+    data, problem, count = fitted.data, fitted.problem, len(question.keys)
+    priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
+    left = (data.residuals.size - fitted.u.size - 1) / data.residuals.size
+    best, wider = fitted.evaluation.likelihood, None
+    for name, value, slope in slopes_of_others(subject, question, fitted):
+        products = products_of(replace(data, J=np.column_stack((data.J, slope)), prior=priors))
+        evaluation = evaluate(products, fitted.noise)
+        moves = np.abs([*evaluation.move[:count], evaluation.move[-1] if value else 0.0])
+        if evaluation.likelihood > best and moves.max() < LINEAR_MOVE:
+            best, wider = evaluation.likelihood, (name, products)
+    if wider is not None:
+        name, products = wider
+        noise = estimate_noise(products, problem.floors, problem.leg_length_m, fitted.noise)
+        gain = evaluate(products, noise).likelihood - fitted.evaluation.likelihood
+        if gain * left > DECISIVE_GAIN:
+            yield f"estimating {name}, too, would raise the log-likelihood by about {gain:.2g}"
+
+
+def slopes_of_others(
+    subject: ModelUnderTest, question: Identify, fitted: Fitted
+) -> Iterator[tuple[str, float, Floats]]:
+    """Yield each parameter and nuisance that is not estimated: name, value, and the walk's derivative (values,)."""
+    config, forecast, count = subject.config, fitted.forecast, len(question.keys)
+    estimated = {parameter_of(key, config).path for key in question.keys}
+    others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
+    fixed = [key for key in others if model_reads(subject.model, config, key)]
+    sensors = [name for name in NUISANCES if forecast.measured.sampled and name not in forecast.nuisances]
+    family = ConfigFamily(config, (*question.keys, *fixed))
+    wide = replace(
+        forecast,
+        walks=step_map_of(subject, family),
+        admits=family.admits,
+        scales=family.scales(),
+        nuisances=(*forecast.nuisances, *sensors),
+    )
+    values = np.array(family.start[count:])
+    u = np.concatenate((fitted.u[:count], values / wide.scales[count:], fitted.u[count:], np.zeros(len(sensors))))
+    places = [*range(count, count + len(fixed)), *range(u.size - len(sensors), u.size)]
+    for name, value, place in zip((*fixed, *sensors), (*values, *np.zeros(len(sensors))), places, strict=True):
+        for exact in (False, True):
+            slope = wide.slope_along(u, np.eye(u.size)[place], fitted.heights_m, exact)
+            if slope is not None:
+                yield name, float(value), slope
+                break
 
 
 def nuisances_with_errors(fitted: Fitted, names: Sequence[str]) -> dict[str, Uncertain]:
@@ -222,20 +325,21 @@ def nuisances_with_errors(fitted: Fitted, names: Sequence[str]) -> dict[str, Unc
 
 
 def measurement_noise(fitted: Fitted) -> dict[str, float]:
-    return dict(zip(fitted.forecast.quantities, fitted.noise.measurement.tolist(), strict=True))
+    return dict(zip(fitted.forecast.quantities, fitted.scatter.tolist(), strict=True))
 
 
 def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
     """Return the floor's roughness, with its standard error from the curvature of the restricted likelihood."""
     roughness = fitted.noise.roughness_m
     if roughness == 0.0:
-        return {"roughness_m": 0.0, "standard_error": None, "at_bound": True}
+        return {"roughness_m": 0.0, "share_of_leg": 0.0, "standard_error": None, "at_bound": True}
     h = 1e-2
     moved = fitted.noise._replace(roughness_m=roughness * np.exp([-h, 0.0, h]))
     logs = evaluate(fitted.products, moved).restricted
     curvature = (2.0 * logs[1] - logs[0] - logs[2]) / h**2
     error = float(roughness / math.sqrt(curvature)) if curvature > 0.0 else None
-    return {"roughness_m": roughness, "standard_error": error, "at_bound": False}
+    share = roughness / fitted.problem.leg_length_m
+    return {"roughness_m": roughness, "share_of_leg": share, "standard_error": error, "at_bound": False}
 
 
 def rms_residuals(fitted: Fitted) -> dict[str, float]:

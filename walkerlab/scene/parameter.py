@@ -1,7 +1,7 @@
 """Config keys as parameters of families of walkers: unit, value, and the config at other values."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -12,6 +12,7 @@ from walkerlab.config.fields import Block, annotation_of, block_of, leaves, leav
 from walkerlab.config.problems import nearest, printable
 from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
+from walkerlab.config.writer import slope_in_degrees
 from walkerlab.errors import ConfigError
 
 R = TypeVar("R")
@@ -110,6 +111,13 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
 
 
 _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerlab schema` lists every key."
+
+
+def parameter_keys(config: ContactConfig) -> Iterator[str]:
+    """Yield the dotted keys of a config's parameters; the slope's as the config writes it."""
+    own = {".".join(path): field for path, field in leaves(Config, held=config)}
+    written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
+    yield from (written.get(key, key) for key in own if not why_no_parameter(key, config, own))
 
 
 def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:

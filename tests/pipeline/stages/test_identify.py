@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
-from walkerlab.errors import ConfigError
+from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Silent
@@ -86,7 +86,7 @@ def test_the_summary_has_the_fixed_keys_and_is_json(identified):
     assert set(summary["estimates"][0]) == {"key", "value", "standard_error", "unit", "start", "at_bound"}
     assert set(summary["gait"]) == {"period_s", "step_length_m", "spectral_radius"}
     assert all(set(value) == {"value", "standard_error"} for value in summary["gait"].values())
-    assert set(summary["noise"]["process"]) == {"roughness_m", "standard_error", "at_bound"}
+    assert set(summary["noise"]["process"]) == {"roughness_m", "share_of_leg", "standard_error", "at_bound"}
     assert summary["models"][0]["fit"] == "fits"
     assert summary["steps"] == 20
     assert np.allclose(np.diag(summary["correlations"]["matrix"]), 1.0)
@@ -427,3 +427,59 @@ def test_worst_combinations_spread_as_the_covariance(identified):
     moves = identified.groups["worst"]["moves"]
     # of two parameters, both combinations are the whole covariance
     assert np.allclose(moves.T @ moves, identified.groups["covariance"]["covariance"], rtol=1e-9)
+
+
+def test_the_noise_is_at_least_the_rounding_of_the_file(tmp_path, gait):
+    path = tmp_path / "stopwatch.csv"
+    path.write_text("T [ms]\n" + "\n".join(["730", "740", "730", "740", "730", "740"]))
+    changes = ask(path, "identify.columns={period_s: T}", "identify.units={time: ms}", "identify.fit={slope_deg: null}")
+    measured = read_measured(taken(*changes).identify, taken())
+    assert measured.resolution == {"step_period_s": pytest.approx(0.001)}
+    summary = identify.run(taken(*changes), gait, Silent()).summary
+    assert summary["noise"]["measurement"]["step_period_s"] >= 0.001 / np.sqrt(12.0) * (1.0 - 1e-9)
+
+
+def test_angles_in_degrees_are_rounded_to_their_last_digit(tmp_path, transient):
+    path = written_angles(tmp_path / "angles.csv", transient, 0.0)
+    time, *angles = np.loadtxt(path, delimiter=",", skiprows=1).T
+    rows = "\n".join(f"{t:.3f},{a:.1f},{b:.1f}" for t, a, b in zip(time, *np.degrees(angles), strict=True))
+    path.write_text(f"time (s),angle 1 (deg),angle 2 (deg)\n{rows}")
+    measured = read_measured(taken(*ask(path, "identify.level=angles")).identify, taken())
+    assert measured.resolution == {"angle_rad": pytest.approx(np.radians(0.1), rel=1e-6)}
+
+
+class Counting(Silent):
+    """Progress that counts the parts of each phase."""
+
+    def __init__(self):
+        self.phases = []
+
+    def start(self, label, total=None):
+        self.phases.append([label, total, 0])
+
+    def advance(self, n=1):
+        self.phases[-1][2] += n
+
+
+def test_each_fit_shows_its_rounds(table, gait):
+    progress = Counting()
+    identify.run(taken(*ask(table, "identify.fit={slope_deg: null}", "identify.starts=2")), gait, progress)
+    assert [label for label, _, _ in progress.phases] == ["rigid model, start 1 of 2", "rigid model, start 2 of 2"]
+    assert all(0 < done <= total for _, total, done in progress.phases)
+
+
+def test_an_exhausted_budget_is_no_answer_and_keeps_the_best_so_far(table, gait):
+    changes = ask(table, "identify.fit={slope_deg: null}", "slope_deg=1.3", "identify.max_walks=1")
+    with pytest.raises(NoAnswer) as caught:
+        identify.run(taken(*changes), gait, Silent())
+    assert "the budget of 1 predicted walks is exhausted (identify.max_walks)" in str(caught.value)
+    assert caught.value.partial.summary["models"][0]["fit"] == "not-converged"
+
+
+def test_the_answer_gives_the_reasons_for_doubt_and_still_uses_the_estimates(table, gait):
+    changes = ask(table, "identify.fit={slope_deg: null}", "identify.prior={walker.leg_length_m: [1.1, 0.01]}")
+    summary = identify.run(taken(*changes), gait, Silent()).summary
+    assert summary["models"][0]["fit"] == "fits-but"
+    text = " ".join(" ".join(answer("identify", {**summary, "config": "identified.yaml"})).split())
+    assert "The errors may be too small: the walk pulls walker.leg_length_m against its prior of 1.1 by" in text
+    assert "next: `walkerlab report -c identified.yaml`" in text

@@ -20,7 +20,8 @@ def test_the_rigid_model_fits_the_film_with_a_hip_too_light():
     fit = ["slope_deg", "walker.hip_mass_kg"]
     summary = identify("film.csv", fit, "angles", prior=prior, nuisance=["clock_rate"])
     slope, hip, _ = summary["estimates"]
-    assert summary["models"][0]["fit"] == "fits"
+    assert summary["models"][0]["fit"] == "fits-but"
+    assert any("against its prior of 1" in reason for reason in summary["models"][0]["reasons"])
     assert f"{slope['value']:.3f} ± {slope['standard_error']:.3f}" in PAGE
     assert f"{hip['value']:.2f} ± {hip['standard_error']:.2f}" in PAGE
     assert summary["prior"][0]["distance"] > 3.0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.physics.estimation.mixed_model import (
     Evaluation,
@@ -16,6 +18,7 @@ from walkerlab.physics.estimation.mixed_model import (
     Products,
     estimate_noise,
     evaluate,
+    most_probable_heights,
     products_of,
     whitening,
 )
@@ -23,8 +26,11 @@ from walkerlab.physics.estimation.prediction import Forecast, Prediction
 from walkerlab.physics.solvers.system import Floats
 
 Loss = Literal["linear", "soft_l1"]
-MAX_ROUNDS: Final = 12
+MAX_ROUNDS: Final = 25
+FREE_ROUNDS: Final = 10  # rounds after which noise and heights keep to the middle of two that lead to each other
+ALIKE: Final = 3.0  # largest difference of the log-likelihoods of such two
 SETTLED_NOISE: Final = 1e-2  # largest relative change of a settled standard deviation
+SETTLED_LIKELIHOOD: Final = 1e-2  # largest change of the restricted log-likelihood for standard deviations as likely
 SETTLED_MOVE: Final = 0.1  # largest change of a settled unknown, in standard errors
 FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quantity's typical size
 # smallest noise, as a fraction of a quantity's typical size; noise-free measurements are given this noise
@@ -38,6 +44,8 @@ SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown ha
 INSIDE: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
 # prior standard deviation of each scaled unknown about its start, which keeps undetermined combinations there
 WEAK_PRIOR: Final = 1.0
+# efficiency of the soft_l1 loss for normal noise: E[psi']^2 / E[psi^2] with psi(x) = x / sqrt(1 + x^2)
+SOFT_EFFICIENCY: Final = 0.9268
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +57,14 @@ class FitProblem:
     # (value, standard deviation) of parameters with prior knowledge, by index, in their units
     priors: Mapping[int, Sequence[float]] = field(default_factory=dict)
     loss: Loss = "linear"
+    max_walks: int = 10_000  # predicted walks after which the search ends
+
+    @cached_property
+    def floors(self) -> Floats:
+        """Smallest noise (quantities,) of each quantity: rounding of its values, or a fraction of its size."""
+        sizes, resolution = typical_sizes(self.forecast), self.forecast.measured.resolution
+        rounding = [resolution.get(name, 0.0) / math.sqrt(12.0) for name in self.forecast.quantities]
+        return np.maximum(NOISE_FLOOR * sizes, rounding)
 
     def first(self) -> Floats:
         """Return the scaled unknowns (unknowns,) at the start."""
@@ -94,41 +110,54 @@ class Fitted:
     @property
     def residuals(self) -> Floats:
         """Measured minus predicted values (values,) over the most probable floor."""
-        return np.asarray(self.data.residuals - self.data.G @ self.heights_m)
+        return np.asarray(self.data.residuals + self.data.trimmed - self.data.G @ self.heights_m)
+
+    @property
+    def scatter(self) -> Floats:
+        """Standard deviation (quantities,) of the measurement without outliers."""
+        return self.noise.measurement * (math.sqrt(SOFT_EFFICIENCY) if self.problem.loss == "soft_l1" else 1.0)
 
 
-def fit(problem: FitProblem, start: Floats) -> Fitted | str:
+def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambda: None) -> Fitted | str:
     """Fit the unknowns from a start (unknowns,); return the reason if no walk near the start can be predicted.
 
     Each round fits the unknowns by least squares on whitened residuals, then the standard deviations.
     """
     forecast, u = problem.forecast, start.copy()
-    size, even = typical_sizes(forecast), np.zeros(forecast.heights)
-    noise, heights, why = Noise(FIRST_NOISE * size, 0.0), even, "standard deviations still change"
+    even = np.zeros(forecast.heights)
+    noise, heights, why = Noise(FIRST_NOISE * typical_sizes(forecast), 0.0), even, "standard deviations still change"
     data = linearise(problem, u, heights)
     if data is None:
         return NO_NEIGHBOURS
-    for _ in range(MAX_ROUNDS):
+    robust = None
+    for done in range(MAX_ROUNDS):
+        on_round()
         before, u = u, least_squares_fit(problem, u, start, heights, data, noise)
-        data = None if forecast.predict(u, even) is None else linearise(problem, u, heights)
+        data = None if forecast.predict(u, even) is None else linearise(problem, u, heights, robust=robust)
         if data is None:
             # The data pull the walker out of its basin of attraction: judge the last walk that did not end early.
             u, why = before, NO_NEIGHBOURS
-            data = linearise(problem, u, heights)
+            data = linearise(problem, u, heights, robust=robust)
         if data is None:
             return NO_NEIGHBOURS
         products, earlier = products_of(data), noise
-        noise = estimate_noise(products, NOISE_FLOOR * size, problem.leg_length_m, noise)
-        evaluation = evaluate(products, noise)
-        heights = passable(problem, u, evaluation.heights_m)
+        noise = estimate_noise(products, problem.floors, problem.leg_length_m, noise)
+        if done >= FREE_ROUNDS and gain_of(products, earlier, noise) < ALIKE:
+            noise = between(earlier, noise) if done == FREE_ROUNDS else earlier
+        evaluation, robust = evaluate(products, noise), robust_at(products, noise)
+        likeliest = most_probable_heights(products, noise, evaluation.move)
+        heights = passable(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
         if why == NO_NEIGHBOURS:
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
         moved = float(np.max(np.abs(u - before) / errors))
-        if settled(earlier, noise, problem.leg_length_m) and moved < SETTLED_MOVE:
+        if moved < SETTLED_MOVE and settled(products, earlier, noise, problem.leg_length_m):
             why = ""
             break
-    data = linearise(problem, u, heights, exact=True) or linearise(problem, u, heights)
+        if forecast.walks_taken > problem.max_walks:
+            why = f"the budget of {problem.max_walks} predicted walks is exhausted (identify.max_walks)"
+            break
+    data = linearise(problem, u, heights, True, robust) or linearise(problem, u, heights, robust=robust)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return NO_NEIGHBOURS
@@ -138,15 +167,15 @@ def fit(problem: FitProblem, start: Floats) -> Fitted | str:
 def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     """Estimate the standard deviations at u (unknowns,), starting from another fit; None if a walk ends early."""
     problem, even = like.problem, np.zeros(like.forecast.heights)
-    data, predicted = linearise(problem, u, even), problem.forecast.predict(u, even)
+    robust = robust_at(like.products, like.noise)
+    data, predicted = linearise(problem, u, even, robust=robust), problem.forecast.predict(u, even)
     if data is None or predicted is None:
         return None
     products = products_of(data)
-    noise = estimate_noise(products, NOISE_FLOOR * data.sizes, problem.leg_length_m, like.noise)
+    noise = estimate_noise(products, problem.floors, problem.leg_length_m, like.noise)
     evaluation = evaluate(products, noise)
-    return replace(
-        like, u=u, heights_m=evaluation.heights_m, noise=noise, evaluation=evaluation, data=data, predicted=predicted
-    )
+    heights = most_probable_heights(products, noise, evaluation.move)
+    return replace(like, u=u, heights_m=heights, noise=noise, evaluation=evaluation, data=data, predicted=predicted)
 
 
 def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
@@ -155,10 +184,24 @@ def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
     return next(shares, 0.0) * heights
 
 
-def settled(before: Noise, after: Noise, leg_length_m: float) -> bool:
+def between(before: Noise, after: Noise) -> Noise:
+    """Return standard deviations halfway between two."""
+    middle = np.sqrt(before.measurement * after.measurement)
+    return Noise(middle, 0.5 * (before.roughness_m + after.roughness_m))
+
+
+def settled(products: Products, before: Noise, after: Noise, leg_length_m: float) -> bool:
+    """Whether standard deviations have stopped changing, or change without becoming likelier."""
     same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED_NOISE)
     change = abs(after.roughness_m - before.roughness_m)
-    return bool(same) and change < SETTLED_NOISE * max(after.roughness_m, 1e-7 * leg_length_m)
+    if same and change < SETTLED_NOISE * max(after.roughness_m, 1e-7 * leg_length_m):
+        return True
+    return gain_of(products, before, after) < SETTLED_LIKELIHOOD
+
+
+def gain_of(products: Products, before: Noise, after: Noise) -> float:
+    """Return how much the restricted log-likelihood rises from one noise to another."""
+    return float(evaluate(products, after).restricted - evaluate(products, before).restricted)
 
 
 def typical_sizes(forecast: Forecast) -> Floats:
@@ -167,15 +210,57 @@ def typical_sizes(forecast: Forecast) -> Floats:
     return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
 
 
-def linearise(problem: FitProblem, u: Floats, heights: Floats, exact: bool = False) -> Linearised | None:
+def linearise(
+    problem: FitProblem, u: Floats, heights: Floats, exact: bool = False, robust: Robust | None = None
+) -> Linearised | None:
+    """Linearise the prediction at u (unknowns,) and heights (heights,); None if a walk ends early.
+
+    robust  how a robust loss trims the residuals; None leaves them whole
+    """
     forecast = problem.forecast
     prediction = forecast.predict(u, heights)
     derivatives = forecast.differentiate(u, heights, np.eye(heights.size), exact)
     if prediction is None or derivatives is None:
         return None
     J, G = derivatives
-    residuals = forecast.values - prediction.values + G @ heights
-    return Linearised(residuals, J, G, forecast.quantity, problem.prior_rows(u), typical_sizes(forecast))
+    residuals = whole = forecast.values - prediction.values
+    if problem.loss == "soft_l1" and robust is not None:
+        residuals = trim(whole, forecast.quantity, robust)
+    rows, sizes = problem.prior_rows(u), typical_sizes(forecast)
+    return Linearised(residuals + G @ heights, J, G, forecast.quantity, rows, sizes, whole - residuals)
+
+
+def trim(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floats:
+    """Return pseudo-residuals (values,) whose least-squares fit, noise and errors are those of the soft_l1 loss.
+
+    With the loss's derivative psi(x) = x / sqrt(1 + x^2) of residuals in units of their scatter, least squares on
+    psi / mean(psi') has the fixed point and the covariance of the robust fit; another factor corrects for short walks.
+    So its noise, times the square root of the loss's efficiency, is the scatter of values without outliers.
+
+    Source: Huber, Robust Statistics, Wiley (1981), sections 7.4 to 7.8.
+    """
+    steepness = 1.0 / np.sqrt(1.0 + (residuals / robust.scatter[quantity]) ** 2)
+    counts = np.bincount(quantity)
+    mean, square = (np.bincount(quantity, steepness**power) / counts for power in (3, 6))
+    factor = (1.0 + robust.absorbed * (square / mean**2 - 1.0)) / mean
+    return np.asarray(residuals * steepness * factor[quantity])
+
+
+class Robust(NamedTuple):
+    """Scatter of each quantity, and how much of its noise a fit absorbs, as a robust loss needs them."""
+
+    scatter: Floats  # (quantities,) standard deviation of values without outliers
+    absorbed: Floats  # (quantities,) share of the noise's variance that the fitted unknowns and floor absorb
+
+
+def robust_at(products: Products, noise: Noise) -> Robust:
+    informations = products.sums[:, 1:, 1:] * noise.measurement[:, None, None] ** -2.0
+    whole = informations.sum(axis=0)
+    unknowns, roughness = products.unknowns, max(noise.roughness_m, 1e-12)
+    whole[:unknowns, :unknowns] += products.prior[1:, 1:]
+    whole[unknowns:, unknowns:] += np.eye(len(whole) - unknowns) / roughness**2
+    absorbed = np.einsum("qij,ji->q", informations, np.linalg.pinv(whole, hermitian=True)) / products.counts
+    return Robust(math.sqrt(SOFT_EFFICIENCY) * noise.measurement, absorbed)
 
 
 def least_squares_fit(
@@ -187,7 +272,7 @@ def least_squares_fit(
     forecast, low_high = problem.forecast, problem.limits()
     inside = np.clip(u, low_high[0] + INSIDE, low_high[1] - INSIDE)
     whiten, known = whitening(data.G, forecast.quantity, noise), (inside, data.J)
-    offset = forecast.values + data.G @ heights
+    offset = forecast.values - data.trimmed + data.G @ heights
 
     def residuals(x: Floats) -> Floats:
         prediction = forecast.predict(x, heights)
@@ -202,6 +287,6 @@ def least_squares_fit(
         own = -whiten(known[1])
         return np.vstack((own, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
 
-    settings = {"loss": problem.loss, "max_nfev": EVALUATIONS, "xtol": SETTLED_FIT, "ftol": SETTLED_FIT}
+    settings = {"max_nfev": EVALUATIONS, "xtol": SETTLED_FIT, "ftol": SETTLED_FIT}
     result = least_squares(residuals, inside, jacobian, low_high, **settings)
     return np.asarray(result.x)

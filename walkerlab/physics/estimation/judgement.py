@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from scipy.special import ndtri, stdtr
+from scipy.special import chdtrc, ndtri, stdtr
 
 from walkerlab.physics.estimation.fit import Fitted
 from walkerlab.physics.estimation.measurements import LEG_ANGLE
@@ -20,10 +21,18 @@ OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
 SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; the residual of a missed heel strike is far larger
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
 PHASE_BINS: Final = 20
+UNUSUALLY_ROUGH: Final = 0.003  # fraction of the leg length; the floor of a laboratory is rough by about 0.001
+DEPENDENT: Final = 2.4  # largest acceptable scatter of averaged residuals, as a normal deviate: 0.8 % of right walks
 
 
-def judge(fitted: Fitted) -> tuple[Fit, str]:
-    """Return whether a model fits, and the reason if it does not."""
+def judge(fitted: Fitted) -> tuple[Fit, tuple[str, ...]]:
+    """Return whether a model fits, and the reasons if it does not or if its errors are doubtful."""
+    fit, reason = judge_fit(fitted)
+    reasons = (reason,) if reason else (*implausible_floor(fitted), *dependent_residuals(fitted))
+    return ("fits-but" if reasons and fit == "fits" else fit), reasons
+
+
+def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
     forecast, sizes = fitted.forecast, fitted.data.sizes
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
@@ -54,6 +63,36 @@ def judge(fitted: Fitted) -> tuple[Fit, str]:
         if systematic > LARGEST_SHARE * sizes[forecast.quantities.index(LEG_ANGLE)]:
             return "misfit", f"the angles differ by {systematic:.3g} rad at the same phase of every step"
     return "fits", ""
+
+
+def implausible_floor(fitted: Fitted) -> Iterator[str]:
+    """Yield what is wrong with a floor that is rougher than floors are."""
+    roughness, leg = fitted.noise.roughness_m, fitted.problem.leg_length_m
+    if roughness > UNUSUALLY_ROUGH * leg:
+        yield (
+            f"the floor would be {1e3 * roughness:.2g} mm rough, {100.0 * roughness / leg:.2g} % of the leg "
+            "(a laboratory's: 0.1 %), so something else disturbs the walk, or a fixed parameter is wrong"
+        )
+
+
+def dependent_residuals(fitted: Fitted) -> Iterator[str]:
+    """Yield how much more the residuals' averages over half steps scatter than independent noise allows."""
+    # Angles compared at fractions of steps inherit the errors of the measured heel strikes.
+    measured = fitted.forecast.measured
+    if not measured.sampled or fitted.forecast.in_phase:
+        return
+    white = whitening(fitted.data.G, fitted.forecast.quantity, fitted.noise)(fitted.data.residuals).reshape(-1, 2)
+    half = 2 * measured.step + (measured.phase >= 0.5)
+    counts = np.bincount(half)
+    sums = np.array([np.bincount(half, leg) for leg in white.T])[:, counts > 0]
+    squares = float((sums**2 / counts[counts > 0]).sum())
+    freedom = max(1, sums.size - fitted.u.size)
+    if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > DEPENDENT:
+        yield (
+            f"residuals of successive angles go together (averages over half a step scatter "
+            f"{math.sqrt(squares / freedom):.2g} times as much as independent noise allows), so that the standard "
+            "errors are too small"
+        )
 
 
 def name_and_unit(quantity: str) -> tuple[str, str]:

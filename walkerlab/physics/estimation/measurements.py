@@ -1,5 +1,6 @@
 """Measured walks: periods and lengths of steps, or angles of both legs over time."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -26,6 +27,7 @@ class MeasuredWalk:
     angles_rad: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     # sum of both legs' angles from the slope's normal at heel strikes; not zero if slope or sensors are off
     touch_sum_rad: float = 0.0
+    resolution: Mapping[str, float] = field(default_factory=dict)  # smallest decimal place of quantities, in SI units
 
     @property
     def count(self) -> int:

@@ -130,10 +130,16 @@ class Forecast:
 
     def predict(self, u: Floats, heights_m: Floats) -> Prediction | None:
         """Predict the walk; None if it ends early or there is no valid walker."""
-        return self._recent(u.tobytes(), heights_m.tobytes())
+        prediction: Prediction | None = self._recent(u.tobytes(), heights_m.tobytes())
+        return prediction
+
+    @property
+    def walks_taken(self) -> int:
+        """Number of walks predicted so far."""
+        return int(self._recent.cache_info().misses)
 
     @cached_property
-    def _recent(self) -> Callable[[bytes, bytes], Prediction | None]:
+    def _recent(self) -> Any:
         # arrays cannot be keys, so their bytes are
         @lru_cache(KEPT_PREDICTIONS)
         def predict(u: bytes, heights_m: bytes) -> Prediction | None:
@@ -164,14 +170,14 @@ class Forecast:
         prediction, starts = self.predict(u, heights_m), self.directions.shape[1]
         if prediction is None:
             return None
-        by_parameter = [self._along(u, unit, heights_m, exact) for unit in np.eye(u.size)[: self.scales.size]]
+        by_parameter = [self.slope_along(u, unit, heights_m, exact) for unit in np.eye(u.size)[: self.scales.size]]
         tangents = self._tangents(u, heights_m, lifts, prediction)
         if tangents is None or any(column is None for column in by_parameter):
             return None
         moves, by_sensor = tangents
         return np.column_stack((*by_parameter, moves[:, :starts], by_sensor)), moves[:, starts:]  # type: ignore[arg-type]
 
-    def _along(self, u: Floats, direction: Floats, heights_m: Floats, exact: bool) -> Floats | None:
+    def slope_along(self, u: Floats, direction: Floats, heights_m: Floats, exact: bool) -> Floats | None:
         """Return the difference quotient (values,) along a direction (unknowns,)."""
 
         def values(share: float) -> Floats | None:

@@ -1,14 +1,16 @@
 """Result of an identification: estimates with errors, and how well the walk determines them."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 from walkerlab.physics.estimation.fit import Fitted
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.orbits.step_map import DisturbedWalk
 from walkerlab.physics.solvers.system import Floats
 
-Fit = Literal["fits", "misfit", "not-converged"]
+Fit = Literal["fits", "fits-but", "misfit", "not-converged"]
+USABLE: Final = ("fits", "fits-but")
+"""Verdicts on walks that a model explains, the better first."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,16 @@ class Estimate:
     unit: str
     start: float
     at_bound: bool
+
+
+@dataclass(frozen=True)
+class Pull:
+    """How hard the data pull an estimate against a bound, or against a prior."""
+
+    key: str
+    against: Literal["bound", "prior"]
+    value: float  # bound or prior value, in the key's unit
+    standard_deviations: float
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,11 @@ class ModelFit:
     model: str
     log_likelihood: float | None
     fit: Fit
-    reason: str
+    reasons: tuple[str, ...] = ()  # why a model does not fit, or what speaks against its errors
+
+    @property
+    def usable(self) -> bool:
+        return self.fit in USABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +94,10 @@ class StepTable:
 class Identification:
     model: str
     estimates: tuple[Estimate, ...]
+    pulls: tuple[Pull, ...]
     not_identifiable: tuple[Unidentifiable, ...]
     information: Information
-    process: dict[str, float | bool | None]  # roughness_m, standard_error, at_bound
+    process: dict[str, float | bool | None]  # roughness_m, share_of_leg, standard_error, at_bound
     measurement: dict[str, float]  # standard deviation of each quantity
     rms_residual: dict[str, float]
     chi_square_per_dof: float

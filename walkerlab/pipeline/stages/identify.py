@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -17,7 +16,7 @@ from walkerlab.labels import Label, unit_by_name
 from walkerlab.physics.estimation.information import is_open
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.prediction import GAIN, OFFSET
-from walkerlab.physics.estimation.result import Estimate, Identification, Information
+from walkerlab.physics.estimation.result import Estimate, Identification, Information, Pull
 from walkerlab.physics.hybrid.rigid_measures import FootholdsOfWalk, places
 from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
@@ -41,7 +40,6 @@ LABELS: Final = {
     "standard_error": Label("SI", "standard error; absent if the walk does not determine the parameter"),
     "start": Label("SI", "value in the config"),
 }
-UNTOUCHED: Final = 1e-3  # a smaller relative reduction of a prior's variance counts as no information
 SHOWN_STEPS, SHOWN_SAMPLES = 10, 800
 """Number of steps, and approximate number of samples, that the motion player shows."""
 FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
@@ -52,16 +50,21 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     refuse(config)
     block = config.identify
     assert block is not None, "refuse rejects a config without the block"
-    progress.start("identify")
     gait = inputs["fixedpoint"].summary
 
+    def begin(label: str, rounds: int) -> Callable[[], None]:
+        progress.start(label, rounds)
+        return progress.advance
+
     def ask(measured: MeasuredWalk) -> Identification:
-        return identify_walk(cast("Config", config), measured, gait, block, progress.note)
+        return identify_walk(cast("Config", config), measured, gait, block, progress.note, begin)
 
     result = identify_divided(config, block, ask)
     content, verdict = content_of(config, result), result.verdict
     if verdict.fit == "not-converged":
-        raise NoAnswer(f"the fit of the {verdict.model} model did not converge: {verdict.reason}", FEWER, content)
+        open_combinations = "".join(f"; open: {entry.combination}" for entry in result.not_identifiable)
+        reason = f"the fit of the {verdict.model} model did not converge: {verdict.reasons[0]}{open_combinations}"
+        raise NoAnswer(reason, FEWER, content)
     return content
 
 
@@ -93,7 +96,7 @@ def refuse(config: IdentifyConfig) -> None:
 def identify_divided(
     config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification]
 ) -> Identification:
-    """Try divisions of the walk into steps; return the first with a good fit, or else the first that can be fitted."""
+    """Try divisions of the walk into steps; return the first that fits, or else the best, the earlier of equals."""
     answers, problems = list[Identification](), list[NoAnswer]()
     for measured in read_divisions(block, config):
         try:
@@ -105,7 +108,7 @@ def identify_divided(
             return answers[-1]
     if not answers:
         raise problems[0]
-    return answers[0]
+    return max(answers, key=lambda answer: answer.verdict.usable)
 
 
 def divide_again(
@@ -122,7 +125,7 @@ def divide_again(
         again = ask(divide_at(block, config, touch_sum))
     except (ConfigError, NoAnswer):
         return before
-    return again if again.verdict.fit == "fits" else before
+    return again if again.verdict.usable else before
 
 
 def content_of(config: IdentifyConfig, result: Identification) -> Content:
@@ -143,17 +146,19 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
         "directions": [dict(zip(known.keys, row, strict=True)) for row in known.directions.tolist()],
         "noise": {"process": dict(result.process), "measurement": dict(result.measurement)},
         "contributions": dict(known.contributions),
+        "pulls": [asdict(pull) for pull in result.pulls],
         "prior": [
-            prior_row(estimate, *block.prior[estimate.key])
+            prior_row(estimate, pull, block.prior[pull.key][1])
+            for pull in result.pulls
             for estimate in result.estimates
-            if estimate.key in block.prior
+            if pull.against == "prior" and estimate.key == pull.key
         ],
         "nuisance": {name: asdict(value) for name, value in result.nuisances.items()},
         "steps": result.measured.count,
         "rms_residual": dict(result.rms_residual),
         "chi_square_per_dof": result.chi_square_per_dof,
         "gait": {name: asdict(value) for name, value in result.gait.items()},
-        "models": [asdict(model) for model in result.models],
+        "models": [{**asdict(model), "reason": "; ".join(model.reasons)} for model in result.models],
         "reference_masses_kg": reference_masses(config, [estimate.key for estimate in result.estimates], result.model),
     }
     groups = {"estimates": rows_group(estimates, LABELS, "row", "row"), "steps": step_group(result)}
@@ -170,17 +175,14 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
     return Content(groups, summary)
 
 
-def prior_row(estimate: Estimate, value: float, sigma: float) -> dict[str, Any]:
+def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
     """Return a prior, with its distance from the walk's own estimate in standard errors of the difference."""
-    error = estimate.standard_error
-    free = 0.0 if error is None else sigma**2 - error**2
-    distance = abs(estimate.value - value) / math.sqrt(free) if free > UNTOUCHED * sigma**2 else 0.0
     return {
-        "key": estimate.key,
-        "value": value,
+        "key": pull.key,
+        "value": pull.value,
         "standard_deviation": sigma,
         "unit": estimate.unit,
-        "distance": distance,
+        "distance": pull.standard_deviations,
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -16,7 +17,13 @@ from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
 from walkerlab.labels import unit_by_name
-from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
+from walkerlab.physics.estimation.measurements import (
+    LEG_ANGLE,
+    STEP_LENGTH,
+    STEP_PERIOD,
+    MeasuredWalk,
+    split_into_steps,
+)
 from walkerlab.physics.estimation.prediction import OFFSET
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
@@ -31,7 +38,7 @@ if TYPE_CHECKING:
 STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
 """Kind of unit of each quantity in a table of steps."""
 MIN_STEPS: Final = 2
-MOST_STEPS: Final = 500  # each step adds an unknown floor height; memory grows as steps squared, time as steps cubed
+MOST_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
 SAME_TOUCHES: Final = 0.002  # rad, largest change of the sum of leg angles at heel strike that counts as no change
@@ -59,11 +66,11 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
     if block.level == "steps":
         yield refuse_count(path, read_steps(path, block))
         return
-    walk = as_walk(read_recording(path, DATA_KEY), block.columns, block.units)
+    walk, resolution = read_angles(block)
     problem, divided = None, False
     for touch_sum_rad in touch_sums(walk, block, config):
         try:
-            measured = divide_angles(walk, config, str(path), touch_sum_rad)
+            measured = divide_angles(walk, config, str(path), touch_sum_rad, resolution)
         except ConfigError as error:
             problem = problem or error
         else:
@@ -94,12 +101,37 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
 
 def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredWalk:
     """Divide the angles in the block's file into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
-    walk = as_walk(read_recording(Path(block.data)), block.columns, block.units)
-    return divide_angles(walk, config, block.data, touch_sum_rad)
+    walk, resolution = read_angles(block)
+    return divide_angles(walk, config, block.data, touch_sum_rad, resolution)
 
 
-def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float) -> MeasuredWalk:
-    """Divide angles of the config's walker into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
+def read_angles(block: Identify) -> tuple[RecordedWalk, float]:
+    """Read the recording in the block's file; return it with the smallest decimal place of its angles (rad).
+
+    That is 0 for angles that are computed from markers.
+    """
+    recording = read_recording(Path(block.data), DATA_KEY)
+    walk = as_walk(recording, block.columns, block.units)
+    source = walk.sources["angle 1"]
+    written = recording.columns.get(source)
+    if written is None:
+        return walk, 0.0
+    unit = unit_value(recording, "angle 1", source, "angle", block.units)
+    return walk, unit * smallest_decimal(written[np.isfinite(written)])
+
+
+def smallest_decimal(values: Floats) -> float:
+    """Return the smallest decimal place that the values use: 0.001 for 0.72 and 0.725, 1 for whole numbers."""
+    return next((10.0**-place for place in range(16) if np.array_equal(np.round(values, place), values)), 0.0)
+
+
+def divide_angles(
+    walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float, resolution: float = 0.0
+) -> MeasuredWalk:
+    """Divide angles of the config's walker into steps; at heel strike the sum of the leg angles is `touch_sum_rad`.
+
+    resolution  smallest decimal place of the angles, rad
+    """
     steps = divide_into_steps(walk, rigid_walker(config), source, touch_sum_rad)
     if steps.touch_time_s.size < MIN_STEPS:
         raise ConfigError(f"{source} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
@@ -107,7 +139,9 @@ def divide_angles(walk: RecordedWalk, config: RigidConfig, source: str, touch_su
     assert angles is not None, "a walk in steps has angles"
     # use only measured samples: the samples of `steps` at heel strikes are interpolated
     own = angles[:, ::-1] if steps.swapped else angles
-    return split_into_steps(walk.time_s - steps.origin_s, own, np.append(0.0, steps.touch_time_s), touch_sum_rad)
+    touches = np.append(0.0, steps.touch_time_s)
+    measured = split_into_steps(walk.time_s - steps.origin_s, own, touches, touch_sum_rad)
+    return replace(measured, resolution={LEG_ANGLE: resolution})
 
 
 def read_steps(path: Path, block: Identify) -> MeasuredWalk:
@@ -116,21 +150,27 @@ def read_steps(path: Path, block: Identify) -> MeasuredWalk:
     refuse_units(table, block.units, STEP_KINDS)
     for name in block.columns.keys() - STEP_KINDS.keys():
         raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Choose from {', '.join(STEP_KINDS)}.")
-    values = {name: read_column(table, name, block) for name in STEP_KINDS}
-    period = values["period_s"]
-    if period is None:
+    columns = {name: column for name in STEP_KINDS if (column := read_column(table, name, block)) is not None}
+    if "period_s" not in columns:
         near = get_close_matches("period_s", table.columns, 1, 0.3) or list(table.columns)[:1]
         raise ConfigError(
             f"{path} has no column period_s; it has: {', '.join(list(table.columns)[:8])}.",
             f'Name the column of periods: --columns "period_s={near[0]}". Angles over time need --level angles.',
         )
+    values = {name: in_si for name, (in_si, _) in columns.items()}
+    period = values["period_s"]
     if period.size < MIN_STEPS:
         raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
-    return MeasuredWalk(period, values["length_m"], values["touch_angle_rad"])
+    quantities = dict(zip(STEP_KINDS, (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE), strict=True))
+    resolution = {quantities[name]: smallest for name, (_, smallest) in columns.items()}
+    return MeasuredWalk(period, values.get("length_m"), values.get("touch_angle_rad"), resolution=resolution)
 
 
-def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
-    """Return a quantity (steps,) in SI units, None if it has no column; raises ConfigError for gaps and bad values."""
+def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, float] | None:
+    """Return a quantity (steps,) and its smallest decimal place, both in SI units; None if it has no column.
+
+    Raises ConfigError for gaps and bad values.
+    """
     by_name = {plain(column): column for column in table.columns}
     stem = name.rpartition("_")[0]
     source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
@@ -144,9 +184,10 @@ def read_column(table: Recording, name: str, block: Identify) -> Floats | None:
             f"{table.path}: {source!r} is {values[bad[0]]:g} in step {bad[0] + 1}; it must be above 0.",
             "Correct it, or leave out the step and those before it.",
         )
-    in_si = np.asarray(values * unit_value(table, name, source, STEP_KINDS[name], block.units))
+    unit = unit_value(table, name, source, STEP_KINDS[name], block.units)
+    in_si = np.asarray(values * unit)
     refuse_sizes(table, name, source, in_si)
-    return in_si
+    return in_si, smallest_decimal(values) * unit
 
 
 def refuse_sizes(table: Recording, name: str, source: str, values: Floats) -> None:

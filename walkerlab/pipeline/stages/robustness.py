@@ -10,12 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 from walkerlab.config.drives import drives_of
-from walkerlab.config.fields import leaves
 from walkerlab.config.ground import Footholds
 from walkerlab.config.reads import RobustnessConfig
-from walkerlab.config.schema import Config
 from walkerlab.config.walkers import contact_required_error
-from walkerlab.config.writer import slope_in_degrees
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import Label
 from walkerlab.physics.hybrid.recorded_walk import as_state
@@ -42,7 +39,7 @@ from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.work import WorkUnit, complete
 from walkerlab.pipeline.workers import in_order
 from walkerlab.scene.families import model_reads, refuse_unread
-from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, parameter_of, why_no_parameter
+from walkerlab.scene.parameter import SLOPE, parameter_keys, parameter_of
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
@@ -305,8 +302,6 @@ def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
 
 def numbers_read(subject: ModelUnderTest, requested: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the dotted keys of the parameters that the model reads, either the requested ones or all."""
-    own = {".".join(path): field for path, field in leaves(Config, held=subject.config)}
-    in_degrees = slope_in_degrees(subject.config.slope_rad) is not None
-    written = {SLOPE_RAD: SLOPE_DEG} if in_degrees else {}
-    every = (written.get(key, key) for key in own if not why_no_parameter(key, subject.config, own))
-    return tuple(key for key in requested or every if model_reads(subject.model, subject.config, key))
+    return tuple(
+        key for key in requested or parameter_keys(subject.config) if model_reads(subject.model, subject.config, key)
+    )

@@ -264,7 +264,7 @@ def config_lines(summary: Summary) -> list[str]:
 def identified_walker(summary: Summary) -> list[str | Table]:
     from walkerlab.views.report.sections import identification
 
-    usable = any(row["fit"] == "fits" for row in summary["models"] if row["model"] == summary["model"])
+    usable = identification.is_usable(identification.verdict_of(summary))
     lines = config_lines(summary) if usable else config_lines(summary)[:1]
     return [*identification.findings(summary), *identification.tables(summary), *lines]
 

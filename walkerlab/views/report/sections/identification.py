@@ -16,6 +16,7 @@ NO_EFFECT = 1e-6
 """Fraction of the largest singular value below which a parameter combination counts as having no effect on any walk."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
+REFERENCES = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
     "step_length_m": "steps of {}",
     "period_s": "a period of {}",
@@ -48,7 +49,7 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
     """Return the answer in sentences: estimates, undetermined combinations, fit, gait and the other model."""
-    verdict = next(row for row in summary["models"] if row["model"] == summary["model"])
+    verdict = verdict_of(summary)
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
     references = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
@@ -69,12 +70,21 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     singular = summary["singular_values"]
     without_effect = separable and min(singular) < NO_EFFECT * max(singular)
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
-    beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]))
-    quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary))
+    beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]), is_usable(verdict))
+    quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary), is_usable(verdict))
     return [
         *words.parts("identify.findings", summary, verdict, *parameters, *beside),
         *words.parts("identify.quality", summary, verdict, *quality),
     ]
+
+
+def verdict_of(summary: Mapping[str, Any]) -> Mapping[str, Any]:
+    verdict: Mapping[str, Any] = next(row for row in summary["models"] if row["model"] == summary["model"])
+    return verdict
+
+
+def is_usable(verdict: Mapping[str, Any]) -> bool:
+    return verdict["fit"] in ("fits", "fits-but")
 
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
@@ -147,7 +157,8 @@ def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str,
 def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     return capitalised(
         join_words(
-            f"the {axis_label(name)} is {with_error(row['value'], row['standard_error'], unit_by_name(name))}"
+            f"the {axis_label(name)}{REFERENCES.get(name, '')} is "
+            f"{with_error(row['value'], row['standard_error'], unit_by_name(name))}"
             for name, row in nuisances.items()
         )
     )
@@ -164,8 +175,9 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
 
 def noise_in_words(summary: Mapping[str, Any]) -> str:
     """Describe the roughness of the floor and the noise of the measurement."""
-    floor = summary["noise"]["process"]["roughness_m"]
-    parts = [f"floor {number(1e3 * floor, 2)} mm rough" if floor else "an even floor"]
+    process = summary["noise"]["process"]
+    floor, share = (number(value, 2) for value in (1e3 * process["roughness_m"], 100.0 * process["share_of_leg"]))
+    parts = [f"floor {floor} mm rough, {share} % of the leg" if process["roughness_m"] else "an even floor"]
     parts += [
         f"{axis_label(name)} measured to {quantity(value, unit_by_name(name), 2)}"
         for name, value in summary["noise"]["measurement"].items()

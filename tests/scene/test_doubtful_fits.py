@@ -1,0 +1,271 @@
+"""Identified walkers with doubtful errors: noise that the floor hides, outliers, contradictions, other disturbances."""
+
+import tracemalloc
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from measured_plain_walk import measure_angles, measure_steps
+
+from walkerlab.api import in_memory
+from walkerlab.config.identify import Identify
+from walkerlab.config.loader import load
+from walkerlab.physics.estimation.judgement import implausible_floor
+from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
+from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
+from walkerlab.scene.identification import identify_walk
+from walkerlab.scene.rigid import rigid_walker
+
+LEG, HIP = "walker.leg_length_m", "walker.hip_mass_kg"
+WALKER = ("slope_deg=2", "walker.leg_length_m=1", "walker.foot_to_mass_m=0.5", "walker.leg_mass_kg=5", HIP + "=10")
+# three walks, measured to 1 ms and 1 mm; the last has outliers
+PERIODS = (
+    0.722004,
+    0.718981,
+    0.721135,
+    0.71914,
+    0.716812,
+    0.718358,
+    0.722169,
+    0.717603,
+    0.719281,
+    0.71832,
+    0.718022,
+    0.726498,
+    0.711292,
+    0.726802,
+    0.715114,
+    0.718599,
+    0.717338,
+    0.720623,
+    0.722093,
+    0.720409,
+)
+OTHER_PERIODS = (
+    0.7166,
+    0.720553,
+    0.716541,
+    0.717025,
+    0.723188,
+    0.719303,
+    0.720866,
+    0.718216,
+    0.720745,
+    0.719621,
+    0.721957,
+    0.719875,
+    0.720422,
+    0.716196,
+    0.71952,
+    0.720062,
+    0.719865,
+    0.718727,
+    0.718102,
+    0.720921,
+)
+OUTLYING_PERIODS = (
+    0.734737,
+    0.705391,
+    0.709023,
+    0.7223,
+    0.725087,
+    0.72127,
+    0.717802,
+    0.718044,
+    0.72115,
+    0.721519,
+    0.716824,
+    0.739816,
+    0.721447,
+    0.717608,
+    0.722631,
+    0.718745,
+    0.717855,
+    0.719917,
+    0.720869,
+    0.717706,
+)
+OUTLYING_LENGTHS = (
+    0.452965,
+    0.463283,
+    0.471806,
+    0.471109,
+    0.441428,
+    0.465679,
+    0.466542,
+    0.469702,
+    0.466835,
+    0.465824,
+    0.466379,
+    0.469304,
+    0.46894,
+    0.470671,
+    0.46735,
+    0.467218,
+    0.469678,
+    0.469263,
+    0.468309,
+    0.46833,
+)
+
+
+@cache
+def walker(*sets):
+    config = load(Path("slope-3deg"), sets).config
+    gait = in_memory("fixedpoint", config).summary
+    return config, gait, rigid_walker(config), np.array(gait["state"])
+
+
+def identify(measured, *sets, **question):
+    config, gait, *_ = walker(*sets)
+    return identify_walk(config, measured, gait, Identify(**question))
+
+
+@cache
+def measured_steps():
+    *_, model, start = walker()
+    return MeasuredWalk(*measure_steps(model, start, np.random.default_rng(0), steps=14))
+
+
+def values(result):
+    return {estimate.key: estimate for estimate in result.estimates}
+
+
+def test_one_quantity_keeps_its_noise_apart_from_the_floor():
+    result = identify(MeasuredWalk(np.array(PERIODS)), *WALKER, "slope_deg=2.1", fit={"slope_deg": None})
+    slope = values(result)["slope_deg"]
+    assert 3e-4 < result.measurement["step_period_s"] < 3e-3
+    assert abs(slope.value - 2.0) < 2.0 * slope.standard_error
+    assert slope.standard_error < 0.05
+
+
+def test_periods_alone_leave_two_parameters_open_and_say_so():
+    fit = {"slope_deg": None, HIP: None}
+    result = identify(MeasuredWalk(np.array(OTHER_PERIODS)), *WALKER, "slope_deg=1.9", HIP + "=11", fit=fit)
+    assert result.verdict.fit == "fits"
+    assert {key for key in fit for entry in result.not_identifiable if key in entry.combination} == set(fit)
+    assert [estimate.standard_error for estimate in result.estimates] == [None, None]
+
+
+def test_outliers_change_neither_noise_nor_errors_of_a_soft_loss():
+    measured = MeasuredWalk(np.array(OUTLYING_PERIODS), np.array(OUTLYING_LENGTHS))
+    linear, soft = (
+        identify(measured, *WALKER, "slope_deg=2.05", fit={"slope_deg": None}, loss=loss)
+        for loss in ("linear", "soft_l1")
+    )
+    slope = values(soft)["slope_deg"]
+    assert linear.verdict.fit == "misfit"
+    assert soft.verdict.fit == "fits"
+    assert abs(slope.value - 2.0) < 2.0 * slope.standard_error
+    assert slope.standard_error < 0.3 * values(linear)["slope_deg"].standard_error
+    assert all(5e-4 < noise < 2e-3 for noise in soft.measurement.values())
+    assert soft.rms_residual["step_period_s"] > 3.0 * soft.measurement["step_period_s"]
+
+
+def test_a_soft_loss_agrees_with_the_linear_one_without_outliers():
+    fit = {"slope_deg": None, LEG: None}
+    linear, soft = (values(identify(measured_steps(), fit=fit, loss=loss)) for loss in ("linear", "soft_l1"))
+    for key in fit:
+        assert soft[key].standard_error == pytest.approx(linear[key].standard_error, rel=0.3)
+        assert abs(soft[key].value - linear[key].value) < linear[key].standard_error
+
+
+def test_noise_is_never_below_the_rounding_of_the_file():
+    walk = MeasuredWalk(np.full(12, 0.73), resolution={"step_period_s": 0.01})
+    result = identify(walk, fit={"slope_deg": None})
+    assert result.measurement["step_period_s"] >= 0.01 / np.sqrt(12.0) * (1.0 - 1e-9)
+
+
+def test_a_right_walker_fits():
+    result = identify(measured_steps(), fit={"slope_deg": None, LEG: None})
+    assert result.verdict.fit == "fits"
+    assert result.verdict.reasons == ()
+    for key, truth in (("slope_deg", 3.0), (LEG, 1.0)):
+        assert abs(values(result)[key].value - truth) < 3.0 * values(result)[key].standard_error
+
+
+def test_a_bound_that_excludes_the_truth_is_pulled_at():
+    result = identify(measured_steps(), LEG + "=0.98", fit={"slope_deg": None, LEG: [0.9, 0.99]})
+    (pull,) = result.pulls
+    free = values(identify(measured_steps(), fit={"slope_deg": None, LEG: None}))[LEG]
+    assert (pull.key, pull.against, pull.value) == (LEG, "bound", 0.99)
+    assert pull.standard_deviations == pytest.approx((free.value - 0.99) / free.standard_error, rel=0.1)
+    assert result.verdict.fit == "fits-but"
+    assert "against its bound of 0.99" in result.verdict.reasons[0]
+
+
+def test_a_bound_that_the_walk_does_not_press_is_no_doubt():
+    free = values(identify(measured_steps(), fit={"slope_deg": None, LEG: None}))[LEG]
+    edge = free.value - 0.5 * free.standard_error
+    result = identify(measured_steps(), LEG + "=0.98", fit={"slope_deg": None, LEG: [0.9, edge]})
+    assert result.verdict.fit == "fits"
+    assert result.pulls[0].standard_deviations == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_wrong_prior_does_not_become_noise():
+    free = identify(measured_steps(), fit={"slope_deg": None, LEG: None})
+    wrong = identify(measured_steps(), fit={"slope_deg": None}, prior={LEG: [1.05, 0.003]})
+    (pull,) = wrong.pulls
+    estimate = values(free)[LEG]
+    distance = (1.05 - estimate.value) / np.hypot(0.003, estimate.standard_error)
+    assert pull.standard_deviations == pytest.approx(distance, rel=0.1)
+    assert wrong.measurement == pytest.approx(free.measurement, rel=0.1)
+    assert wrong.verdict.fit == "fits-but"
+
+
+def test_a_floor_rougher_than_floors_are_is_a_reason_to_doubt():
+    fitted = identify(measured_steps(), fit={"slope_deg": None}).fitted
+    leg = fitted.problem.leg_length_m
+    reasons = [
+        list(implausible_floor(replace(fitted, noise=fitted.noise._replace(roughness_m=share * leg))))
+        for share in (0.0, 0.0029, 0.0089)
+    ]
+    assert reasons[:2] == [[], []]
+    assert "8.9 mm rough, 0.89 % of the leg" in reasons[2][0]
+
+
+@cache
+def measured_angles(seed, rate_change, *sets):
+    *_, model, start = walker(*sets)
+    times, angles, touches = measure_angles(model, start, np.random.default_rng(seed), 8, rate_change)
+    return split_into_steps(times, angles, touches)
+
+
+def test_a_wrong_hip_mass_is_named_and_would_raise_the_likelihood_by_what_a_refit_gains():
+    measured = measured_angles(0, 0.0, "slope_deg=3.5")
+    wrong = identify(measured, "slope_deg=3.5", HIP + "=11.2", fit={"slope_deg": None})
+    assert wrong.verdict.fit == "fits-but"
+    text = " ".join(wrong.verdict.reasons)
+    assert f"estimating {HIP}, too" in text or "estimating walker.leg_mass_kg, too" in text
+    right = identify(measured, "slope_deg=3.5", HIP + "=11.2", fit={"slope_deg": None, HIP: None})
+    gain = float(text.rpartition(" ")[2])
+    assert right.verdict.log_likelihood - wrong.verdict.log_likelihood == pytest.approx(gain, rel=0.3)
+    assert right.verdict.usable
+    assert abs(values(right)[HIP].value - 10.0) < 3.0 * values(right)[HIP].standard_error
+
+
+def test_rates_that_change_at_each_strike_are_seen_in_the_residuals():
+    even, kicked = (identify(measured_angles(3, change), fit={"slope_deg": None, HIP: None}) for change in (0.0, 0.005))
+    assert even.verdict.fit == "fits"
+    assert kicked.verdict.fit == "fits-but"
+    assert "residuals of successive angles go together" in " ".join(kicked.verdict.reasons)
+
+
+def test_many_noise_levels_of_a_long_walk_need_little_memory():
+    rng = np.random.default_rng(0)
+    count = 250
+    data = Linearised(
+        rng.normal(size=count), rng.normal(size=(count, 3)), rng.normal(size=(count, count)), np.zeros(count, int),
+        np.zeros((0, 4)), np.ones(1),
+    )  # fmt: skip
+    products, levels = products_of(data), np.linspace(0.5, 2.0, 200)
+    tracemalloc.start()
+    together = evaluate(products, Noise(levels[:, None], np.full(200, 0.1)))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 150e6  # all matrices at once would need 500 MB
+    alone = evaluate(products, Noise(levels[7:8], 0.1))
+    assert together.restricted[7] == pytest.approx(float(alone.restricted), rel=1e-12)
+    assert together.information[7] == pytest.approx(alone.information, rel=1e-9)
