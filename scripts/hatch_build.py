@@ -1,29 +1,64 @@
-"""Writes the commit that a package is built from into it; run by the build (pyproject.toml), not by hand."""
+"""Adds to a package what only its build knows: the commit, and the machine code of its kernels (see pyproject.toml)."""
 
 from __future__ import annotations
 
 import importlib.util
+import os
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
+MACHINE_CODE = "walkerlab/physics/machine_code"
+# The oldest systems on which the wheel works: the machine code calls only functions that every C library has.
+OLDEST_SYSTEMS = ("manylinux_2_17_", "macosx_11_0_")
 
-class CommitHook(BuildHookInterface[Any]):
-    """Adds a file with the commit: to a wheel's metadata, to the root of a source distribution."""
+
+class PackageHook(BuildHookInterface[Any]):
+    """Adds the commit to a wheel's metadata or a source distribution's root, and machine code to a wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Add it, if anybody knows the commit; an editable installation has its checkout to ask."""
-        commit = commit_module(Path(self.root))
-        known = commit.commit_of_source(Path(self.root))
-        if known is None or version == "editable":
+        """Add both, except to an editable installation, which asks its checkout and compiles when it runs."""
+        if version == "editable":
             return
         self.folder = tempfile.TemporaryDirectory()  # gone when the build is
-        path = Path(self.folder.name, commit.FILE)
-        path.write_text(f"{known}\n")
-        place = "extra_metadata" if self.target_name == "wheel" else "force_include"
-        build_data[place][str(path)] = commit.FILE
+        self.add_commit(build_data)
+        if self.target_name == "wheel" and os.environ.get("WALKERLAB_BUILD_KERNELS") != "0":
+            self.add_machine_code(build_data)
+
+    def add_commit(self, build_data: dict[str, Any]) -> None:
+        commit = commit_module(Path(self.root))
+        known = commit.commit_of_source(Path(self.root))
+        if known is not None:
+            path = Path(self.folder.name, commit.FILE)
+            path.write_text(f"{known}\n")
+            place = "extra_metadata" if self.target_name == "wheel" else "force_include"
+            build_data[place][str(path)] = commit.FILE
+
+    def add_machine_code(self, build_data: dict[str, Any]) -> None:
+        """Compile all kernels of the built-in walkers; what $WALKERLAB_CACHE has is taken from there."""
+        code = Path(self.folder.name, "machine_code")
+        environment = {"WALKERLAB_CACHE": str(Path(self.folder.name, "cache")), "OMP_NUM_THREADS": "1", **os.environ}
+        command = [sys.executable, "-c", f"from walkerlab.pipeline.compile_ahead import build; build({str(code)!r})"]
+        done = subprocess.run(command, cwd=self.root, env=environment | {"PYTHONPATH": self.root}, text=True)
+        if done.returncode:
+            raise SystemExit("walkerlab's kernels do not compile here; WALKERLAB_BUILD_KERNELS=0 builds without them.")
+        if code.is_dir():
+            build_data["force_include"][str(code)] = MACHINE_CODE
+            build_data["pure_python"] = False
+            build_data["tag"] = wheel_tag()
+
+
+def wheel_tag() -> str:
+    """Tag of a wheel for this Python on the oldest systems that its machine code works on."""
+    from packaging.tags import interpreter_name, interpreter_version, platform_tags
+
+    platforms = list(platform_tags())
+    chosen = next((each for each in platforms if each.startswith(OLDEST_SYSTEMS)), platforms[0])
+    return f"{interpreter_name()}{interpreter_version()}-none-{chosen}"
 
 
 def commit_module(root: Path) -> Any:

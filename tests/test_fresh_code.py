@@ -1,5 +1,6 @@
 """An edited function never runs stale: compiled code belongs to the sources that it was made of."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.physics.kernel_cache import KEPT_GENERATIONS, cache_folder
+from walkerlab.physics.kernel_cache import KEPT_GENERATIONS, build_target, cache_folder
 
 PACKAGE = Path(__file__).parents[1] / "walkerlab"
 CALL = """
@@ -70,7 +71,7 @@ def copy(unchanged, tmp_path):
 
 
 def compiled(folder):
-    return {path.name: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")}
+    return {path.name: path.stat().st_mtime_ns for path in folder.rglob("*.kernel")}
 
 
 def test_an_edited_function_of_another_file_never_runs_stale(copy):
@@ -358,3 +359,118 @@ def test_code_compiled_for_types_of_another_program_does_not_stand_in_the_way(co
     run("import foreign")
     (tmp_path / "foreign.py").unlink()
     assert run(OWN) == "1.0\n"
+
+
+BUILD = """
+import os, sys
+from pathlib import Path
+from walkerlab.physics import kernel_cache
+os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"] = kernel_cache.build_target()[0], ""
+import walkerlab.physics.orbits.trial_of_code as trial
+trial.twice(3.0)
+from walkerlab.physics.compiler import files_in_use
+from walkerlab.pipeline.compile_ahead import write_machine_code
+write_machine_code(kernel_cache.BUILT, files_in_use)
+"""
+USE = """
+import sys
+from walkerlab.physics import kernel_cache
+names = []
+kernel_cache.watchers.append(names.append)
+import walkerlab.physics.orbits.trial_of_code as trial
+print(trial.twice(3.0), *names, kernel_cache.why_not_built(), sep="|")
+"""
+
+
+@pytest.fixture
+def built(copy, tmp_path):
+    """A copy of the package with the machine code of its trial kernel, and a way to use it with an empty cache."""
+    if build_target() is None:
+        pytest.skip("no kernels are built for this platform")
+    package, _ = copy
+
+    def run(source, **changes):
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache"), **changes}
+        program = [sys.executable, "-B", "-c", source]
+        done = subprocess.run(program, cwd=tmp_path, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip().split("|")
+
+    run(BUILD)
+    shutil.rmtree(tmp_path / "cache")
+    return package, run
+
+
+def test_kernels_from_the_package_are_used_and_nothing_is_compiled_or_written(built, tmp_path):
+    _, run = built
+    assert run(USE) == ["8.0", ""]
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_processor_that_lacks_what_the_packages_kernels_need_compiles_its_own(built):
+    _, run = built
+    value, name, why = run(USE, NUMBA_CPU_FEATURES="")
+    assert (value, name) == ("8.0", "twice")
+    assert why.startswith("this processor lacks ")
+
+
+@pytest.mark.parametrize("name", ["Python", "numba", "llvmlite", "platform"])
+def test_kernels_built_elsewhere_are_not_used(built, name):
+    package, run = built
+    about = package / "physics" / "machine_code" / "about.json"
+    entries = json.loads(about.read_text())
+    about.write_text(json.dumps({**entries, name: "another"}))
+    value, compiled_name, why = run(USE)
+    assert (value, compiled_name) == ("8.0", "twice")
+    assert why == f"{name} differs: another when the package was built, {entries[name]} here"
+
+
+def test_kernels_built_from_other_sources_are_not_used(built):
+    package, run = built
+    (package / "physics" / "mechanics" / "trial_of_code.py").write_text(CALLED.replace("x + 1.0", "x + 2.0"))
+    value, name, why = run(USE)
+    assert (value, name) == ("10.0", "twice")
+    assert why.startswith("sources differs: ")
+
+
+def test_a_damaged_kernel_of_the_package_is_compiled_once(built):
+    package, run = built
+    (file,) = (package / "physics" / "machine_code").glob("*.kernel")
+    file.write_bytes(file.read_bytes()[:-1])
+    assert run(USE) == ["8.0", "twice", ""]
+    assert run(USE) == ["8.0", ""]
+
+
+OWN_LAW = """
+from typing import NamedTuple
+from walkerlab.physics.mechanics.trial_of_system import value
+class Law(NamedTuple):
+    number: float
+@value.case(Law)
+def value_of_law(law):
+    return 2.0 * law.number
+"""
+USE_OF_LAW = """
+from own_law import Law
+from walkerlab.physics import kernel_cache
+from walkerlab.physics.orbits.trial_of_system import valued
+names = []
+kernel_cache.watchers.append(names.append)
+print(valued(Law(1.0)), *names, sep="|")
+"""
+
+
+def test_an_edited_law_of_a_user_never_runs_stale(copy, tmp_path):
+    package, _ = copy
+    (package / "physics" / "mechanics" / "trial_of_system.py").write_text(SYSTEM)
+    (package / "physics" / "orbits" / "trial_of_system.py").write_text(VALUED)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
+
+    def run(law):
+        (tmp_path / "own_law.py").write_text(law)
+        program = [sys.executable, "-B", "-c", USE_OF_LAW]
+        return subprocess.check_output(program, cwd=tmp_path, env=environment, text=True).strip().split("|")
+
+    assert run(OWN_LAW) == ["2.0", "valued"]
+    assert run(OWN_LAW) == ["2.0"]
+    assert run(OWN_LAW.replace("2.0 *", "3.0 *")) == ["3.0", "valued"]

@@ -1,11 +1,9 @@
 """What compiled functions may do, and what they may not."""
 
-import gc
-import importlib.util
+import importlib
 import os
 import subprocess
 import sys
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +12,8 @@ from numba import typeof
 from numba.core.errors import TypingError
 from numba.core.itanium_mangler import mangle_type
 
-from walkerlab.physics import compiler
-from walkerlab.physics.compiler import compiling
+from walkerlab.physics import kernel_cache
+from walkerlab.physics.compiler import stripped, unpacked
 from walkerlab.physics.kernel_cache import watch_compilation
 from walkerlab.physics.kernels import (
     by_reference,
@@ -69,11 +67,8 @@ def allocating(n):
 
 def test_memory_comes_with_the_arguments():
     """Code that allocates would count references, which takes as long as its arithmetic."""
-    thresholds = gc.get_threshold()
     with pytest.raises(TypingError):
         allocating(3)
-    assert gc.get_threshold() == thresholds
-    assert not compiling
     assert uncompiled(allocating)(3) == 0.0
 
 
@@ -209,105 +204,6 @@ def test_scratch_that_is_read_unwritten_shows_in_python():
     assert np.isnan(matrix((0.0, 0.0))).all()
 
 
-def test_the_installed_numba_has_the_inner_parts_that_are_leant_on():
-    assert compiler.absent == []
-
-
-WITHOUT = """
-import sys
-import numba.core.caching, numba.core.codegen
-if sys.argv[1] == "class":
-    del numba.core.codegen.JITCodeLibrary
-elif sys.argv[1] == "method":
-    del numba.core.caching.IndexDataCacheFile._load_index
-    numba.core.caching.IndexDataCacheFile.load = lambda self, key: None
-    numba.core.caching.IndexDataCacheFile.save = lambda self, key, data: None
-import numba
-import walkerlab.physics.kernels
-from walkerlab.physics.kernel_cache import cache_folder
-own = numba.config.CACHE_DIR
-sys.path.insert(0, sys.argv[2])
-import chosen_kernels
-thing = chosen_kernels.Thing(2.0)
-print(chosen_kernels.measured(thing).hex(), own == numba.config.CACHE_DIR, cache_folder())
-"""
-CHOSEN = """
-from typing import NamedTuple
-from walkerlab.physics import compiler
-from walkerlab.physics.compiler import compiling
-from walkerlab.physics.kernel_cache import watch_compilation
-from walkerlab.physics.kernels import by_type, by_type_or_default, kernel_part, kernel, vector, forced_inline
-
-
-class Thing(NamedTuple):
-    size: float
-
-
-@by_type
-def measure(thing):
-    pass
-
-
-@measure.case(Thing)
-def size(thing):
-    return thing.size
-
-
-@by_type_or_default
-def factor(thing):
-    return 1.0 / 3.0
-
-
-@forced_inline
-def scaled(x, by):
-    return x * by
-
-
-@kernel_part
-def summed(thing):
-    scratch = vector((0.0, 0.0, 0.0))
-    for i in range(3):
-        scratch[i] = scaled(measure(thing), factor(thing))
-    return scratch[0] + scratch[1] + scratch[2]
-
-
-@kernel
-def measured(thing):
-    return summed(thing) + 0.1
-"""
-
-
-def run_without(part, tmp_path):
-    file = tmp_path / "chosen_kernels.py"
-    if not file.exists():  # numba itself may go by its time
-        file.write_text(CHOSEN)
-    environment = {**os.environ, "WALKERLAB_CACHE": str(tmp_path / part)}
-    command = [sys.executable, "-c", WITHOUT, part, str(tmp_path)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    number, untouched, folder = done.stdout.split()
-    assert untouched == "True"
-    return number, Path(folder), done.stderr
-
-
-@pytest.mark.parametrize(
-    ("part", "named"),
-    [("class", "numba.core.codegen.JITCodeLibrary"), ("method", "numba.core.caching.IndexDataCacheFile._load_index")],
-)
-def test_without_numbas_inner_parts_kernels_are_compiled_as_numba_does_it_and_it_is_told_once(part, named, tmp_path):
-    number, folder, told = run_without(part, tmp_path)
-    expected, _, silent = run_without("nothing", tmp_path)
-    assert number == expected
-    assert told.count("RuntimeWarning") == 1
-    assert f"lacks {named}: compiling takes longer" in told
-    assert silent == ""
-    if part == "class":
-        stored = {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")}
-        assert stored  # in the folder of this state of the sources, from which the next process takes it
-        run_without(part, tmp_path)
-        assert {path: path.stat().st_mtime_ns for path in folder.rglob("*.nbc")} == stored
-
-
 @forced_inline
 def squared(x):
     return (lambda y: y * y)(x)
@@ -337,35 +233,64 @@ def outer(x):
 """
 
 
-def test_a_kernel_is_told_of_until_it_is_compiled_itself_and_not_only_what_it_calls(tmp_path):
-    path = tmp_path / "nested_kernels.py"
-    path.write_text(NESTED)
-    spec = importlib.util.spec_from_file_location("nested_kernels", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    told = []
-    with watch_compilation(told.append):
-        assert module.outer(1.0) == 4.0
-    assert told == ["outer", "inner", "outer", ""]
-
-
-@pytest.mark.parametrize("stops", [KeyboardInterrupt, TypeError])
-def test_a_kernel_whose_compiling_is_stopped_gives_its_lock_back(stops, tmp_path, monkeypatch):
-    path = tmp_path / "stopped_kernels.py"
-    path.write_text(NESTED)
-    spec = importlib.util.spec_from_file_location("stopped_kernels", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-
-    def stop(*_):
-        raise stops
-
-    monkeypatch.setattr(compiler.Compiler, "compile_extra", stop)
-    with pytest.raises(stops):
-        module.inner(1.0)
-    assert compiling == []
+@pytest.fixture
+def nested(tmp_path, monkeypatch):
+    """A module with a kernel that calls another one, with nothing compiled."""
+    (tmp_path / "nested_kernels.py").write_text(NESTED)
+    monkeypatch.setenv("WALKERLAB_CACHE", str(tmp_path / "cache"))
+    kernel_cache.cache_folder.cache_clear()
+    monkeypatch.syspath_prepend(tmp_path)
+    yield importlib.import_module("nested_kernels")
+    del sys.modules["nested_kernels"]
     monkeypatch.undo()
-    assert module.inner(1.0) == 2.0
+    kernel_cache.cache_folder.cache_clear()
+
+
+def test_a_kernel_called_by_a_kernel_is_compiled_into_it(nested, tmp_path):
+    """Stored machine code cannot be linked."""
+    names = []
+    with watch_compilation(names.append):
+        assert nested.outer(1.0) == 4.0
+    assert names == ["outer"]
+    assert [path.name.partition("-")[0] for path in tmp_path.rglob("*.kernel")] == ["outer"]
+
+
+def test_a_kernel_whose_compilation_is_interrupted_gives_its_lock_back(nested):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    with watch_compilation(interrupt), pytest.raises(KeyboardInterrupt):
+        nested.inner(1.0)
+    assert nested.inner(1.0) == 2.0
+
+
+@pytest.mark.parametrize(
+    "damage", [lambda data: data[:-100], lambda data: data[:500] + b"x" + data[501:], lambda _: b""]
+)
+def test_damaged_machine_code_is_compiled_again(nested, tmp_path, damage):
+    assert nested.inner(1.0) == 2.0
+    (stored,) = tmp_path.rglob("inner*.kernel")
+    whole = stored.read_bytes()
+    stored.write_bytes(damage(whole))
+    names = []
+    with watch_compilation(names.append):
+        assert nested.inner.__class__(nested.inner.py_func, targetoptions=nested.inner.targetoptions)(1.0) == 2.0
+    assert names == ["inner"]
+    assert unpacked(stored.read_bytes()) is not None
+
+
+def test_machine_code_without_its_bitcode_runs(nested, tmp_path):
+    assert nested.outer(1.0) == 4.0
+    (stored,) = tmp_path.rglob("outer*.kernel")
+    whole = stored.read_bytes()
+    stored.write_bytes(stripped(whole))
+    assert stored.stat().st_size < len(whole)
+    written = stored.stat().st_mtime_ns
+    code = "import nested_kernels; print(nested_kernels.outer(1.0))"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.stdout == "4.0\n", done.stderr
+    assert [path.stat().st_mtime_ns for path in tmp_path.rglob("*.kernel")] == [written]
 
 
 def test_machine_code_names_records_by_their_layout_so_that_processes_agree(monkeypatch):

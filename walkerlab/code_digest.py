@@ -22,9 +22,9 @@ IMPORT = re.compile(
     r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
 )
 
-# Folders that do not count as data: in a wheel, the built-in configs are inside the package, but a stage's key already
-# contains the part of the config that the stage reads.
-INPUT_FOLDERS = ("config/builtin",)
+# Folders that do not count as data. In a wheel, the built-in configs are inside the package, but a stage's key already
+# contains the part of the config that the stage reads. Machine code gives the same results as its sources.
+INPUT_FOLDERS = ("config/builtin", "physics/machine_code")
 
 
 class Sources:

@@ -77,9 +77,6 @@ class Listener:
     def end(self, said):
         self.ended.append(said)
 
-    def compiling(self, kernel):
-        pass
-
     def announce_page(self, summary, folder):
         self.pages.append((folder / summary["html"]).read_text())
 

@@ -48,9 +48,8 @@ def test_what_a_stage_reads_is_in_the_config(stage, config):
 def test_the_table_names_what_the_stage_itself_says_that_it_takes(stage):
     module = importlib.import_module(stage.module)
     named = {Config if takes is None else takes for takes in (stage.takes, stage.takes_of_scene or stage.takes)}
-    for function in (module.run, getattr(module, "compile_kernels", module.run)):
-        first = next(iter(inspect.signature(function, eval_str=True).parameters.values())).annotation
-        assert set(get_args(first) or (first,)) == named
+    first = next(iter(inspect.signature(module.run, eval_str=True).parameters.values())).annotation
+    assert set(get_args(first) or (first,)) == named
 
 
 @pytest.mark.parametrize("config", ["paper", "kneed"])

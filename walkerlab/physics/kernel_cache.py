@@ -1,14 +1,17 @@
-"""Folder of compiled kernels; each state of the sources, version of numba and processor has its own.
+"""Files of machine code: those that the package's build compiled, and the user's cache.
 
-Numba's cache does not notice changes in a function that a kernel calls from another file. The folder's name therefore
-contains a digest of all sources that kernels can use, so stale code never runs. Caches of other programs are untouched.
-Compiled code is loaded only from folders and files that no other user may have written.
+The cache has a folder for each state of the sources, version of numba and processor; its name contains a digest of all
+sources that kernels can use, so stale code never runs. The package's own files are used only if they were compiled from
+the present sources, with the present numba, and for a processor like this one.
+Compiled code is loaded only from the package, and from folders and files that no other user may have written.
 """
 
 import contextlib
 import functools
 import hashlib
+import json
 import os
+import platform
 import re
 import shutil
 import sys
@@ -24,6 +27,17 @@ from walkerlab.private_files import is_foreign, make_private, make_private_folde
 
 PHYSICS = Path(__file__).parent
 PACKAGE = PHYSICS.parent
+BUILT = PHYSICS / "machine_code"
+"""Folder of the machine code that the package's build has compiled."""
+ABOUT = "about.json"  # in that folder: what its code depends on
+X86_64 = "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.1", "sse4.2")
+# processor that builds compile for and the features that it needs, in LLVM's words, by platform
+TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "linux-x86_64": X86_64,
+    "win32-amd64": X86_64,
+    "linux-aarch64": ("generic", ("neon",)),
+    "darwin-arm64": ("apple-m1", ()),
+}
 # the only packages that may hold compiled functions; a test checks this
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
 HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
@@ -36,12 +50,12 @@ class CacheWarning(RuntimeWarning):
 
 
 watchers: list[Callable[[str], None]] = []
-"""Callbacks that receive the name of the kernel that this process compiles or waits for, and '' at the end."""
+"""Callbacks that receive the name of each kernel that this process begins to compile."""
 
 
 @contextlib.contextmanager
 def watch_compilation(watcher: Callable[[str], None]) -> Iterator[None]:
-    """Call `watcher` when compilations start and end within the context; see `watchers`."""
+    """Call `watcher` with the names of kernels that are compiled within the context."""
     watchers.append(watcher)
     try:
         yield
@@ -59,16 +73,83 @@ def sources_digest() -> str:
     return digest_of((module.name, module.text) for module in modules if module.name != PACKAGE.name)
 
 
-def processor_name() -> str:
+def processor_features() -> set[str]:
+    """Return LLVM's names of the features that compiled code may use on this processor."""
     # imported here and below so that checking whether the folder is writable loads no compiler
+    import numba
+    from numba.core.codegen import get_host_cpu_features
+
+    flags = get_host_cpu_features() if numba.config.CPU_FEATURES is None else numba.config.CPU_FEATURES
+    return {flag[1:] for flag in flags.split(",") if flag.startswith("+")}
+
+
+def processor_name() -> str:
     import numba
     from llvmlite import binding as llvm
 
     name = numba.config.CPU_NAME or llvm.get_host_cpu_name()
-    features = numba.config.CPU_FEATURES
-    if features is None:
-        features = llvm.get_host_cpu_features().flatten()
+    features = ",".join(sorted(processor_features()))
     return f"{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}"
+
+
+def build_target() -> tuple[str, tuple[str, ...]] | None:
+    """Return the processor that builds on this platform compile for and the features that it needs, if it has one."""
+    return TARGETS.get(f"{sys.platform}-{platform.machine().lower()}")
+
+
+def circumstances() -> dict[str, str]:
+    """Return what the package's machine code depends on, as it is here."""
+    import llvmlite
+    import numba
+
+    return {
+        "platform": f"{sys.platform}-{platform.machine().lower()}",
+        "Python": platform.python_version().rpartition(".")[0],
+        "numba": numba.__version__,
+        "llvmlite": llvmlite.__version__,
+        "sources": sources_digest()[:16],
+    }
+
+
+@functools.cache
+def why_not_built() -> str:
+    """Return why the package's machine code cannot be used here; an empty text if it can."""
+    try:
+        built = json.loads((BUILT / ABOUT).read_text())
+    except OSError:
+        return "this installation has none: it is editable, or was built with WALKERLAB_BUILD_KERNELS=0"
+    for name, here in circumstances().items():
+        if built[name] != here:
+            return f"{name} differs: {built[name]} when the package was built, {here} here"
+    missing = set(built["features"]) - processor_features()
+    return f"this processor lacks {', '.join(sorted(missing))}" if missing else ""
+
+
+def describe_origin() -> list[str]:
+    """Describe in lines where kernels come from, and why."""
+    versions = ", ".join(f"{name} {here}" for name, here in circumstances().items())
+    why, folder = why_not_built(), f"compiled when a run needs them, and kept in {cache_root()}"
+    if why:
+        advice = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
+        return [versions, f"kernels: {folder}", f"The package's kernels are not used: {why}. {advice}"]
+    return [versions, f"kernels: {len(list(BUILT.glob('*.kernel')))} from the package; others are {folder}"]
+
+
+def files_of(name: str) -> Iterator[Path]:
+    """Yield the files with machine code of this name: the package's, then that in the user's cache."""
+    if why_not_built() == "" and (BUILT / name).is_file():
+        yield BUILT / name
+    kept = cache_folder() / name
+    if kept.is_file():
+        yield kept
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file of machine code, so that other processes see all of it or nothing."""
+    make_private_folder(path.parent)
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(content)
+    Path(file.name).replace(path)
 
 
 def cache_root() -> Path:
@@ -152,10 +233,6 @@ def _remove_unused(generations: list[Path]) -> None:
     for folder in sorted(last_used, key=last_used.__getitem__, reverse=True)[KEPT_GENERATIONS:]:
         if time.time() - last_used[folder] > UNUSED_S:
             shutil.rmtree(folder, ignore_errors=True)
-
-
-def nothing_compiled_yet() -> bool:
-    return next(cache_folder().rglob("*.nbc"), None) is None
 
 
 def lock_of(name: str) -> Any:

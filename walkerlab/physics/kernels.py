@@ -12,7 +12,6 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
 from numba.extending import (
     NativeValue,
-    intrinsic,
     lower_builtin,
     lower_getattr_generic,
     models,
@@ -22,16 +21,9 @@ from numba.extending import (
 )
 from numba.np.arrayobj import make_array, populate_array
 
-from walkerlab.physics.compiler import KernelCache, KernelCompiler, PartCompiler, absent, cached_plainly
+from walkerlab.physics.compiler import FLAGS, Kernel, bodies
+from walkerlab.physics.compiler import PART_FLAGS as PART_FLAGS
 
-# The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit.
-# No reference counts (_nrt): kernels allocate nothing and borrow arrays from their caller, and counting would take as
-# long as the arithmetic.
-FLAGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"nsz"}, "_nrt": False}
-# Python never calls parts of a kernel
-PART_FLAGS: dict[str, Any] = {**FLAGS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-if not absent:
-    PART_FLAGS["pipeline_class"] = PartCompiler
 # inlined, because passing lanes through memory costs as much as the arithmetic on them
 ALWAYS_INLINE_FLAGS: dict[str, Any] = {**PART_FLAGS, "forceinline": True}
 F = TypeVar("F", bound=Callable[..., Any])
@@ -39,31 +31,16 @@ C = TypeVar("C", bound=type)
 
 
 def kernel(function: F) -> F:
-    """Compile `function` on its first call and keep the machine code on disk for later processes."""
-    if absent:
-        return cast(F, cached_plainly(function, FLAGS))
-    compiled = numba.njit(pipeline_class=KernelCompiler, **FLAGS)(function)
-    # like enable_caching, but with a KernelCache
-    compiled._cache = KernelCache(function)
-    return cast(F, compiled)
+    """Compile `function` on its first call and keep the machine code on disk; in kernels it is a `kernel_part`."""
+    if numba.config.DISABLE_JIT:
+        return function
+    return cast(F, Kernel(function, targetoptions={"nopython": True, **FLAGS}))
 
 
 def kernel_part(function: F) -> F:
     """Leave `function` as it is in Python, and compile it into the kernels that call it."""
     compile_as(function, lambda *_: (function, PART_FLAGS))
     return function
-
-
-def callable_kernel(function: F) -> F:
-    """Declare a function that kernels call as a `kernel_part`, and Python as a `kernel`."""
-    whole = kernel(function)
-
-    @functools.wraps(function)
-    def enter(*arguments: Any) -> Any:
-        return whole(*arguments)
-
-    compile_as(enter, lambda *_: (function, PART_FLAGS))
-    return cast(F, enter)
 
 
 def forced_inline(function: F) -> F:
@@ -97,7 +74,7 @@ def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], 
 
 def uncompiled(compiled: F) -> F:
     """Return the Python function of a kernel, for integration methods that are not compiled."""
-    return cast(F, cast(Any, compiled).py_func)
+    return getattr(compiled, "py_func", compiled)
 
 
 class ByType:
@@ -122,6 +99,7 @@ class ByType:
 
         def register(body: F) -> F:
             self._bodies[chosen] = body
+            bodies.setdefault(chosen, []).append(body)
             if forced_inline:
                 self._forced_inline.add(chosen)
             return body
@@ -218,14 +196,18 @@ def matrix(like: Any) -> Any:
     return np.full((len(like), len(like)), np.nan)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def zeros(context: Any, like: Any) -> Any:
+def zeros(like: Any) -> Any:
     """Return a tuple of len(like) zeros; compiled code without reference counts cannot return arrays."""
+    return (0.0,) * len(like)
 
-    def generate(context: Any, builder: Any, called: Any, _arguments: Any) -> Any:
-        return context.get_constant_generic(builder, called.return_type, (0.0,) * called.return_type.count)
 
-    return types.containers.UniTuple(types.float64, like.shape[0])(like), generate
+@functools.cache
+def _zeros(length: int) -> Callable[..., Any]:
+    constant = (0.0,) * length
+    return lambda _: constant
+
+
+compile_as(zeros, lambda like: (_zeros(like.shape[0]), PART_FLAGS))
 
 
 def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:

@@ -1,6 +1,5 @@
 """Executor that reuses, runs or leaves out each stage of a pipeline."""
 
-import importlib
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -17,7 +16,7 @@ from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.task import Precompiler, Task, nothing_compiled_yet, run_in_worker, task_of
+from walkerlab.pipeline.task import Task, run_in_worker, task_of
 from walkerlab.pipeline.workers import WorkerPool
 from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
 
@@ -85,13 +84,11 @@ class Executor:
         side_by_side = self.jobs > 1 and any_side_by_side(likely, self.config)
         try:
             with WorkerPool(self.jobs) as pool:
-                precompiler = Precompiler(pool, self.config)
                 while self._waiting or self._running:
-                    self._start_ready_stages(pool if side_by_side else None, precompiler)
+                    self._start_ready_stages(pool if side_by_side else None)
                     while self._working and not self._events.get()():
                         pass
                     self._draw_early()
-                precompiler.raise_bugs({done.stage.name for done in self.done if done.action == "run"})
         finally:
             for running_stage in self._running.values():
                 running_stage.reporter.end("")
@@ -167,15 +164,13 @@ class Executor:
     def _command_of(self, name: str) -> str:
         return f"`walkerlab {self.graph[name].command}`"
 
-    def _start_ready_stages(self, pool: WorkerPool | None, precompiler: Precompiler) -> None:
+    def _start_ready_stages(self, pool: WorkerPool | None) -> None:
         """Start all ready stages in `pool`, or run the next one in this process if `pool` is None."""
         for stage in list(self._waiting):
             timing = any(running_stage.step.stage.work == "times" for running_stage in self._running.values())
             if timing or len(self._working) == self.jobs:
                 return
             if not self._is_ready(stage):
-                if stage.name in self._left and (compiling := precompiler.begin(stage, only_first=True)) is not None:
-                    self._watch(compiling)
                 continue
             step = self._decide(stage)
             if step.action == "run" and stage.work == "times" and self._running:
@@ -186,7 +181,7 @@ class Executor:
                 self._expect(step)
                 self.skip(step)
             elif pool is None:
-                self._run_here(step, precompiler)
+                self._run_here(step)
                 return
             else:
                 running_stage = self._begin(step)
@@ -196,13 +191,7 @@ class Executor:
                 self._running[future] = running_stage
                 self._watch(future)
 
-    def _run_here(self, step: Step, precompiler: Precompiler) -> None:
-        """Run a stage in this process; if no kernels exist yet, a worker compiles those of a later stage meanwhile."""
-        importlib.import_module(step.stage.module)
-        slow = [stage for stage in self._waiting if stage.precompile]
-        if slow and nothing_compiled_yet():
-            precompiler.begin(slow[0], only_first=False)
-        precompiler.wait_for(step.stage)
+    def _run_here(self, step: Step) -> None:
         running_stage = self._running[None] = self._begin(step)
         self._finish(None, running_stage.task(running_stage.reporter))
 

@@ -95,8 +95,6 @@ class Stage:
     requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
     # "times": measures run times, so it runs alone; "draws": also writes files, from the results that exist
     work: Literal["computes", "times", "draws"] = "computes"
-    # function of the module that compiles the stage's kernels while an earlier stage runs; empty if that does not pay
-    precompile: str = ""
     # the only command that runs the stage (its own or `STAGE --full`); empty if any command that needs it runs it
     only_by: str = ""
     finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
@@ -240,7 +238,7 @@ PIPELINE = Graph(
         "contact-sim", "walkerlab.pipeline.stages.contact_sim",
         "Simulate a walk of the contact model, with contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
-        precompile="compile_kernels", does_without=contact_walk_omissions,
+        does_without=contact_walk_omissions,
     ),
     Stage(
         "tune", "walkerlab.evidence.paper.tune",

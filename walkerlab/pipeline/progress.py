@@ -33,9 +33,6 @@ def track(progress: Progress, label: str, total: int, done: Iterable[R], n: int 
 class StageReporter(Progress, Protocol):
     """Progress of a stage, as the runner reports it."""
 
-    def compiling(self, kernel: str) -> None:
-        """Show the name of the kernel being compiled; '' once it is compiled."""
-
     def end(self, said: str) -> None:
         """End the stage with a closing line; '' if the stage failed, since its error is reported elsewhere."""
 
@@ -69,4 +66,4 @@ class Silent:
     def note(self, *_arguments: Any, **_keywords: Any) -> None:
         """Discard the message."""
 
-    start = advance = warn = compiling = end = announce_page = note
+    start = advance = warn = end = announce_page = note

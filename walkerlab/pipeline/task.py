@@ -1,10 +1,8 @@
-"""Tasks: stages with their arguments, to run in this or another process; and compilation of kernels in advance."""
+"""Tasks: stages with their arguments, to run in this or another process."""
 
 import contextlib
 import importlib
-import sys
-from collections.abc import Callable, Collection, Mapping
-from concurrent.futures import Future
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from inspect import signature
@@ -12,13 +10,13 @@ from typing import Any
 
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
-from walkerlab.errors import NoAnswer, WalkerlabError
+from walkerlab.errors import NoAnswer
 from walkerlab.physics import kernel_cache
 from walkerlab.pipeline.graph import Stage
 from walkerlab.pipeline.progress import StageReporter
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import drawing_into
-from walkerlab.pipeline.workers import WorkerPool, tell
+from walkerlab.pipeline.workers import tell
 
 Task = Callable[[StageReporter], Content]
 """A stage with its arguments; called with a reporter, it runs the stage."""
@@ -49,7 +47,7 @@ def call_stage(
     folder = arguments.get("folder")
     drawing = contextlib.nullcontext() if folder is None else drawing_into(folder)
     try:
-        with kernel_cache.watch_compilation(reporter.compiling), drawing:
+        with kernel_cache.watch_compilation(partial(note_compilation, reporter)), drawing:
             content = run(config, inputs, reporter, **arguments)
     except NoAnswer as error:
         partial_content = error.partial if isinstance(error.partial, Content) else Content()
@@ -58,6 +56,10 @@ def call_stage(
     if not isinstance(content, Content):
         raise TypeError(f"{module}.run returned {type(content).__name__}, not Content")
     return content
+
+
+def note_compilation(reporter: StageReporter, kernel: str) -> None:
+    reporter.note(f"compiling {kernel} for this walker; later runs reuse it")
 
 
 class PipeReporter:
@@ -72,55 +74,3 @@ def run_in_worker(task: Task) -> Content:
     """Run a stage in a worker and send its progress to the parent."""
     reporter: Any = PipeReporter()
     return task(reporter)
-
-
-def nothing_compiled_yet() -> bool:
-    """Whether the kernels are imported and none has been compiled on this machine yet."""
-    return "walkerlab.physics.kernels" in sys.modules and kernel_cache.nothing_compiled_yet()
-
-
-def compile_kernels(module: str, function: str, config: Config, only_first: bool) -> None:
-    """Compile the kernels of a stage; with `only_first`, only if none has been compiled yet."""
-    stage = importlib.import_module(module)
-    if not only_first or nothing_compiled_yet():
-        getattr(stage, function)(config)
-
-
-class Precompiler:
-    """Compiles kernels of later stages in workers while earlier stages compile theirs.
-
-    On a new machine the stages would otherwise wait for the compiler one after the other. All processes share the
-    cache of compiled code. A stage whose kernels were not compiled ahead compiles them itself.
-    """
-
-    def __init__(self, pool: WorkerPool, config: Config) -> None:
-        """Start without any compilation."""
-        self._pool, self._config = pool, config
-        self._begun: dict[str, Future[None]] = {}
-
-    def begin(self, stage: Stage, only_first: bool) -> Future[None] | None:
-        """Start compiling a stage's kernels; return None if it has no `precompile` function or this was done before.
-
-        only_first  compile only if the worker finds that no kernel has been compiled yet
-        """
-        if not stage.precompile or stage.name in self._begun:
-            return None
-        future = self._pool.submit(compile_kernels, stage.module, stage.precompile, self._config, only_first)
-        self._begun[stage.name] = future
-        return future
-
-    def wait_for(self, stage: Stage) -> None:
-        """Wait until the compilation of a stage's kernels ends, even if it fails."""
-        if stage.name in self._begun:
-            self._begun[stage.name].exception()
-
-    def raise_bugs(self, ran: Collection[str]) -> None:
-        """Re-raise a bug that stopped a compilation; the stage itself reports errors that a user can act on.
-
-        ran  names of the stages that ran; compilations for other stages are not waited for
-        """
-        for name, future in self._begun.items():
-            ended = (name in ran or future.done()) and not future.cancelled()
-            error = future.exception() if ended else None
-            if error is not None and not isinstance(error, WalkerlabError):
-                raise error

@@ -11,7 +11,7 @@ from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END
 from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
 from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, is_above, is_to_lift
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
-from walkerlab.physics.kernels import callable_kernel, kernel, kernel_part
+from walkerlab.physics.kernels import kernel, kernel_part
 from walkerlab.physics.mechanics.hinges import HIP_ROW, is_sprung
 from walkerlab.physics.solvers.events import CrossingFinder
 from walkerlab.physics.solvers.stepping import (
@@ -39,7 +39,7 @@ REWINDS = 24
 DOUBTS = 12
 
 
-@callable_kernel
+@kernel
 def scan(system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder) -> tuple[float, int]:
     """Sample all event functions on a solver step into `finder.values`; returns the result of `earliest_crossing`."""
     for node in range(finder.nodes.size):

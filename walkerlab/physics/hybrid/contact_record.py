@@ -24,7 +24,7 @@ from walkerlab.physics.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT,
 from walkerlab.physics.hybrid.contact_state import WalkState
 from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.physics.hybrid.hip_work import torque_work
-from walkerlab.physics.kernels import by_reference, by_type_or_default, callable_kernel, kernel_part, matrix, vector
+from walkerlab.physics.kernels import by_reference, by_type_or_default, kernel, kernel_part, matrix, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.tree import fast_fields, record_type
 from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_crossing
@@ -176,7 +176,7 @@ def observe_edge(observer: ContactObserver, system: OnGround, foot: int, y: Any)
         observer.account[EDGES] += foot_elastic_energy(system, foot, y)
 
 
-@callable_kernel
+@kernel
 def end_energy(system: OnGround, y: Any) -> float:
     return total_energy(system, y)
 
@@ -205,7 +205,7 @@ def add_work_until(method: Any, system: OnGround, fraction: float, account: Any)
     add_work(system, states, rule, method.clock[T_OLD], span, account)
 
 
-@callable_kernel
+@kernel
 def add_work(system: OnGround, states: Any, rule: Quadrature, begin: float, span: float, account: Any) -> None:
     """Add the work and losses (J) from time `begin` (s) over `span` (s) to an account, from the states at the nodes."""
     nodes, weights = rule

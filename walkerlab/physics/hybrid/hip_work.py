@@ -6,7 +6,7 @@ is integrated: only the reversals within a solver step are located, like events.
 
 from typing import Any, NamedTuple
 
-from walkerlab.physics.kernels import callable_kernel, kernel_part
+from walkerlab.physics.kernels import kernel, kernel_part
 from walkerlab.physics.mechanics.hinges import legs_apart
 from walkerlab.physics.solvers.events import CrossingFinder, first_crossing
 from walkerlab.physics.solvers.stepping import interpolate
@@ -37,7 +37,7 @@ def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder,
     return TorqueWork(torque * (angle - first), positive)
 
 
-@callable_kernel
+@kernel
 def sample_rates(system: Any, finder: CrossingFinder, row: int) -> None:
     """Write the legs' relative angular velocity (rad/s) at the nodes of a solver step into `row` of the finder."""
     for node in range(finder.nodes.size):

@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.rigid_record import Observer, observe, observe_start, observe_strike
-from walkerlab.physics.kernels import callable_kernel, kernel, kernel_part, vector
+from walkerlab.physics.kernels import kernel, kernel_part, vector
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import (
     AT_STRIKE,
@@ -134,7 +134,7 @@ def sample_events(system: Mode, y: Any, node: int, finder: CrossingFinder) -> No
         finder.values[KNEE, node] = knee_angle(system.model, y, 0)
 
 
-@callable_kernel
+@kernel
 def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tuple[float, float, float]:
     """Find the fractions of a solver step of heel strike (foot ahead), fall and knee strike, or NO_CROSSING."""
     for node in range(finder.nodes.size):

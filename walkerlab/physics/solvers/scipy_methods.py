@@ -46,7 +46,8 @@ def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
 
 def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
     """Return a kernel's machine code for arguments of these types; calling it avoids the cost of dispatch."""
-    code: Callable[..., None] = function.compile(tuple(numba.typeof(argument) for argument in arguments))
+    types = tuple(numba.typeof(argument) for argument in arguments)
+    code: Callable[..., None] = function if numba.config.DISABLE_JIT else function.compile(types)
     return code
 
 

@@ -1,7 +1,6 @@
 """Walk of the contact model, an assembled walker on compliant ground, from the rigid model's start state."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -13,7 +12,6 @@ from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sample_energies, sample_feet
-from walkerlab.physics.mechanics.rigid import group_bodies
 from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
@@ -33,7 +31,6 @@ from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.contact import (
     SAMPLES_PER_PENDULUM_TIME,
     ContactScene,
-    contact_scene,
     require_contact,
     scene_measures,
     scene_on_pads,
@@ -44,7 +41,6 @@ from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.omissions import contact_walk_omissions
 
 RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
-HALF_ANGLE = 0.2  # rad, half the angle between the legs in the walk that compiles the kernels
 SCUFFED = (
     "A straight swing leg cannot pass the stance leg on a plane: its foot scuffs. Give it room with "
     "contact.terrain: after-mid-swing, or checkerboard."
@@ -72,16 +68,6 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
 
     stored, summarise = partial(groups, config, scene), partial(summary, config, scene)
     return content_of_walk("contact-sim", walk, tolerances, stored, summarise, progress, again)
-
-
-def compile_kernels(config: ContactSimConfig) -> None:
-    """Compile all kernels of `run` by a walk with a minimal evaluation budget."""
-    scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
-    places = group_bodies(scene.assembly).names
-    angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
-    standing = start_state(scene, (*angles, *(0.0 for _ in places)))
-    interval = scene.ground.frame.pendulum_time if config.outputs else None
-    groups(config, scene, scene.walk(standing, 1, replace(tolerances_of(config, 1), budget=1), interval))
 
 
 def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:

@@ -149,43 +149,31 @@ class StageLine:
 
     def __init__(self, console: Console, stage: str, place: str, expected_s: float | None) -> None:
         self.console, self.stage, self.place, self.expected_s = console, stage, place, expected_s
-        self.label, self.kernel = stage, ""
+        self.label = stage
         self.total: int | None = None
         self.done = 0
         self.progress: list[tuple[int, float]] = []  # parts done and computing time (s), after each advance
-        self.compiled_s = 0.0  # compile time within the current piece of work (s)
-        self.compiling_since = 0.0
         self.began = self.work_began = time.monotonic()
 
     def start(self, label: str, total: int | None = None) -> None:
         """Begin a piece of work; `total`: number of its parts, or None if unknown."""
         self.label, self.total, self.done, self.progress = label, total, 0, []
-        self.work_began, self.compiled_s = time.monotonic(), 0.0
+        self.work_began = time.monotonic()
         self.console.detail(label if total is None else f"{label} ({total})")
         self.console.refresh()
 
     def advance(self, n: int = 1) -> None:
         self.done += n
-        self.progress.append((self.done, self.computed_s()))
+        self.progress.append((self.done, time.monotonic() - self.work_began))
 
     def note(self, text: str) -> None:
         self.console.note(text)
-
-    def compiling(self, kernel: str) -> None:
-        """Exclude compilation from the computing time; `kernel`: function now being compiled, empty at the end."""
-        now = time.monotonic()
-        if self.kernel and not kernel:
-            self.compiled_s += now - self.compiling_since
-            self.console.detail(f"{self.stage}: compiled {self.kernel} in {now - self.compiling_since:.1f} s")
-        self.kernel, self.compiling_since = kernel, now
-        self.console.refresh()
 
     def end(self, message: str) -> None:
         self.console.ended(self, message)
 
     def work(self) -> str:
-        label = self.label if self.label.startswith(self.stage) else f"{self.stage}: {self.label}"
-        return f"{label}: compiling {self.kernel}, cached for later runs" if self.kernel else label
+        return self.label if self.label.startswith(self.stage) else f"{self.stage}: {self.label}"
 
     def pace(self) -> str:
         elapsed = time.monotonic() - self.began
@@ -195,15 +183,9 @@ class StageLine:
         parts += [] if remaining is None else [f"about {remaining:.0f} s left"]
         return ", ".join(parts)
 
-    def computed_s(self) -> float:
-        """Return the time spent on the current piece of work (s), without compilation."""
-        now = time.monotonic()
-        compiled = self.compiled_s + (now - self.compiling_since if self.kernel else 0.0)
-        return now - self.work_began - compiled
-
     def seconds_left(self) -> float | None:
         """Predict the remaining time (s) from the rate so far, or from the stage's last duration; None if unknown."""
-        computed = self.computed_s()
+        computed = time.monotonic() - self.work_began
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
             half = bisect.bisect_left(self.progress, (self.done // 2,))
             done, start = self.progress[half - 1] if half else (0, 0.0)

@@ -1,6 +1,7 @@
-"""Commands that start, show and repeat runs: init, open, rerun, export, draw, explore, animate."""
+"""Commands that start, show and repeat runs: init, compile, open, rerun, export, draw, explore, animate."""
 
 import signal
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -48,6 +49,17 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         message = write_config(file or Path(f"my-{walker}.yaml"), walker)
         if not request.quiet:
             print(message)
+
+    @command(app, "config", "sets", "runs", "jobs", "quiet", "verbose", name="compile")
+    def compile_kernels(request: Request) -> None:
+        """Compile all code that a config's runs need, for example before many of them start on a cluster."""
+        from walkerlab.pipeline.compile_ahead import compile_ahead
+
+        began = time.monotonic()
+        config = request.resolved_run.loaded.config
+        kernels = compile_ahead([config], request.processes)
+        if not request.quiet:
+            print(f"{len(kernels)} kernels are ready for {config.name}, after {time.monotonic() - began:.0f} s.")
 
     @command(app, "runs", "quiet", "verbose", name="open")
     def open_run(request: Request, run: RunArgument = "paper") -> None:

@@ -88,7 +88,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
     )
-    app.callback()(options_of_the_program)
+    app.callback(invoke_without_command=True)(options_of_the_program)
     for stage in graph.stages:
         add_stage(app, stage, graph)
     housekeeping.add_to(app, graph)
@@ -98,23 +98,33 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     return app
 
 
-def print_version(requested: bool) -> None:
-    """Print the version, with the code's commit if it is known, and exit."""
-    if requested:
-        # Imported here: only this option needs git.
-        from walkerlab.pipeline.store.commit import commit_of_package
-
-        commit = commit_of_package(Path(walkerlab.__file__).parent)
-        typer.echo(f"walkerlab {walkerlab.__version__}" + (f" (commit {commit})" if commit else ""))
-        raise typer.Exit
-
-
 def options_of_the_program(
-    version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and the commit.")
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and the commit.")] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="With --version: also print where compiled code comes from."),
     ] = False,
 ) -> None:
-    """Handle `--version`."""
+    """Print the version, or leave the rest to a command."""
+    if version:
+        print_version(verbose)
+    elif context.invoked_subcommand is None:
+        context.fail("Missing command.")
+
+
+def print_version(verbose: bool) -> None:
+    """Print the version, with the code's commit if it is known, and exit."""
+    # Imported here: only this option needs git, and only its long form the compiler.
+    from walkerlab.pipeline.store.commit import commit_of_package
+
+    commit = commit_of_package(Path(walkerlab.__file__).parent)
+    typer.echo(f"walkerlab {walkerlab.__version__}" + (f" (commit {commit})" if commit else ""))
+    if verbose:
+        from walkerlab.physics.kernel_cache import describe_origin
+
+        typer.echo("\n".join(describe_origin()))
+    raise typer.Exit
 
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:

@@ -35,7 +35,7 @@ class Desk:
 
     def __init__(self, drops: bool = False) -> None:
         """Start the worker; `drops`: whether a new request cancels the one in progress."""
-        self.drops, self.compiling, self.compiled = drops, "", 0
+        self.drops = drops
         self.worker = self._hire()
         self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
 
@@ -60,7 +60,7 @@ class Desk:
             # repeat the call if the signal for an earlier request arrived late, or if the worker died while idle
             while number == self._newest:
                 try:
-                    answer = self.worker.do(call, self._note_compilation)
+                    answer = self.worker.do(call)
                 except WorkerDiedError as error:
                     self.worker = self._hire()
                     deaths += error.exit_code_of_worker != -GIVE_WAY  # the signal kills a worker without a handler yet
@@ -72,10 +72,6 @@ class Desk:
                     if answer != SUPERSEDED:
                         return answer
             return SUPERSEDED
-
-    def _note_compilation(self, kernel: str) -> None:
-        self.compiling = kernel
-        self.compiled += bool(kernel)
 
     def close(self) -> None:
         self.worker.process.kill()
@@ -192,8 +188,7 @@ class Handler(BaseHTTPRequestHandler):
                 html, policy = render_page(self.server.base)
                 return self.send(200, html.encode(), "text/html; charset=utf-8", policy)
             if address.path == "/api/job":
-                desk, progress = self.server.desk, self.server.job.progress()
-                return self.answer(200, {**progress, "compiling": desk.compiling, "compiled": desk.compiled})
+                return self.answer(200, self.server.job.progress())
             runs = self.server.base.runs.resolve()
             file = (runs / unquote(address.path).removeprefix("/runs/")).resolve()
             if address.path.startswith("/runs/") and file.is_relative_to(runs) and file.is_file():

@@ -14,13 +14,11 @@ from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_extending_yaml, to_yaml
 from walkerlab.errors import ConfigError, WalkerlabError
-from walkerlab.physics import kernel_cache
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.resolve import resolve
 from walkerlab.pipeline.results import MemoryResults
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.pipeline.workers import tell
 from walkerlab.views.explore.numbers import adjustable
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections import motion
@@ -114,10 +112,7 @@ def walk(question: ExploredConfig) -> Answered:
         config = loaded.config
         wanted = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # Compute the walks first: they store the gait, so that it need not be found again.
-        with kernel_cache.watch_compilation(tell):
-            answers = {
-                stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")
-            }
+        answers = {stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")}
     except ConfigError as error:
         return question.refusal(error)
     commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *wanted)]

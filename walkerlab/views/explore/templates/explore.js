@@ -61,21 +61,15 @@ async function walk() {
   while (next) {
     next = false;
     document.body.dataset.state = "asking";
-    // Show the rigid model while the contact model is being compiled.
-    const first = !shown;
-    const asked = structuredClone(question({ models: first ? ["rigid"] : models() }));
+    const asked = structuredClone(question({ models: models() }));
     const began = performance.now();
-    const late = setInterval(async () => {
-      const [, { compiling, compiled } = {}] = await ask("/api/job").catch(() => [0]);
-      if (!asking || document.body.dataset.state !== "asking") return;
-      const what = compiling ? `Compiling (only once): part ${compiled}, ${compiling}` : `Computing ${changes(asked.set) || called(asked.config)}`;
-      say(`${what} (${Math.round((performance.now() - began) / 1000)} s).`);
+    const late = setInterval(() => {
+      say(`Computing ${changes(asked.set) || called(asked.config)} (${Math.round((performance.now() - began) / 1000)} s).`);
     }, 500);
     try {
       const [status, answer] = await ask("/api/walk", asked).finally(() => clearInterval(late));
       if (status === 409) next = true;
       if (!next) show(status, answer, asked);
-      if (first && status === 200) next = true;
     } catch {
       document.body.dataset.state = "failed";
       say("The server does not answer. Start `walkerlab explore` again; this page keeps trying.", "bad");
