@@ -12,6 +12,7 @@ import linecache
 import pickle
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -85,7 +86,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         """Load stored code, or return None if it must be compiled."""
         name = self.file_name(signature)
         for path in files_of(name):
-            payload = unpacked(path.read_bytes())
+            payload = read_code(path)
             # a class that a notebook defines is another class in the next process
             if payload is not None and payload[SIGNATURE].args == tuple(signature):
                 files_in_use.add(name)
@@ -119,20 +120,20 @@ def packed(payload: Any) -> bytes:
     return hashlib.sha256(data).digest() + data
 
 
-def unpacked(content: bytes) -> Any:
-    """Convert the content of a file to a kernel's code, or None if it is damaged or needs classes that are gone."""
-    data = content[CHECKSUM_BYTES:]
-    if hashlib.sha256(data).digest() != content[:CHECKSUM_BYTES]:
-        return None
+def read_code(path: Path) -> Any:
+    """Read a kernel's code; None if the file is damaged, unreadable or deleted, or needs classes that are gone."""
     try:
-        return pickle.loads(data)
-    except (ImportError, AttributeError):
-        return None
+        content = path.read_bytes()
+        if hashlib.sha256(content[CHECKSUM_BYTES:]).digest() == content[:CHECKSUM_BYTES]:
+            return pickle.loads(content[CHECKSUM_BYTES:])
+    except (OSError, ImportError, AttributeError):
+        pass
+    return None
 
 
-def stripped(content: bytes) -> bytes:
-    """Drop all but symbol names from the LLVM bitcode in a file, three quarters of it; only linking needs the rest."""
-    (name, kind, (machine_code, bitcode)), *rest = unpacked(content)
+def stripped(path: Path) -> bytes:
+    """Return a file's content with only symbol names of its LLVM bitcode, most of the file; linking needs the rest."""
+    (name, kind, (machine_code, bitcode)), *rest = read_code(path)
     module = binding.parse_bitcode(bitcode)
     names = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
     symbols = "\n".join(f'@"{each}" = global i8 0' for each in names)

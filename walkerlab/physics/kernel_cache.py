@@ -116,11 +116,11 @@ def why_not_built() -> str:
     """Return why the package's machine code cannot be used here; an empty text if it can."""
     try:
         built = json.loads((BUILT / ABOUT).read_text())
-    except OSError:
+    except (OSError, ValueError):
         return "this installation has none: it is editable, or was built with WALKERLAB_BUILD_KERNELS=0"
     for name, here in circumstances().items():
-        if built[name] != here:
-            return f"{name} differs: {built[name]} when the package was built, {here} here"
+        if built.get(name) != here:
+            return f"{name} differs: {built.get(name)} when the package was built, {here} here"
     missing = set(built["features"]) - processor_features()
     return f"this processor lacks {', '.join(sorted(missing))}" if missing else ""
 

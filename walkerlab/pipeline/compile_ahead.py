@@ -111,9 +111,10 @@ def write_machine_code(folder: Path, names: Iterable[str]) -> dict[str, Any]:
     """Copy files from the cache to the package's folder, with what they depend on, which is returned."""
     from walkerlab.physics.compiler import stripped
 
+    folder.mkdir(exist_ok=True)
     processor, features = kernel_cache.build_target() or ("", ())
     for name in sorted(names):
-        kernel_cache.write_file(folder / name, stripped((kernel_cache.cache_folder() / name).read_bytes()))
+        (folder / name).write_bytes(stripped(kernel_cache.cache_folder() / name))
     about = {**kernel_cache.circumstances(), "processor": processor, "features": features}
     (folder / kernel_cache.ABOUT).write_text(json.dumps(about, indent=1))
     return about
