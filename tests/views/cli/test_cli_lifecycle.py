@@ -308,3 +308,16 @@ def test_a_closed_stdout_ends_quietly(walker):
     command = f"exec {shlex.join(walker.command)} schema >&-"
     done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_compile_says_how_many_kernels_are_ready(walker):
+    done = walker("compile", "-c", "rigid-only", "--jobs", "1")
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"\d+ kernels are ready for rigid-only, after \d+ s\.\n", done.stdout)
+
+
+def test_the_version_in_long_says_where_kernels_come_from(walker):
+    first, versions, *kernels = walker("--version", "--verbose").stdout.splitlines()
+    assert first.startswith("walkerlab ")
+    assert {"Python", "numba", "llvmlite", "sources"} <= set(versions.split())
+    assert kernels[0].startswith("kernels: ")
