@@ -422,7 +422,7 @@ def test_kernels_built_elsewhere_are_not_used(built, name):
     about.write_text(json.dumps({**entries, name: "another"}))
     value, compiled_name, why = run(USE)
     assert (value, compiled_name) == ("8.0", "twice")
-    assert why == f"{name} differs: another when the package was built, {entries[name]} here"
+    assert why.startswith(f"{name} differs: another when the package was built, {entries[name]} here.")
 
 
 def test_kernels_built_from_other_sources_are_not_used(built):

@@ -29,6 +29,7 @@ PHYSICS = Path(__file__).parent
 PACKAGE = PHYSICS.parent
 BUILT = PHYSICS / "machine_code"
 """Folder of the machine code that the package's build has compiled."""
+REBUILD = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
 ABOUT = "about.json"  # in that folder: what its code depends on
 X86_64 = "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.1", "sse4.2")
 # processor that builds compile for and the features that it needs, in LLVM's words, by platform
@@ -117,12 +118,12 @@ def why_not_built() -> str:
     try:
         built = json.loads((BUILT / ABOUT).read_text())
     except (OSError, ValueError):
-        return "this installation has none: it is editable, or was built with WALKERLAB_BUILD_KERNELS=0"
+        return f"this installation has none: it is editable, or was built with WALKERLAB_BUILD_KERNELS=0. {REBUILD}"
     for name, here in circumstances().items():
         if built.get(name) != here:
-            return f"{name} differs: {built.get(name)} when the package was built, {here} here"
+            return f"{name} differs: {built.get(name)} when the package was built, {here} here. {REBUILD}"
     missing = set(built["features"]) - processor_features()
-    return f"this processor lacks {', '.join(sorted(missing))}" if missing else ""
+    return f"this processor lacks {', '.join(sorted(missing))}." if missing else ""
 
 
 def describe_origin() -> list[str]:
@@ -130,8 +131,7 @@ def describe_origin() -> list[str]:
     versions = ", ".join(f"{name} {here}" for name, here in circumstances().items())
     why, folder = why_not_built(), f"compiled when a run needs them, and kept in {cache_root()}"
     if why:
-        advice = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
-        return [versions, f"kernels: {folder}", f"The package's kernels are not used: {why}. {advice}"]
+        return [versions, f"kernels: {folder}", f"The package's kernels are not used: {why}"]
     return [versions, f"kernels: {len(list(BUILT.glob('*.kernel')))} from the package; others are {folder}"]
 
 

@@ -60,6 +60,22 @@ def compile_contact(method: str, config: Config) -> None:
     sample_feet(scene.walker, walk.samples)
 
 
+def compile_plain_systems(config: Config) -> None:
+    """Compile what solvers without our events call, with which `stability` compares the contact walk."""
+    from walkerlab.physics.ground.on_pads import OnPads
+    from walkerlab.physics.ground.walker import on_ground
+    from walkerlab.physics.solvers.scipy_methods import right_hand_side
+    from walkerlab.physics.solvers.semi_implicit_euler import semi_implicit_euler
+    from walkerlab.scene.contact import contact_scene
+
+    if config.contact is None:
+        return
+    scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
+    system, y = OnPads(on_ground(scene.walker, (True, True)), scene.ground.terrain), np.zeros(scene.walker.size)
+    right_hand_side(system, 0.0, y, np.empty_like(y))
+    semi_implicit_euler(system, y, np.empty_like(y), 0.0, 1e-4, 1)
+
+
 def compile_lanes(config: Config) -> None:
     """Compile the walks of basins, which walk straight legs from several starts at once."""
     from walkerlab.physics.hybrid.rigid_lanes import two_legs
@@ -73,6 +89,7 @@ def compile_lanes(config: Config) -> None:
 
 PARTS: tuple[Callable[[Config], None], ...] = (
     *(partial(compile_model, method) for method, compile_model in product(METHODS, (compile_contact, compile_rigid))),
+    compile_plain_systems,
     compile_lanes,
 )
 """Functions that compile some kernels of a config, those that take longest first."""
