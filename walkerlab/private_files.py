@@ -7,9 +7,15 @@ import stat
 from pathlib import Path
 
 
+def is_own(status: os.stat_result) -> bool:
+    """Whether a file belongs to this user; always where the system has no owners by number, as on Windows."""
+    return not hasattr(os, "geteuid") or status.st_uid == os.geteuid()
+
+
 def is_foreign(path: Path) -> bool:
     """Whether a file, folder or link belongs neither to this user nor to root."""
-    return path.lstat().st_uid not in (os.geteuid(), 0)
+    status = path.lstat()
+    return not (is_own(status) or status.st_uid == 0)
 
 
 def may_be_foreign(path: Path) -> bool:
@@ -36,7 +42,7 @@ def make_private(path: Path) -> list[Path]:
             path.unlink()
         return [path]
     status = path.lstat()
-    if status.st_uid == os.geteuid() and status.st_mode & 0o077:
+    if is_own(status) and status.st_mode & 0o077:
         path.chmod(status.st_mode & 0o700)
     deleted = []
     for each in list(path.iterdir()) if stat.S_ISDIR(status.st_mode) else ():

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.code_digest import Sources, digest_of
-from walkerlab.private_files import is_foreign, make_private, make_private_folder, may_be_foreign
+from walkerlab.private_files import is_foreign, is_own, make_private, make_private_folder, may_be_foreign
 
 PHYSICS = Path(__file__).parent
 PACKAGE = PHYSICS.parent
@@ -178,7 +178,7 @@ def _refusal(root: Path) -> str:
         folder = root.resolve()
         generations = list(folder.glob("kernels-*"))
         # a folder that holds anything else is not ours alone: others may need it
-        if folder.stat().st_uid == os.geteuid() and len(generations) == len(list(folder.iterdir())):
+        if is_own(folder.stat()) and len(generations) == len(list(folder.iterdir())):
             folder.chmod(0o700)
         if may_be_foreign(folder):
             return "is open to other users or belongs to another user"
