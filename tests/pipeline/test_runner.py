@@ -12,7 +12,7 @@ from walkerlab.pipeline.graph import Graph, Stage
 from walkerlab.pipeline.runner import execute
 from walkerlab.pipeline.store.artifact import read
 
-EXPLICIT = "start=[0.1, 0.2, 0.3, 0.4]"
+EXPLICIT = "start=[null, 0.2, 0.3, 0.4]"
 STEEP = "slope_rad=1.2"
 
 

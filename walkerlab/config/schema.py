@@ -91,6 +91,11 @@ def state_of(start: Any) -> tuple[float, ...]:
     return start.state if isinstance(start, MidStep) else tuple(start)
 
 
+def with_state(start: Any, state: tuple[float, ...]) -> Any:
+    """Return a start at the same instant with another state."""
+    return MidStep(instant=MID_STEP, state=state) if isinstance(start, MidStep) else state
+
+
 def kind_of_start(value: Any) -> str:
     """Return the tag of the kind of start that a value is."""
     if isinstance(value, list | tuple):

@@ -136,7 +136,7 @@ def test_cases_of_ones_own_come_from_a_file(tmp_path):
         ("- {expected: [walked], reason: mine}\n", "cases.yaml:1:3: stability.cases.name: is missing; allowed: text"),
         ("- {name: x, expected: [], reason: mine}\n", "cases.yaml:1:23: .*must name an outcome"),
         (
-            "- name: x\n  expected: [walked]\n  reason: mine\n  config: {slope_rad: 0, start: [0, 0, 0, 0]}\n",
+            "- name: x\n  expected: [walked]\n  reason: mine\n  config: {slope_rad: 0, start: [null, 0, 0, 0]}\n",
             "cases.yaml:4:26: start: case x starts with its feet together",
         ),
         ("- {name: ../x, expected: [walked], reason: mine}\n", "name"),

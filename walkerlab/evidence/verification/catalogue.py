@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 from walkerlab.config.fields import Block
 from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.reader import read
-from walkerlab.config.schema import Config, state_of
+from walkerlab.config.schema import Config, state_of, with_state
 from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.tree import plain
 from walkerlab.config.walkers import has_knees
@@ -106,7 +106,8 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
     if "start" in changes or "slope" in changes:
         state, rotation = state_of(config.start), config.slope_rad - slope
         n = len(state) // 2
-        values |= {"slope_rad": slope, "start": (*(x + rotation for x in state[:n]), *(start * x for x in state[n:]))}
+        turned = (*(x + rotation for x in state[:n]), *(start * x for x in state[n:]))
+        values |= {"slope_rad": slope, "start": with_state(config.start, turned)}
     for path, value in values.items():
         config = with_key(config, path, value)
     return config

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any, TypeGuard
 
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
-from walkerlab.config.schema import Config
+from walkerlab.config.schema import Config, with_state
 from walkerlab.evidence.verification.catalogue import all_cases, scene_cases
 from walkerlab.evidence.verification.judge import CaseCell, run_cells
 from walkerlab.evidence.verification.omissions import verification_omissions
@@ -54,7 +54,9 @@ def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[
 def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     """Return the scene with a numeric start and pad pitch, which all its cases share."""
     step, start = rigid_start(config, inputs)
-    scene = Config().model_copy(update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": start})
+    scene = Config().model_copy(
+        update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": with_state(config.start, start)}
+    )
     contact = config.contact
     if contact is None or contact.terrain != "checkerboard":
         return scene
