@@ -19,11 +19,11 @@ from synthetic_walks import both_models, contact, rigid, rigid_alone
 
 from walkerlab.evidence.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
-from walkerlab.views.cli.exports import COLUMN_WIDTHS
 from walkerlab.views.figures.canvas import settle, styled
 from walkerlab.views.figures.maps import ATTRACTORS
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.figures.style import CONTACT, LEGS, POINT, RIGID
+from walkerlab.views.report.tex import COLUMN_WIDTHS
 
 RESULTS = {
     "both models": both_models(),

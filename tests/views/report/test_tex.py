@@ -1,10 +1,14 @@
 """Tables for LaTeX: aligned decimals, one number of digits a column, heads and captions in words."""
 
+import pytest
+from latex import compile_tables
+
 from walkerlab.evidence.paper.sections import table_of
 from walkerlab.views.report.tables import Column, as_csv, record_table, table
-from walkerlab.views.report.tex import as_tex
+from walkerlab.views.report.tex import WITHOUT_GRAPHICX, as_tex, in_tex
 
 END = r" \\"
+SMALL_TABLE = table("Periods", [Column("period (s)", numeric=True)], [[0.7036]])
 
 
 def tex_of(*values, title="period (s)"):
@@ -31,10 +35,10 @@ def test_numbers_that_differ_much_keep_as_many_digits_each():
 
 
 def test_packages_and_caption_come_first_and_a_head_of_numbers_is_no_number():
-    begin = ["% \\usepackage{booktabs, siunitx}", r"\begin{table}", r"\centering", r"\caption{Periods.}"]
+    begin = ["% \\usepackage{booktabs, graphicx, siunitx}", WITHOUT_GRAPHICX]
     text = tex_of(0.5)
-    assert text.splitlines()[:4] == begin
-    assert r"{period (s)} \\" in text
+    assert text.splitlines()[:5] == [*begin, r"\begin{table}", r"\centering", r"\caption{Periods.}"]
+    assert "{period} \\\\\n{(s)} \\\\\n\\midrule" in text
 
 
 def test_what_is_no_number_is_kept_from_the_columns_layout():
@@ -46,8 +50,45 @@ def test_the_papers_tables_have_its_digits_its_words_and_a_caption():
     row = {"unit": "s", "paper_matlab": 0.6, "paper_matlab_text": "0.60", "corrected": 0.7036, "contact": 0.7111}
     text = as_tex(table_of("table3", {"t_left": row})).decode()
     assert r"\caption{Table 3: characteristics of the walk, in the paper and here." in text
-    assert r"quantity & {paper, MATLAB} & {corrected} & {contact model} \\" in text
+    head = [r" & {paper,} &  & {contact} \\", r"quantity & {MATLAB} & {corrected} & {model} \\", r"\midrule"]
+    assert "\n".join(head) in text
     assert r"left step period, $t_\mathrm{left}$ (s) & 0.60 & 0.70360 & 0.71110 \\" in text
+
+
+def wide_table():
+    columns = [Column("walker and ground", "name"), Column("what was seen of it", "text")]
+    columns += [Column(f"quantity number {place} (rad/s)", f"x{place}", numeric=True) for place in range(16)]
+    numbers = {f"x{place}": 10.0**-place for place in range(16)}
+    text = "a walk of many words, at 10⁻¹² and 4.5 × 10^-13 m/s², with t₁₂ and θ̇₁, that would not fit a line"
+    rows = [{"name": "kneed", "text": text, **numbers}, {"name": "x" * 60, "text": "y" * 80, **numbers}]
+    return table("Many columns", columns, rows)
+
+
+@pytest.mark.parametrize("options", ["", "twocolumn"])
+def test_tables_compile_and_stay_within_the_text_block(options, tmp_path):
+    texts = [as_tex(content, columns).decode() for content in (wide_table(), SMALL_TABLE) for columns in (1, 2)]
+    assert compile_tables(texts, options, tmp_path) == []
+
+
+def test_a_table_of_two_columns_is_a_float_across_both():
+    for columns, kind in ((1, "table"), (2, "table*")):
+        text = as_tex(SMALL_TABLE, columns).decode()
+        assert text.splitlines()[2] == rf"\begin{{{kind}}}"
+        assert text.endswith(f"\\end{{{kind}}}\n")
+
+
+def test_units_have_a_row_of_their_own_under_heads_of_several_lines():
+    columns = [Column("walk"), Column("length of the longest step (m)", numeric=True), Column("steps", numeric=True)]
+    text = as_tex(table("Walks", columns, [["rigid", 0.3714, 10]])).decode()
+    head = text[text.index(r"\toprule") : text.index(r"\midrule")].splitlines()[1:]
+    assert head == [
+        rf" & {{length of}} & {END}", rf" & {{the}} & {END}", rf" & {{longest}} & {END}",
+        rf"walk & {{step}} & {{steps}}{END}", rf" & {{(m)}} & {END}",
+    ]  # fmt: skip
+
+
+def test_superscripts_that_follow_one_another_are_one():
+    assert in_tex("10⁻¹² m, x₁², 2^-3") == "10$^{-12}$ m, x$_{1}^{2}$, 2$^{-3}$"
 
 
 def test_what_a_record_has_no_value_for_is_empty_in_a_file():

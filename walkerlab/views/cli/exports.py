@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,14 +51,11 @@ if TYPE_CHECKING:
     from walkerlab.views.figures.illustration import Illustration
 
 FIGURE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png", "eps", "tiff"), ("csv", "nc")
-WRITERS = {"csv": as_csv, "tex": as_tex}
 DRAWING_KINDS = ("svg", "pdf", "png")
 FILM_KINDS = ("gif", "mp4")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
 TRAJECTORY, STEPS = "trajectory", "steps"
-COLUMN_WIDTHS = {1: 252.0, 2: 516.0}
-"""Width (pt) of a figure that spans one or two columns of a journal."""
 STORED_WITH = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
@@ -71,9 +69,20 @@ def run_to_export(run: str, request: Request) -> RunFolder:
 
 
 def export_from(
-    folder: RunFolder, what: str, target: Target, width: float, model: str, console: Console, dpi: int = EXPORT_DPI
+    folder: RunFolder,
+    what: str,
+    target: Target,
+    width: float,
+    model: str,
+    console: Console,
+    dpi: int = EXPORT_DPI,
+    columns: int = 1,
 ) -> Path:
-    """Write an item of a run to a file and return its path; a figure is `width` pt wide, with `dpi` pixels per inch.
+    """Write an item of a run to a file and return its path.
+
+    width    width (pt) of a figure
+    dpi      pixels per inch of a figure
+    columns  journal columns that a table for LaTeX spans
 
     Raises ConfigError for an unknown item or format, StaleError for a missing result.
     """
@@ -81,14 +90,15 @@ def export_from(
         what = f"figure-{int(numbered[1]):02d}"
     make: Callable[[str], bytes]
     kinds: Sequence[str]
+    writers: dict[str, Callable[[Table], bytes]] = {"csv": as_csv, "tex": partial(as_tex, columns=columns)}
     if what == TRAJECTORY:
         stem, kinds, make = f"{model}-{what}", TRAJECTORY_KINDS, lambda kind: trajectory(folder, model, kind, console)
     elif what == STEPS:
         stem, kinds, make = f"{model}-{what}", ("csv",), lambda _: steps_of_walk(folder, model, console)
     elif what in TABLES:
-        stem, kinds, make = what, tuple(WRITERS), lambda kind: WRITERS[kind](table(folder, what, kind, console))
+        stem, kinds, make = what, tuple(writers), lambda kind: writers[kind](table(folder, what, kind, console))
     elif isinstance(item := find_item(folder, what), Table):
-        stem, kinds, make = hyphenate(what), tuple(WRITERS), lambda kind: WRITERS[kind](item)
+        stem, kinds, make = hyphenate(what), tuple(writers), lambda kind: writers[kind](item)
     else:
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, item, kind, (width, dpi), console)
     path, kind = target.of(what, f"{folder.name}-{stem}", kinds)

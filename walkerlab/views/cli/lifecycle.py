@@ -97,7 +97,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             ),
         ] = None,
         output: Output = None,
-        columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns that a figure spans.")] = 1,
+        columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns of a figure or a LaTeX table.")] = 1,
         width: Annotated[
             float | None,
             typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
@@ -122,11 +122,12 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             return
         if request.sets:
             raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
-        from walkerlab.views.cli.exports import COLUMN_WIDTHS, export_from, run_to_export, walk_in
+        from walkerlab.views.cli.exports import export_from, run_to_export, walk_in
+        from walkerlab.views.report.tex import COLUMN_WIDTHS
 
         folder, points = run_to_export(run, request), width or COLUMN_WIDTHS[columns]
         whose = walk_in(folder, model)
-        print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi))
+        print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi, columns))
 
     @command(app)
     def draw(

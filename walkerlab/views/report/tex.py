@@ -2,6 +2,7 @@
 
 import math
 import re
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
@@ -13,7 +14,22 @@ COLUMN_DIGITS: Final = 5
 MAX_PLAIN: Final = 1e6
 """Magnitude from which numbers are written with a power of ten."""
 EMPTY_CELL: Final = "--"
-PACKAGES: Final = r"% \usepackage{booktabs, siunitx}"
+PACKAGES: Final = r"% \usepackage{booktabs, graphicx, siunitx}"
+WITHOUT_GRAPHICX: Final = r"\providecommand{\resizebox}[3]{#3}"
+SHRINK: Final = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
+"""Begin of a box that is at most as wide as the text around it."""
+MIN_HEAD: Final = 10
+"""Number of characters of a column's head that always stay on one line."""
+MAX_UNWRAPPED: Final = 28
+"""Number of characters of a text cell above which its column is wrapped."""
+WRAPPED: Final = r">{\raggedright\arraybackslash}p{11em}"
+TYPE_SIZES: Final = {"": 1.0, r"\small": 0.9, r"\footnotesize": 0.8, r"\scriptsize": 0.7}
+CHARACTER_PT: Final = 5.0
+"""Width of a digit in 10 pt type."""
+COLUMN_WIDTHS: Final = {1: 252.0, 2: 516.0}
+"""Width (pt) of one and of two columns of a journal."""
+TITLE: Final = re.compile(r"(?P<words>.*\S)\s+(?P<unit>\([^()]*\))")
+"""Title of a column with a unit."""
 DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
 """A number in a siunitx column: sign, digits before and after the point, sign and digits of the exponent."""
 ESCAPED_POWER = re.compile(r"\\\^\{\}(-?\d+)")
@@ -28,25 +44,60 @@ IN_MATHS = {
     **{"−": "$-$", "×": r"$\times$", "±": r"$\pm$", "≤": r"$\le$", "≥": r"$\ge$", "Δ": r"$\Delta$", "°": r"$^\circ$"},
     **{"√": r"$\sqrt{}$", "≈": r"$\approx$", "µ": r"$\mu$", "…": r"\ldots{}"},
 }
+SCRIPT = re.compile(r"[\^_]\{([^{}]*)\}")
+SCRIPTS = re.compile(r"([\^_])\{[^{}]*\}(?:\1\{[^{}]*\})+")
+"""Several superscripts, or subscripts, in a row, which LaTeX refuses."""
 SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
 """Characters that LaTeX can set only in maths."""
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
 
 
-def as_tex(content: Table) -> bytes:
-    """Format a table for booktabs and siunitx, as a float if it has a caption; columns of sentences are left out."""
-    heads, rows = flat(content)
-    columns = [in_column(head, [row[place].datum for row in rows]) for place, head in enumerate(heads)]
-    head, *lines = [" & ".join(line) + r" \\" for line in zip(*(cells for _, cells in columns), strict=True)]
-    layout = "".join(layout for layout, _ in columns)
-    body = [rf"\begin{{tabular}}{{{layout}}}", r"\toprule", head, r"\midrule", *lines, r"\bottomrule", r"\end{tabular}"]
+def as_tex(content: Table, columns: int = 1) -> bytes:
+    """Format a table for booktabs and siunitx, as a float if it has a caption; columns of sentences are left out.
+
+    columns  journal columns that the table spans; its type is as small as they require
+    """
+    titles, rows = flat(content)
+    data = [[row[place].datum for row in rows] for place in range(len(titles))]
+    layouts, cells = zip(*map(in_column, data), strict=True)
+    heads = head_rows(titles, layouts, cells)
+    head, body = ([" & ".join(line) + r" \\" for line in zip(*block, strict=True)] for block in (heads, cells))
+    size = type_size([[*above, *below] for above, below in zip(heads, cells, strict=True)], columns)
+    begin = [f"{size}\\setlength{{\\tabcolsep}}{{3pt}}", SHRINK, rf"\begin{{tabular}}{{{''.join(layouts)}}}"]
+    text = [*begin, r"\toprule", *head, r"\midrule", *body, r"\bottomrule", r"\end{tabular}}"]
     sentences = (text if text.endswith((".", "?")) else f"{text}." for text in (content.caption, content.note) if text)
     if caption := " ".join(sentences):
-        body = [r"\begin{table}", r"\centering", rf"\caption{{{in_tex(caption)}}}", *body, r"\end{table}"]
-    return "\n".join([PACKAGES, *body, ""]).encode()
+        kind = "table*" if columns > 1 else "table"
+        text = [rf"\begin{{{kind}}}", r"\centering", rf"\caption{{{in_tex(caption)}}}", *text, rf"\end{{{kind}}}"]
+    return "\n".join([PACKAGES, WITHOUT_GRAPHICX, *text, ""]).encode()
 
 
-def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
+def type_size(cells: Sequence[Sequence[str]], columns: int) -> str:
+    """Choose the largest type in which a table's columns probably fit into this number of journal columns."""
+    characters = (min(max(map(len, column)), MAX_UNWRAPPED) for column in cells)
+    width = sum(CHARACTER_PT * count + 6.0 for count in characters)
+    fitting = (size for size, scale in TYPE_SIZES.items() if scale * width <= COLUMN_WIDTHS[columns])
+    return next(fitting, list(TYPE_SIZES)[-1])
+
+
+def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Return the lines of each column's head: words over one another, and units in a row of their own."""
+    parts = [TITLE.fullmatch(title) for title in titles]
+    has_units = any(part and part["unit"] for part in parts)
+    heads = []
+    for part, title, column in zip(parts, titles, cells, strict=True):
+        widest = max(map(len, column), default=0)
+        words = textwrap.wrap(part["words"] if part else title, max(MIN_HEAD, widest), break_long_words=False)
+        heads.append([*words, *([part["unit"] if part else ""] if has_units else [])])
+    height = max(map(len, heads))
+    filled = ([""] * (height - len(head)) + head for head in heads)
+    return [
+        [f"{{{in_tex(line)}}}" if layout.startswith("S") and line else in_tex(line) for line in head]
+        for head, layout in zip(filled, layouts, strict=True)
+    ]
+
+
+def in_column(data: Sequence[Any]) -> tuple[str, list[str]]:
     """Return layout and cells of a column; a numeric column is a siunitx column, aligned at the decimal point."""
     numbers = [value for value in data if is_number(value)]
     written = column_format(numbers)
@@ -54,9 +105,10 @@ def in_column(head: str, data: Sequence[Any]) -> tuple[str, list[str]]:
     decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
     # text that looks like numbers, such as printed values, makes the column numeric if it is most of the column
     if not numbers and 2 * len(decimals) <= len(cells) - cells.count(EMPTY_CELL):
-        return "l", [in_tex(head), *cells]
+        longest, longest_word = (max(map(len, texts), default=0) for texts in (cells, " ".join(cells).split()))
+        return WRAPPED if longest_word <= MAX_UNWRAPPED < longest else "l", cells
     aligned = [cell if DECIMAL.fullmatch(cell) else f"{{{cell}}}" for cell in cells]
-    return f"S[table-format={room_for(decimals)}]", [f"{{{in_tex(head)}}}", *aligned]
+    return f"S[table-format={room_for(decimals)}]", aligned
 
 
 def is_number(value: Any) -> bool:
@@ -92,7 +144,12 @@ def in_tex(value: Any) -> str:
     if value is None:
         return EMPTY_CELL
     text = SIGNS.sub(lambda match: IN_MATHS[match[0]], ESCAPED_POWER.sub(r"$^{\1}$", str(value).translate(TEX)))
-    return SYMBOL.sub(symbol_in_tex, text).replace("$$", "")
+    return SCRIPTS.sub(join_scripts, SYMBOL.sub(symbol_in_tex, text).replace("$$", ""))
+
+
+def join_scripts(match: re.Match[str]) -> str:
+    """Join superscripts, or subscripts, that follow one another."""
+    return f"{match[1]}{{{''.join(SCRIPT.findall(match[0]))}}}"
 
 
 def symbol_in_tex(match: re.Match[str]) -> str:
