@@ -26,7 +26,7 @@ def main(file: Path) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation, camera.distance = 70.0, -8.0, 1.6
+    camera.azimuth, camera.elevation, camera.distance = 90.0, -8.0, 1.6
     renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
     pictures = []
     for instant in INSTANTS_S:
