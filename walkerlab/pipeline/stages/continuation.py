@@ -34,6 +34,7 @@ from walkerlab.scene.walk_outcomes import ground_causes, without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds, and a function that returns a config's step map over the parameter."""
+SHORTEST_REACH = 1e-9  # part of the span over which a branch must lead
 LOOKED_AT = 5  # number of values in the span, ends included, at which the search looks for gaits
 TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
 OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
@@ -100,8 +101,9 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
     for model in models_of(question):
         search = search_of(model, question, progress)
         family = Family(model, None) if search is None else search.family(np.random.default_rng(config.seed))
-        isolated += [alone_at(branch, model, parameter) for branch in family.branches if len(branch.points) == 1]
-        families.append(replace(family, branches=tuple(branch for branch in family.branches if len(branch.points) > 1)))
+        short = SHORTEST_REACH * question.span.size
+        isolated += [alone_at(branch, model, parameter) for branch in family.branches if branch.reach <= short]
+        families.append(replace(family, branches=tuple(branch for branch in family.branches if branch.reach > short)))
     answer, second = summary(families, question, again), question.second
     answer["left_out"] += isolated
     content = Content(groups(families, answer, config, parameter, None if second is None else second.parameter), answer)
@@ -411,7 +413,7 @@ def region_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, str]:
     """Report a gait that continues in neither direction, because the step map is discontinuous there."""
-    (gait,) = branch.points
+    gait = branch.points[0]
     what = f"a gait of the {model} model at {gait.value:.5g} {parameter.unit} ({gait.period_s:.4g} s)"
     return {"what": what, "why": f"it continues in neither direction: {branch.ends[1].reason}", "saves": ""}
 
