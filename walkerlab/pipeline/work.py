@@ -1,5 +1,6 @@
 """Resumable work: batches of units spread over processes, each unit stored as soon as it is computed."""
 
+import contextlib
 import math
 import time
 from collections import deque
@@ -24,6 +25,9 @@ BUGS: Final = (ArithmeticError, AssertionError, AttributeError, ImportError, Loo
 """Errors that indicate a bug; a retry would only repeat them."""
 MAX_DEATHS: Final = 12
 """Maximum number of worker deaths before the first result; beyond it the machine is the cause, not the work."""
+
+
+NOTHING_COMPUTED: Final = "its job came to its time limit, or was stopped, before it had computed one unit"
 
 
 class WorkUnit(NamedTuple):
@@ -52,11 +56,23 @@ class InPlace(SizedExecutor):
         return future
 
 
+class JobEndsError(BaseException):
+    """Error that a signal raises in a job that a cluster is about to end."""
+
+
+class JobEndedError(WalkerlabError):
+    """Error for a cluster's job that ended before it had computed one unit."""
+
+    exit_code = 4
+
+
 def compute(units: Batch) -> list[Timed]:
-    results = []
-    for unit in units:
-        started = time.perf_counter()
-        results.append((unit.run(), time.perf_counter() - started))
+    """Compute units in turn; if the process is about to be ended, return the results so far."""
+    results: list[Timed] = []
+    with contextlib.suppress(JobEndsError):
+        for unit in units:
+            started = time.perf_counter()
+            results.append((unit.run(), time.perf_counter() - started))
     return results
 
 
@@ -90,10 +106,13 @@ class Spread:
             for future in ended:
                 batch, failures = self._running.pop(future)
                 error = future.exception()
-                if error is None:
-                    self._arrived(batch, future.result())
+                results = [] if error is not None else future.result()
+                if results:
+                    self._arrived(batch[: len(results)], results)
+                    rest = batch[len(results) :]
+                    self._again.extend([(rest, 0)] if rest else [])
                 else:
-                    self._failed(batch, failures, error)
+                    self._failed(batch, failures, error or JobEndedError(NOTHING_COMPUTED))
 
     def _next_batch(self, workers: int) -> Batch:
         size = min(self.left, self._batch_size(workers))
@@ -119,7 +138,8 @@ class Spread:
 
     def _failed(self, batch: Batch, failures: int, error: BaseException) -> None:
         """Retry a failed batch, then its halves, and give up a unit that keeps failing; re-raises bugs."""
-        if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not isinstance(error, WorkerDiedError)):
+        of_worker = isinstance(error, WorkerDiedError | JobEndedError)
+        if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not of_worker):
             raise error
         self._deaths += 1
         if self._deaths > MAX_DEATHS and not self._alive:

@@ -8,6 +8,8 @@ import sys
 import threading
 import time
 from asyncio import CancelledError
+from concurrent.futures import Future
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,9 +18,18 @@ from process_table import THERE, is_alive, processes_below
 
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline import work
-from walkerlab.pipeline.sweeps.engines import ENGINES, JobExecutor, Order, engine_named, one_thread_each
-from walkerlab.pipeline.work import Spread
-from walkerlab.pipeline.workers import ONE_THREAD
+from walkerlab.pipeline.sweeps import engines
+from walkerlab.pipeline.sweeps.engines import (
+    ENGINES,
+    JobExecutor,
+    Order,
+    SlurmQueue,
+    engine_named,
+    environment_of_workers,
+    until_told,
+)
+from walkerlab.pipeline.work import JobEndedError, Spread, WorkUnit, compute
+from walkerlab.pipeline.workers import ONE_THREAD, WorkerPool
 
 LOCAL = ENGINES["local"]
 
@@ -133,7 +144,7 @@ def test_dask_gives_the_same_and_outlives_its_workers(toy, monkeypatch):
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
     with (
-        one_thread_each(),  # restores what Dask leaves in this process's environment
+        environment_of_workers(),  # restores what Dask leaves in this process's environment
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -189,6 +200,99 @@ def test_jobs_on_this_machine_give_the_same(toy, tmp_path, monkeypatch):
     swept = toy.run("deadly", "seed=11:13:3", engine=ENGINES["slurm"], order=order(2, folder=tmp_path, options=options))
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {13}
     assert "its worker died" in swept.content[""]["reason"][2]
+
+
+@pytest.mark.parametrize("number", [signal.SIGUSR2, signal.SIGTERM])
+def test_a_job_that_is_told_to_end_returns_what_it_has_computed(number):
+    units = (WorkUnit("a", 1, int), WorkUnit("b", 1, partial(signal.raise_signal, number)), WorkUnit("c", 1, int))
+    with WorkerPool(1) as pool:
+        results = pool.submit(until_told, compute, units).result(timeout=60)
+        assert [value for value, _ in results] == [0]
+        assert pool.submit(until_told, compute, units[1:]).result(timeout=60) == []
+
+
+class Cut(WorkerPool):
+    """Workers whose jobs end after one unit, or before the unit `slow` is done."""
+
+    def __init__(self, slow):
+        super().__init__(1)
+        self.slow = slow
+
+    def submit(self, fn, batch):
+        future = Future()
+        future.set_result([] if batch[0].name == self.slow else compute(batch[:1]))
+        return future
+
+
+@pytest.mark.parametrize(("slow", "given_up"), [("", []), ("2", ["2"])])
+def test_units_that_a_job_has_not_computed_are_computed_by_another(slow, given_up):
+    names, lost, why = [], [], []
+
+    def keep(batch, results):
+        names.extend(unit.name for unit, _ in zip(batch, results, strict=True))
+
+    def give_up(unit, error):
+        lost.append(unit.name)
+        why.append(str(error))
+
+    units = [WorkUnit(str(number), 1, int) for number in range(6)]
+    with Cut(slow) as cut:
+        Spread(iter(units), 6, keep, give_up, 600.0, 1e-3).run(cut)
+    assert lost == given_up
+    assert sorted(names + lost) == [unit.name for unit in units]
+    assert all("before it had computed one unit" in text for text in why)
+
+
+FAKE_SQUEUE = """#!/bin/sh
+cat {folder}/answer 2>/dev/null
+"""
+
+
+@pytest.mark.parametrize(
+    ("answer", "expected"),
+    [
+        ("41 RUNNING\n42 TIMEOUT\n", "Slurm job 42 reached its time limit (60 min; --engine-option timeout_min=N)"),
+        ("42 OUT_OF_MEMORY\n", "needed more memory than it may have (--engine-option mem_gb=N)"),
+        ("42 NODE_FAIL\n", "ended: NODE_FAIL"),
+        ("41 RUNNING\n", "left the queue"),
+        (None, "squeue has not answered"),
+    ],
+)
+def test_a_slurm_job_that_ends_without_a_result_is_noticed_without_accounting(answer, expected, tmp_path, monkeypatch):
+    for name, value in (("LISTING_S", 0.0), ("RESULT_S", 0.0), ("SILENCE_S", 0.1)):
+        monkeypatch.setattr(engines, name, value)
+    program = tmp_path / "squeue"
+    program.write_text(FAKE_SQUEUE.format(folder=tmp_path))
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    if answer is not None:
+        (tmp_path / "answer").write_text(answer)
+    paths = SimpleNamespace(result_pickle=tmp_path / "result", stderr=tmp_path / "log")
+    with pytest.raises(JobEndedError) as ended:
+        SlurmQueue("60").wait(SimpleNamespace(job_id="42", paths=paths))
+    assert expected in ended.value.message
+    assert ended.value.message.endswith(f"without a result; its output: {tmp_path / 'log'}")
+    paths.result_pickle.touch()
+    SlurmQueue("60").wait(SimpleNamespace(job_id="42", paths=paths))
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_processes_of_other_engines_import_nothing_from_the_current_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cloudpickle.py").write_text("raise SystemExit('imported')")
+    for name, options in (("slurm", {"cluster": "local"}), ("dask", {})):
+        with ENGINES[name].opened(Order(1, folder=tmp_path, options=options)) as pool:
+            assert pool.submit(os.getpid).result(timeout=60)
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library's own
+def test_a_dask_cluster_without_workers_gets_new_ones(monkeypatch):
+    monkeypatch.setattr(engines, "RESTART_S", 1.0)
+    distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
+    with ENGINES["dask"].opened(Order(1)) as pool:
+        client = distributed.get_client()
+        client.retire_workers(list(client.nthreads()), close_workers=True)
+        assert pool.submit(os.getpid).result(timeout=60)
 
 
 FAKE_SBATCH = """#!/bin/sh

@@ -6,18 +6,38 @@ import contextlib
 import functools
 import importlib
 import os
+import signal
+import subprocess
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from multiprocessing import current_process
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from walkerlab.errors import ConfigError
+from walkerlab.pipeline.interrupts import raise_on
 from walkerlab.pipeline.store.files import storing
+from walkerlab.pipeline.work import JobEndedError, JobEndsError
 from walkerlab.pipeline.workers import ONE_THREAD, SizedExecutor, WorkerPool
 from walkerlab.private_files import make_private, make_private_folder, may_be_foreign
+
+LISTING_S: Final = 5.0
+"""Minimum time between two questions to Slurm's queue."""
+RESULT_S: Final = 30.0
+"""Time after a job's end in which its result may still appear on a network disk."""
+RESTART_S: Final = 20.0
+"""Time without a Dask worker after which workers are started again; Dask itself needs some seconds to replace one."""
+SILENCE_S: Final = 600.0
+"""Time without an answer of Slurm's queue after which its jobs are taken for lost."""
+GONE, SILENT = "gone", "silent"
+ENDED_STATES: Final = {
+    "BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL", "OUT_OF_MEMORY", "PREEMPTED", "REVOKED",
+    "TIMEOUT", GONE, SILENT,
+}  # fmt: skip
+"""States in which a Slurm job does not run any more."""
 
 GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The engine `local` needs no such guard.'
 
@@ -60,10 +80,11 @@ def local(order: Order) -> WorkerPool:
 
 
 @contextlib.contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Let processes that start within the `with` block compute in one thread each."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+def environment_of_workers() -> Iterator[None]:
+    """Let processes that start in the `with` block use one thread, and import nothing from the current folder."""
+    changes = dict.fromkeys((*ONE_THREAD, "PYTHONSAFEPATH"), "1")
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
     try:
         yield
     finally:
@@ -79,27 +100,54 @@ def dask(order: Order) -> Iterator[JobExecutor]:
     """Use a Dask cluster at an address, or start one on this machine."""
     distributed = extra("distributed", "dask")
     # Dask copies these variables into this process's environment whenever it starts or replaces a worker.
-    with one_thread_each(), contextlib.ExitStack() as stack:
+    with environment_of_workers(), contextlib.ExitStack() as stack:
+        workers: DaskWorkers | None = None
         if order.address:
             client = stack.enter_context(distributed.Client(order.address))
         else:
-            workers = order.workers or os.cpu_count() or 1
+            count = order.workers or os.cpu_count() or 1
             try:
                 cluster = distributed.LocalCluster(
-                    n_workers=workers, threads_per_worker=1, dashboard_address=None, processes=True
+                    n_workers=count, threads_per_worker=1, dashboard_address=None, processes=True
                 )
             except RuntimeError as error:
                 raise ConfigError(f"--engine dask: its processes did not start: {error}", GUARD) from error
             stack.enter_context(cluster)
             client = stack.enter_context(distributed.Client(cluster))
+            workers = DaskWorkers(cluster, client, count)
         # Worker deaths are handled chunk by chunk, as in every engine; Dask's own executor reports an error for a
         # result whose worker dies before handing it over.
-        size = order.workers or max(1, len(client.scheduler_info()["workers"]))
-        executor = JobExecutor(functools.partial(client.submit, retries=0, pure=False), size)
+        size = order.workers or max(1, len(client.nthreads()))
+        executor = JobExecutor(
+            functools.partial(client.submit, retries=0, pure=False), size, None if workers is None else workers.wait
+        )
         try:
             yield executor
         finally:
             client.cancel(list(executor.jobs))
+
+
+class DaskWorkers:
+    """Workers of a cluster that this process started. Dask does not always replace one that it ended for its memory."""
+
+    def __init__(self, cluster: Any, client: Any, count: int) -> None:
+        self.cluster, self.client, self.count = cluster, client, count
+        self._lock = threading.Lock()
+        self._seen_at = time.monotonic()  # when there was a worker
+
+    def wait(self, job: Any) -> None:
+        """Wait until a job has ended; start the workers again if there has been none for a while."""
+        while not job.done():
+            with contextlib.suppress(TimeoutError):
+                extra("distributed", "dask").wait(job, timeout=LISTING_S)
+            with self._lock:
+                if job.done() or self.client.nthreads():
+                    self._seen_at = time.monotonic()
+                elif time.monotonic() - self._seen_at > RESTART_S:
+                    self.cluster.scale(0)
+                    time.sleep(1.0)  # the cluster forgets closed workers in the background
+                    self.cluster.scale(self.count)
+                    self._seen_at = time.monotonic()
 
 
 @contextlib.contextmanager
@@ -117,14 +165,78 @@ def slurm(order: Order) -> Iterator[JobExecutor]:
         job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
-    executor = JobExecutor(job_runner.submit, order.workers or 16)
+    queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
+    submit = functools.partial(job_runner.submit, until_told)
+    executor = JobExecutor(submit, order.workers or 16, None if queue is None else queue.wait)
+    with environment_of_workers():
+        try:
+            yield executor
+        finally:
+            for job in list(executor.jobs):
+                with contextlib.suppress(OSError):  # the job may have ended meanwhile
+                    if not job.paths.result_pickle.exists():
+                        job.cancel(check=False)
+
+
+def until_told(fn: Callable[..., Any], *args: Any) -> Any:
+    """Run a function in a job; a signal that announces the job's end raises JobEndsError in it."""
+    announcement = os.environ.get("SUBMITIT_PREEMPT_SIGNAL", "USR2")
+    numbers = (signal.Signals[f"SIG{announcement}"], signal.SIGTERM)
+    for number in numbers:
+        raise_on(number, JobEndsError)
     try:
-        yield executor
+        return fn(*args)
     finally:
-        for job in list(executor.jobs):
-            with contextlib.suppress(OSError):  # the job may have ended meanwhile
-                if not job.done():
-                    job.cancel(check=False)
+        for number in numbers:  # nothing must keep the result from being stored
+            signal.signal(number, signal.SIG_IGN)
+
+
+class SlurmQueue:
+    """States of this user's Slurm jobs, from the queue; submitit asks only the accounting, which few clusters keep."""
+
+    def __init__(self, time_limit: str) -> None:
+        """Start without asking; `time_limit` is that of the jobs, min."""
+        self.time_limit = time_limit
+        self._lock = threading.Lock()
+        self._states: dict[str, str] = {}
+        self._listed_at = self._answered_at = time.monotonic() - LISTING_S
+
+    def wait(self, job: Any) -> None:
+        """Wait until a job has stored its result; raises JobEndedError if it ended without one."""
+        seen_alive = time.monotonic()
+        while not job.paths.result_pickle.exists():
+            state = self.state(job.job_id)
+            if state in ENDED_STATES:
+                if time.monotonic() - seen_alive > RESULT_S:
+                    raise JobEndedError(self.describe(job, state))
+            else:
+                seen_alive = time.monotonic()
+            time.sleep(1.0)
+
+    def state(self, job_id: str) -> str:
+        """Return a job's state; GONE if the queue no longer lists it, SILENT if Slurm has not answered for long."""
+        with self._lock:
+            now = time.monotonic()
+            if now - self._listed_at >= LISTING_S:
+                self._listed_at = now
+                # finished jobs stay in the list for some minutes
+                command = ["squeue", "--noheader", "--me", "--states=all", "--format=%i %T"]
+                done = subprocess.run(command, capture_output=True, text=True, check=False)
+                if done.returncode == 0:
+                    self._answered_at = now
+                    self._states = dict(line.split()[:2] for line in done.stdout.splitlines())
+            if self._answered_at == self._listed_at:
+                return self._states.get(job_id, GONE)
+            return SILENT if now - self._answered_at > SILENCE_S else "UNKNOWN"
+
+    def describe(self, job: Any, state: str) -> str:
+        what = {
+            "TIMEOUT": f"reached its time limit ({self.time_limit} min; --engine-option timeout_min=N)",
+            "OUT_OF_MEMORY": "needed more memory than it may have (--engine-option mem_gb=N)",
+            GONE: "left the queue",
+            SILENT: f"is not known, because squeue has not answered for {SILENCE_S:.0f} s",
+        }.get(state, f"ended: {state}")
+        return f"Slurm job {job.job_id} {what}, without a result; its output: {job.paths.stderr}"
 
 
 def private_jobs_folder(run_folder: Path) -> Path:
@@ -150,12 +262,13 @@ def private_jobs_folder(run_folder: Path) -> Path:
 class JobExecutor(SizedExecutor):
     """Executor that starts jobs of a library; a thread waits for each job."""
 
-    def __init__(self, start: Callable[..., Any], size: int) -> None:
-        """Store the function that starts a job.
+    def __init__(self, start: Callable[..., Any], size: int, wait_for: Callable[[Any], None] | None = None) -> None:
+        """Store the functions that start a job and wait for it.
 
-        start  called with a function and its arguments; returns a job whose `result()` waits
+        start     called with a function and its arguments; returns a job whose `result()` waits
+        wait_for  called with a job; returns when its result is there, or raises an error; None to call only `result()`
         """
-        self._start, self.size = start, size
+        self._start, self.size, self._wait_for = start, size, wait_for
         self.jobs: set[Any] = set()
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
@@ -165,6 +278,8 @@ class JobExecutor(SizedExecutor):
 
         def wait() -> None:
             try:
+                if self._wait_for is not None:
+                    self._wait_for(job)
                 result = job.result()
             except BaseException as error:  # a cancelled job may raise an error that is no Exception
                 future.set_exception(error)

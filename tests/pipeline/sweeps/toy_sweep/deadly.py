@@ -1,4 +1,4 @@
-"""Some seeds end the process, one raises, one ends it the first time only; the others take a moment."""
+"""Some seeds end the process, one raises, one ends it the first time only, one needs memory; others take a moment."""
 
 import os
 import signal
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from walkerlab.pipeline.store.content import Content
 
-ALWAYS, RAISES, ONCE = 13, 7, 21
+ALWAYS, RAISES, ONCE, GREEDY = 13, 7, 21, 29
 
 
 def run(config, inputs, progress):
@@ -18,5 +18,9 @@ def run(config, inputs, progress):
         if config.seed == ONCE:
             once.touch()
         os.kill(os.getpid(), signal.SIGKILL)
+    if config.seed == GREEDY and "TOY_SWEEP_GREED" in os.environ:
+        kept = bytearray(int(os.environ["TOY_SWEEP_GREED"]))
+        kept[:: 1 << 12] = b"x" * len(kept[:: 1 << 12])  # each page, so that the system has to give it
+        time.sleep(5.0)  # until whoever watches the memory has looked
     time.sleep(float(os.environ.get("TOY_SWEEP_PAUSE", "0")))
     return Content({}, {"twice": 2 * config.seed})
