@@ -598,6 +598,7 @@ def read_walk(
     units: Mapping[str, str] | None = None,
     walker: Walker | None = None,
     slope_deg: float | None = None,
+    walks: str | None = None,
     **keys: Any,
 ) -> Result:
     """Read a walk from a file, in memory; `summary` has its steps, `dataset` its steps and samples.
@@ -607,11 +608,12 @@ def read_walk(
     units      units by kind, quantity or column, if the file does not state them, such as {"angle": "deg"}
     walker     walker that made the recording, built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
+    walks      direction of a walk of markers, as the recording sees it: left, right, away or towards
     keys       other config keys
 
     Raises ConfigError for a file without a walk.
     """
-    recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {})}
+    recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {}), "walks": walks}
     values = {"slope_deg": slope_deg, "recording": recording}
     return in_memory("recorded-walk", config_of_scene(walker, values, keys))
 

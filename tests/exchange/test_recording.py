@@ -103,6 +103,17 @@ def test_the_unit_of_one_component_of_results_holds_for_it_alone(tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
 
+def test_results_begin_with_the_initial_conditions_of_the_simulation(tmp_path):
+    """ADAMS writes the state at time 0 into a block of its own; a static solution at the same time replaces it."""
+    initial = '<Data name="initialConditions_001" id="9"><Step type="initialConditions">-0.1\n0.5 0.6</Step></Data>'
+    path = written(tmp_path, "walk.res", RES.replace('<Data name="dynamic_001"', f'{initial}<Data name="dynamic_001"'))
+    walk = as_walk(read_recording(path), {}, {})
+    assert walk.time_s == pytest.approx([-0.1, *TIMES], abs=1e-12)
+    assert walk.both_legs("angle")[0].tolist() == [0.5, 0.6]
+    path = written(tmp_path, "walk.res", path.read_text(encoding="utf-8").replace("-0.1\n0.5", f"{TIMES[0]}\n0.5"))
+    assert as_walk(read_recording(path), {}, {}).both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
+
+
 @pytest.mark.parametrize("names", ["T,time", "T,t", "T,sensor.time", "time,t", "t,sensor.time"])
 def test_a_column_whose_name_may_be_a_temperature_is_the_time_only_if_no_other_can_be(names, tmp_path):
     first, second = ([20.0, 20.0], [0.0, 1.0]) if names.startswith("T,") else ([0.0, 1.0], [20.0, 20.0])

@@ -5,6 +5,7 @@ from typing import Literal, get_args
 from pydantic import field_validator
 
 from walkerlab.config.fields import Block, Text, key, meaning_error
+from walkerlab.config.recording import WALKS, Direction
 
 Nuisance = Literal["time_offset_s", "clock_rate", "angle_offset_rad", "angle_gain"]
 Pair = list[float]
@@ -63,6 +64,7 @@ class Identify(Block):
         "units by kind (time, length, angle), quantity or column",
         bounds="a unit for each kind, quantity or column",
     )
+    walks: Direction | None = WALKS
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -1,6 +1,16 @@
 """The recording block: a walk measured or computed elsewhere, to compare with."""
 
+from typing import Any, Literal
+
 from walkerlab.config.fields import Block, Text, key
+
+Direction = Literal["left", "right", "away", "towards"]
+WALKS: Any = key(
+    None,
+    "",
+    "direction of a walk of markers, as the recording sees it; right is the first horizontal axis",
+    default_in_words="the one in which swinging feet move",
+)
 
 
 class RecordedFile(Block):
@@ -29,3 +39,4 @@ class RecordedFile(Block):
         "units by kind (angle, length, ...), quantity or column",
         bounds="a unit for each kind, quantity or column",
     )
+    walks: Direction | None = WALKS

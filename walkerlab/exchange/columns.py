@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from walkerlab.errors import ConfigError
+from walkerlab.exchange.marker_lines import Line, find_plane, length_doubts, refuse_running, unseen_as_gaps
 from walkerlab.exchange.recording import TIME, UNIT_IN_NAME, Array, Recording
 from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
 
@@ -30,6 +31,10 @@ NEEDED: Final = (TIME, "angle 1", "angle 2")
 UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 """Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
+HIP_OF_LINES: Final = "upper marker along the walk"
+"""Place (m) of the marker at the top of the first line, where angles are those of lines."""
+SAMPLE: Final = "sample"
+"""Number of each sample in the file, from 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,10 @@ class RecordedWalk:
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)  # reason by quantity that a column has but the walk lacks
+    walks: str = ""  # stated direction, '' if it is to be found
+    unit_is_stated: bool = True  # whether the file states the unit of a leg's angle for itself, or the user
+    lines: tuple[str, ...] = ()  # quantities that are angles of lines between markers
+    doubts: tuple[str, ...] = ()  # what is odd about the recording, and what was done about it
 
     def both_legs(self, name: str) -> Array | None:
         """Return a quantity of both legs (samples, 2); None unless it is recorded for both."""
@@ -47,13 +56,16 @@ class RecordedWalk:
         return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
 
 
-def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str, str]) -> RecordedWalk:
+def as_walk(
+    recording: Recording, columns: Mapping[str, str], units: Mapping[str, str], walks: str = ""
+) -> RecordedWalk:
     """Return the quantities of a recorded walk in SI units.
 
     columns  columns that the user names, by quantity; `HIP>FOOT` is the angle of the line between two markers
     units    units that the file does not state, by kind ('angle', 'length', ...), by quantity or by column
+    walks    left, right, away or towards, as the recording sees the walk; '' to find the direction between markers
 
-    Raises ConfigError for a column or unit that is unknown or missing, and for gaps.
+    Raises ConfigError for a column or unit that is unknown or missing, for gaps, and for running.
     """
     refuse_units(recording, units, QUANTITY_KINDS)
     named = find_named(recording, columns)
@@ -64,22 +76,52 @@ def as_walk(recording: Recording, columns: Mapping[str, str], units: Mapping[str
             raise ConfigError(left_out[name], f'Choose one: --columns "{name}=..."')
         if name not in sources:
             raise missing(recording, name)
+    ends = {name: pairs for name, source in sources.items() if (pairs := ends_of(recording, source))}
+    for pairs in ends.values():
+        recording = replace(recording, columns=unseen_as_gaps(recording.columns, pairs))
     asked = {**dict.fromkeys(NEEDED), **named}.keys()
     part, cut = without_gaps_at_ends(recording, [sources[name] for name in asked])
     left_out |= {"samples": cut} if cut else {}
     within = replace(recording, columns={name: values[part] for name, values in recording.columns.items()})
-    values = {}
+    values, lines = {}, dict[str, Line]()
     for name, source in sources.items():
         try:
             refuse_gaps(recording, source, part)
-            values[name] = in_si(within, name, source, units)
+            if name in ends:
+                lines[name] = places_of_ends(within, ends[name], units)
+            else:
+                values[name] = recording.columns[source][part] * unit_value(
+                    recording, name, source, QUANTITY_KINDS[name], units
+                )
         except ConfigError as error:
             if name in asked:
                 raise
             left_out[name] = error.message.removeprefix(f"{recording.path}: ")
     time = values.pop(TIME)
     refuse_order(recording.path, time)
-    return RecordedWalk(time, values, {name: sources[name] for name in (TIME, *values)}, left_out)
+    used = {name: sources[name] for name in (TIME, *values, *lines)}
+    values[SAMPLE] = 1.0 + np.arange(part.start, part.stop)
+    walk = RecordedWalk(time, values, used, left_out, walks, states_unit(recording, sources["angle 1"], units))
+    return with_lines(walk, lines, str(recording.path)) if lines else walk
+
+
+def with_lines(walk: RecordedWalk, lines: Mapping[str, Line], source: str) -> RecordedWalk:
+    """Add the angles of lines between markers (by quantity) to a walk; raises ConfigError for running."""
+    plane = find_plane(lines, walk.walks)
+    refuse_running(lines, plane, source)
+    angles = {name: plane.angle(line) for name, line in lines.items()}
+    hip = next(iter(lines.values()))[0] @ plane.ahead
+    by_source = {walk.sources[name]: line for name, line in lines.items()}
+    doubts = length_doubts(by_source, walk.quantities[SAMPLE], walk.time_s)
+    return replace(
+        walk, quantities={**walk.quantities, **angles, HIP_OF_LINES: hip}, lines=tuple(lines), doubts=tuple(doubts)
+    )
+
+
+def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
+    """Return the two columns of each coordinate of a line's ends; empty if the source is no line."""
+    ends = None if source in recording.columns else LINE.fullmatch(source)
+    return line_columns(recording, ends[1], ends[2]) if ends else []
 
 
 def without_gaps_at_ends(recording: Recording, sources: Iterable[str]) -> tuple[slice, str]:
@@ -117,7 +159,8 @@ def refuse_gaps(recording: Recording, source: str, part: slice) -> None:
             raise ConfigError(
                 f"{recording.path}: {column!r} lacks {gaps.size} of {values.size} values, the first at sample "
                 f"{gaps[0] + 1}.",
-                "Fill the gaps, or cut the recording to a part without them.",
+                "Fill the gaps, or cut the recording to a part without them. A marker at (0, 0, 0) that changes its leg's "
+                "length counts as a gap.",
             )
 
 
@@ -193,9 +236,8 @@ def named_column(recording: Recording, name: str) -> str:
 
 def columns_of(recording: Recording, source: str) -> list[str]:
     """Return the columns that a source needs: its own, or the coordinates of a line's ends; ConfigError if absent."""
-    ends = None if source in recording.columns else LINE.fullmatch(source)
-    if ends is not None:
-        return [column for pair in line_columns(recording, ends[1], ends[2]) for column in pair]
+    if pairs := ends_of(recording, source):
+        return [column for pair in pairs for column in pair]
     if source not in recording.columns:
         raise unknown_column(recording, source)
     return [source]
@@ -244,14 +286,6 @@ def missing(recording: Recording, name: str) -> ConfigError:
     return ConfigError(
         f"{recording.path} has no column for {name!r}; it has: {there}.", f'Name it: --columns "{name}={nearest}"'
     )
-
-
-def in_si(recording: Recording, name: str, source: str, units: Mapping[str, str]) -> Array:
-    """Return a quantity in SI units; raises ConfigError for a missing or unsuitable unit."""
-    ends = None if source in recording.columns else LINE.fullmatch(source)
-    if ends is not None:
-        return line_angle(*places_of_ends(recording, line_columns(recording, ends[1], ends[2]), units))
-    return recording.columns[source] * unit_value(recording, name, source, QUANTITY_KINDS[name], units)
 
 
 def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Collection[str]) -> None:
@@ -304,6 +338,12 @@ def unknown_unit(recording: Recording, unit: str, name: str, kind: str) -> Confi
     )
 
 
+def states_unit(recording: Recording, column: str, units: Mapping[str, str]) -> bool:
+    """Return whether the user or the file states the unit of a leg's angle for itself, not for all angles of a file."""
+    named = ends_of(recording, column) or column in recording.units or unit_in_name(column, "angle")
+    return bool(named or not units.keys().isdisjoint((column, "angle 1", "angle")))
+
+
 def unit_in_name(column: str, kind: str) -> str:
     """Return the unit at the end of a column's name, such as mm in hip_mm; empty if the name has none."""
     endings = [unit for unit in UNIT_VALUES[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
@@ -316,7 +356,7 @@ def rate_unit(units: Mapping[str, str], kind: str) -> str:
     return f"{unit}/s" if unit else ""
 
 
-def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> list[Array]:
+def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> Line:
     """Return the positions (samples, axes) of a line's ends: in m, or as recorded if all have the same unknown unit."""
     columns = [column for pair in pairs for column in pair]
     stated = {stated_unit(recording, column, column, "length", units) for column in columns}
@@ -325,20 +365,8 @@ def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units
         column: recording.columns[column] * (unit_value(recording, column, column, "length", units) if scaled else 1.0)
         for column in columns
     }
-    return [np.stack([places[column] for column in end], axis=1) for end in zip(*pairs, strict=True)]
-
-
-def line_angle(top: Array, bottom: Array) -> Array:
-    """Return the angles (samples,) of a line from the vertical (rad), positive if the lower end is ahead.
-
-    Ahead is the direction of the upper end's motion along the horizontal axis on which it moves most.
-    """
-    vertical = int(np.argmax(np.abs(np.mean(top - bottom, axis=0))))
-    spans = np.ptp(top, axis=0)
-    spans[vertical] = -1.0
-    ahead = int(np.argmax(spans))
-    forward = np.sign(top[-1, ahead] - top[0, ahead]) or 1.0
-    return np.asarray(np.arctan2(forward * (bottom - top)[:, ahead], np.abs((top - bottom)[:, vertical])))
+    top, bottom = (np.stack([places[column] for column in end], axis=1) for end in zip(*pairs, strict=True))
+    return top, bottom
 
 
 def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:

@@ -1,37 +1,71 @@
 """Find the heel strikes in recorded angles.
 
 A foot strikes when it is ahead and its height over the other foot falls to zero. Noise repeats such crossings, so
-consecutive crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit of the angles:
-one polynomial before the strike and one after it, which meet at the strike, because only the rates jump.
+neighbouring crossings of one leg count as one strike. Its time is the zero of the height in a smooth fit of the angles:
+one polynomial before the strike and one after it, which meet at the strike, because only the rates jump. The scatter of
+the angles around the fit gives the standard error of that time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
-from operator import itemgetter
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.exchange.rate_jumps import AHEAD, WINDOW, Array, typical_interval
 
 Height = Callable[[Array], Array]
 
-TOUCH_DEGREE: Final = 3
+DEGREES: Final = range(1, 7)
+"""Degrees of the polynomials; the samples decide between them."""
 FEWEST: Final = 6
-"""Fewest samples before a heel strike that a fit needs."""
-ITERATIONS: Final = 8
+"""Fewest samples on each side of a heel strike that a fit takes in, if the step has as many."""
+WIDEST: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
+SHORTEST: Final = 0.25  # fraction of the step period; nearer crossings of one leg are one heel strike
+SLOWEST: Final = 0.25  # fraction of the median speed of falling feet; a slower crossing is no heel strike
+ITERATIONS: Final = 20
+SETTLED: Final = 3  # number of iterations that choose the degree anew
+CLOSE: Final = 1e-3  # correction at which a heel strike is located, in standard errors
+ERRORS: Final = 3.0  # standard errors within which a value is zero
+LASTING_S: Final = 1e-4  # time that a heel strike takes on ground that gives way, so that no fit resolves less
+PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first sample
+JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
+JUMP_SAMPLES: Final = 10  # fewest samples in that time
+JUMP_DEGREE: Final = 4
+MOST_JUMPS: Final = 20  # number of heel strikes at which jumps are sought
+SHIFTS: Final = 61
+SIDES: Final = 2
+SMALLEST: Final = 1e-30  # rad^2, added to sums of squares, of which logarithms are taken
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Polynomials through the angles of both legs before and after an instant, at which they meet."""
+
+    angle: Array  # (2,) at the instant
+    rates: dict[str, Array]  # (2,) before and after it, by `before` and `after`; absent if there are too few samples
+    squares: float  # sum of the squared residuals
+    freedoms: int  # number of values less number of coefficients
+    deviation: float  # standard error of either angle
+    criterion: float  # Bayesian information criterion, corrected for few values; smaller is better
+
+    @property
+    def scatter(self) -> float:
+        return float(np.sqrt(self.squares / self.freedoms))
 
 
 @dataclass(frozen=True)
 class Touch:
-    """Heel strike: time (s), leg that strikes (0 or 1), and scatter of the angles around it (rad)."""
+    """Heel strike: time and its standard error (s), leg that strikes (0 or 1), speed of the foot's fall (m/s)."""
 
     time_s: float
     leg: int
-    scatter_rad: float
+    error_s: float
+    fall_m_s: float
+    fit: Fit  # in s
 
 
 def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
@@ -41,9 +75,16 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
     angle   (samples, 2) rad, from the vertical, positive with the foot ahead
     height  function from angles (samples, 2) to the height (samples,) of leg 0's foot over leg 1's (m, normal to slope)
     """
-    crossings = merge_repeats(candidates(time, angle, height))
-    period = typical_interval([crossing for crossing, _ in crossings], time)
-    return [locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in crossings]
+    crossings = candidates(time, angle, height)
+    period = typical_interval([crossing for crossing, _ in merge_repeats(crossings, np.inf)], time)
+    merged = merge_repeats(crossings, SHORTEST * period)
+    located = [locate_touch(time, angle, height, crossing, leg, period) for crossing, leg in merged]
+    touches = [touch for touch in located if touch is not None and touch.time_s >= time[0]]
+    first = touch_at_start(time, angle, height, period)
+    if first is not None:
+        touches = [first, *(touch for touch in touches if touch.time_s > first.time_s + SHORTEST * period)]
+    slowest = SLOWEST * float(np.median([touch.fall_m_s for touch in touches])) if touches else 0.0
+    return [touch for touch in touches if touch.fall_m_s >= slowest]
 
 
 def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int]]:
@@ -62,39 +103,129 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     return crossings
 
 
-def merge_repeats(crossings: list[tuple[float, int]]) -> list[tuple[float, int]]:
-    """Average the consecutive crossings of a leg, which belong to one heel strike."""
-    strikes = [(leg, [time for time, _ in repeats]) for leg, repeats in groupby(crossings, itemgetter(1))]
+def merge_repeats(crossings: Sequence[tuple[float, int]], apart_s: float) -> list[tuple[float, int]]:
+    """Average consecutive crossings of a leg that are nearer to each other than `apart_s` (s)."""
+    strikes: list[tuple[int, list[float]]] = []
+    for time, leg in crossings:
+        if strikes and strikes[-1][0] == leg and time - strikes[-1][1][-1] < apart_s:
+            strikes[-1][1].append(time)
+        else:
+            strikes.append((leg, [time]))
     return [(float(np.mean(times)), leg) for leg, times in strikes]
 
 
-def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch:
-    """Locate the heel strike near a crossing by a fit of the angles; with too few samples, return the crossing."""
-    half = WINDOW * period
-    inside = np.abs(time - near) <= half
-    t, y, touch, scatter = (time[inside] - near) / half, angle[inside], 0.0, 0.0
-    if np.count_nonzero(t <= 0.0) < FEWEST:
-        return Touch(near, leg, 0.0)
-    for _ in range(ITERATIONS):
-        at_touch, rate, scatter = fit_around(t, y, touch)
-        over = height(np.array([at_touch, at_touch + 1e-6 * rate, at_touch - 1e-6 * rate]))
-        slope = (over[1] - over[2]) / 2e-6
-        correction = float(np.clip(-over[0] / slope, -0.5, 0.5)) if slope else 0.0
-        touch += correction
-        if abs(correction) < 1e-9:
-            break
-    return Touch(near + touch * half, leg, scatter)
+def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> Touch | None:
+    """Return the heel strike with which a recording begins, or None if it begins at another instant.
+
+    The height fitted at the first sample is zero within three of its standard errors, which are small in time.
+    """
+    spread, begin = angle[:, 0] - angle[:, 1], float(time[0])
+    if abs(spread[0]) <= AHEAD * np.abs(spread).max():
+        return None
+    t, y = samples_near(time, angle, begin, period)
+    fit = fit_of_degree(t, y, 0.0, best_degree(t, y, 0.0))
+    touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
+    off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
+    return touch if touch and touch.error_s < PRECISE_S and off <= ERRORS * touch.error_s else None
 
 
-def fit_around(t: Array, y: Array, touch: float) -> tuple[Array, Array, float]:
-    """Fit polynomials that meet at a heel strike; return the angles at it, the rates before it, and the scatter."""
-    before, after = np.minimum(t - touch, 0.0), np.maximum(t - touch, 0.0)
-    sides = [
-        side[:, None] ** np.arange(1, TOUCH_DEGREE + 1)
-        for side in (before, after)
-        if np.count_nonzero(side) >= TOUCH_DEGREE
-    ]
-    basis = np.concatenate([np.ones((t.size, 1)), *sides], axis=1)
-    coefficients = np.linalg.lstsq(basis, y, rcond=None)[0]
-    freedoms = max(1, y.size - coefficients.size)
-    return coefficients[0], coefficients[1], float(np.sqrt(np.sum((y - basis @ coefficients) ** 2) / freedoms))
+def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch | None:
+    """Locate the heel strike near a crossing by a fit; None if there are too few samples, or the foot does not fall."""
+    t, y = samples_near(time, angle, near, period)
+    farthest = 0.5 * float(np.abs(t).max())
+    at, correction, degree, touch = 0.0, 0.0, DEGREES[0], None
+    for iteration in range(ITERATIONS):
+        # The best degree shows only once the polynomials meet near the strike.
+        degree = best_degree(t, y, at) if iteration < SETTLED else degree
+        fit = fit_of_degree(t, y, at, degree)
+        touch = touch_of(fit, height, near + at, leg) if fit else None
+        if touch is None or touch.fall_m_s <= 0.0:
+            return None
+        over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
+        correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
+        if iteration >= SETTLED and abs(correction) < CLOSE * touch.error_s:
+            return touch
+        at += correction
+    # With much noise the samples that change sides keep moving the zero.
+    return touch if touch and abs(correction) < touch.error_s else None
+
+
+def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
+    """Return the samples around an instant (times from it, and angles); more of the step where samples are sparse."""
+    away = np.abs(time - near)
+    wanted = float(np.partition(away, min(2 * FEWEST, away.size) - 1)[min(2 * FEWEST, away.size) - 1])
+    inside = away <= max(WINDOW * period, min(wanted, WIDEST * period))
+    return time[inside] - near, angle[inside]
+
+
+def touch_of(fit: Fit, height: Height, time: float, leg: int) -> Touch:
+    """Return the heel strike of a leg at the time (s) of a fit."""
+    small = 1e-6 * np.eye(2)
+    values = height(np.concatenate((fit.angle + small, fit.angle - small)))
+    gradient = (values[:2] - values[2:]) / 2e-6
+    slope = float(gradient @ next(iter(fit.rates.values())))
+    error = np.hypot(fit.deviation * np.hypot(*gradient) / abs(slope), LASTING_S) if slope else np.inf
+    return Touch(time, leg, float(error), slope if leg else -slope, fit)
+
+
+def best_degree(t: Array, y: Array, at: float) -> int:
+    """Return the degree of the polynomials that describe the samples best."""
+    fits = {degree: fit for degree in DEGREES if (fit := fit_of_degree(t, y, at, degree)) is not None}
+    return min(fits, key=lambda degree: fits[degree].criterion, default=DEGREES[0])
+
+
+def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
+    """Fit polynomials that meet at an instant, without a side that has too few samples; None if both have."""
+    sides = {name: side for name, side in {"before": t < at, "after": t >= at}.items() if np.sum(side) > degree}
+    if not sides:
+        return None
+    used, scale = np.any(list(sides.values()), axis=0), float(np.ptp(t))
+    powers = ((t - at) / scale)[:, None] ** np.arange(1, degree + 1)
+    basis = np.concatenate([np.ones((t.size, 1)), *(side[:, None] * powers for side in sides.values())], axis=1)[used]
+    count, columns = basis.shape
+    if count <= columns:
+        return None
+    orthonormal, triangle = np.linalg.qr(basis)
+    inverse = np.linalg.inv(triangle)
+    coefficients = inverse @ (orthonormal.T @ y[used])
+    squares, freedoms = float(np.sum((y[used] - basis @ coefficients) ** 2)) + SMALLEST, 2 * (count - columns)
+    rates = {name: coefficients[1 + place * degree] / scale for place, name in enumerate(sides)}
+    deviation = float(np.sqrt(squares / freedoms) * np.linalg.norm(inverse[0]))
+    criterion = 2 * count * float(np.log(squares)) + 2 * columns * float(np.log(2 * count)) * count / (count - columns)
+    return Fit(coefficients[0], rates, squares, freedoms, deviation, criterion)
+
+
+def angles_at_jumps(
+    time: Array, angle: Array, touches: Sequence[Touch]
+) -> tuple[float, Array, NDArray[np.int64]] | None:
+    """Find where rates jump near heel strikes: how much later (s), and the angles (jumps, 2) and legs (jumps,) there.
+
+    All strikes are shifted alike, by the time that leaves the smallest residuals. Returns None unless the shift exceeds
+    three of its standard errors and the precision that heel strikes need.
+    """
+    period = typical_interval([touch.time_s for touch in touches], time)
+    half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), WIDEST * period)
+    inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
+    near = [(touch.time_s, np.abs(time - touch.time_s) <= half) for touch in inside]
+
+    def fits_at(shift: float) -> list[Fit]:
+        fits = (fit_of_degree(time[rows] - instant, angle[rows], shift, JUMP_DEGREE) for instant, rows in near)
+        return [fit for fit in fits if fit is not None and len(fit.rates) == SIDES]
+
+    trials = {shift: fits_at(shift) for shift in (np.linspace(-0.5, 0.5, SHIFTS) * half).tolist()}
+    squares = {shift: sum(fit.squares for fit in fits) for shift, fits in trials.items() if len(fits) == len(inside)}
+    shifts = list(squares)
+    if not inside or 0.0 not in squares:
+        return None
+    place = min(range(len(shifts)), key=lambda place: squares[shifts[place]])
+    best, least = shifts[place], squares[shifts[place]]
+    variance = least / sum(fit.freedoms for fit in trials[best])
+    if squares[0.0] - least <= ERRORS**2 * variance or not 0 < place < len(shifts) - 1:
+        return None
+    # the smallest residuals between three trials, by a parabola
+    before, after = squares[shifts[place - 1]], squares[shifts[place + 1]]
+    best += 0.5 * (before - after) / (before - 2.0 * least + after) * (shifts[place + 1] - best)
+    fits = fits_at(best)
+    if abs(best) <= PRECISE_S or len(fits) < len(inside):
+        return None
+    return best, np.array([fit.angle for fit in fits]), np.array([touch.leg for touch in inside])

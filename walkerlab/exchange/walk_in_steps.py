@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk
-from walkerlab.exchange.rate_jumps import AHEAD, Array
-from walkerlab.exchange.touches import Touch, find_touches
+from walkerlab.exchange.leg_angles import legs
+from walkerlab.exchange.marker_lines import NAMED
+from walkerlab.exchange.rate_jumps import Array
+from walkerlab.exchange.touches import Touch, angles_at_jumps, find_touches
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     STRAIGHT,
@@ -27,9 +30,8 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-# rad, limit of the sum of the leg angles from the normal in a recording that starts on two feet
-TWO_FEET_TOLERANCE: Final = 0.03
-SHORTEST: Final = 0.25  # fraction of the mean step period; an earlier first heel strike counts as the start
+SHANK: Final = 1.4  # ratio of a shank's farthest angle behind to that at heel strikes, at least; a thigh's is 1
+WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
 MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
@@ -52,6 +54,7 @@ class RecordedSteps:
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
     origin_s: float  # the recording's time at the first heel strike
+    doubts: tuple[str, ...]  # what is odd about the heel strikes
 
 
 def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_sum_rad: float = 0.0) -> RecordedSteps:
@@ -62,15 +65,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
 
     Raises ConfigError for implausible values, a gap within a step, or a recording without a complete step.
     """
-    angle = walk.both_legs("angle")
-    assert angle is not None, "a walk has the angles of both legs"
-
-    largest = float(np.abs(angle).max())
-    if largest > math.pi:
-        raise ConfigError(
-            f"{source}: an angle from the vertical reaches {largest:.3g} rad, more than half a turn.",
-            "State the unit of angles, e.g. --units angle=deg, or remove outliers.",
-        )
+    angle = legs(walk)
 
     def total(angles: Array) -> Array:
         return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
@@ -81,22 +76,79 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         return np.asarray(2.0 * model.leg_length * np.sin(half) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
 
     touches = find_touches(walk.time_s, angle, height)
-    if touches and not starts_on_two_feet(angle, float(total(angle[:1])[0]) - touch_sum_rad):
-        origin, ends = touches[0].time_s, touches[1:]
-    else:
-        origin = float(walk.time_s[0])
-        mean_step = (touches[-1].time_s - origin) / len(touches) if touches else 0.0
-        ends = [touch for touch in touches if touch.time_s > origin + SHORTEST * mean_step]
-    if not ends:
+    refuse_gaps(walk.time_s, [touch.time_s for touch in touches], source)
+    touches, doubts = longest_walk(touches)
+    if len(touches) < 2:
         raise ConfigError(
             f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
-            f"{largest:.3g} rad.",
+            f"{float(np.abs(angle).max()):.3g} rad.",
             "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
-            "without outliers, and over at least one whole step.",
+            "and over at least one whole step.",
         )
-    refuse_duration((ends[-1].time_s - origin) / len(ends), source)
-    refuse_gaps(walk.time_s, [origin, *(touch.time_s for touch in ends)], source)
-    return divided(walk, angle, model, origin, ends, swapped=ends[0].leg == 1)
+    refuse_duration((touches[-1].time_s - touches[0].time_s) / (len(touches) - 1), source)
+    refuse_spread(walk, touches, source)
+    doubts += [*knee_doubts(walk, touches, model), *offset_doubts(walk.time_s, angle, touches, total, touch_sum_rad)]
+    steps = divided(walk, model, touches, tuple(doubts))
+    refuse_lengths(steps, source)
+    return steps
+
+
+def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
+    """Return the longest sequence of heel strikes of alternate legs, and a sentence about those left out."""
+    walks: list[list[Touch]] = [[]]
+    breaks = []
+    for touch in touches:
+        if walks[-1] and walks[-1][-1].leg == touch.leg:
+            breaks.append(f"leg {touch.leg + 1} at time {walks[-1][-1].time_s:.6g} and {touch.time_s:.6g} s")
+            walks.append([])
+        walks[-1].append(touch)
+    longest = max(walks, key=len)
+    if not breaks or len(longest) < 2:
+        return longest, []
+    kept = f"only the steps from time {longest[0].time_s:.6g} to {longest[-1].time_s:.6g} s are kept"
+    return longest, [f"The same leg strikes twice in a row ({', '.join(breaks[:NAMED])}), so that {kept}."]
+
+
+def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
+    """Yield a sentence for each leg of a kneed walker whose angle may not be its thigh's."""
+    for leg, name in enumerate(("angle 1", "angle 2") if model.kneed else ()):
+        farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
+        thigh = "of a kneed walker it must be the thigh's, from hip to knee"
+        if name in walk.lines:
+            yield f"{name.capitalize()} is that of the line {walk.sources[name]}; {thigh}."
+        elif farthest < SHANK * (min(float(touch.fit.angle[leg]) for touch in touches) + model.slope):
+            yield f"{name.capitalize()} swings far behind the leg, as a shank does; {thigh}."
+
+
+def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None:
+    """Raise ConfigError if the legs are too far apart at a heel strike and nothing states the unit of their angles."""
+    apart, time = max((abs(float(np.diff(touch.fit.angle)[0])), touch.time_s) for touch in touches)
+    if apart > WIDEST_RAD and not walk.unit_is_stated:
+        raise ConfigError(
+            f"{source}: the legs are {math.degrees(apart):.0f} degrees apart at time {time:.6g} s.",
+            "State the unit of angles: --units angle=deg, or --units angle=rad if they are that far apart.",
+        )
+
+
+def offset_doubts(
+    time: Array, angle: Array, touches: list[Touch], total: Callable[[Array], Array], touch_sum_rad: float
+) -> list[str]:
+    """Name the errors of both angles that explain why rates jump at other instants than the feet are level."""
+    jumps = angles_at_jumps(time, angle, touches)
+    if jumps is None:
+        return []
+    shift, at_jumps, leg = jumps
+    both = float(np.mean(total(at_jumps))) - touch_sum_rad
+    # An error of one angle makes the steps of one leg longer than those of the other, a tilt does not.
+    spread = at_jumps[:, 0] - at_jumps[:, 1]
+    apart = float(np.mean(spread[leg == 0]) + np.mean(spread[leg == 1])) / 2.0 if np.ptp(leg) else 0.0
+    errors = [math.degrees(0.5 * (both + apart)), math.degrees(0.5 * (both - apart))]
+    if abs(apart) > 0.5 * abs(both):
+        cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(errors, 1))
+    else:
+        cause = f"a tilt explains it, with both angles {math.degrees(0.5 * both):.2f} degrees too large"
+    moment = f"{1e3 * abs(shift):.0f} ms {'after' if shift > 0.0 else 'before'} the feet are level"
+    return [f"Heel strikes are uncertain: the rates of the legs jump {moment}; {cause}."]
 
 
 def is_plausible(size: float) -> bool:
@@ -110,6 +162,16 @@ def refuse_duration(step_s: float, source: str) -> None:
             f"{source}: steps of {step_s:.3g} s are implausible.",
             "State the unit of time, e.g. --units time=ms.",
         )
+
+
+def refuse_lengths(steps: RecordedSteps, source: str) -> None:
+    """Raise ConfigError for a step that does not go forwards."""
+    for number, (length, time) in enumerate(zip(steps.length_m.tolist(), steps.touch_time_s.tolist(), strict=True), 1):
+        if not is_plausible(length):
+            raise ConfigError(
+                f"{source}: step {number}, up to time {steps.origin_s + time:.6g} s, would be {length:.3g} m long.",
+                "Check the angles there: they must be from the vertical, positive with the foot ahead (--columns).",
+            )
 
 
 def refuse_gaps(time: Array, touches: list[float], source: str) -> None:
@@ -132,29 +194,35 @@ def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
     return float(instants[place]), float(instants[place + 1])
 
 
-def starts_on_two_feet(angle: Array, total: float) -> bool:
-    spread = np.abs(angle[:, 0] - angle[:, 1])
-    return bool(abs(total) < TWO_FEET_TOLERANCE and spread[0] > AHEAD * spread.max())
-
-
-def divided(
-    walk: RecordedWalk, angle: Array, model: RigidModel, origin: float, ends: list[Touch], swapped: bool
-) -> RecordedSteps:
-    times = np.array([touch.time_s for touch in ends]) - origin
+def divided(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts: tuple[str, ...]) -> RecordedSteps:
+    origin, swapped = touches[0].time_s, touches[1].leg == 1
+    times = np.array([touch.time_s for touch in touches[1:]]) - origin
     order = [1, 0] if swapped else [0, 1]
-    velocity = walk.both_legs("velocity")
+    angle, velocity = legs(walk), walk.both_legs("velocity")
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
     time, side = walk.time_s - origin, SIDE * float(times[-1])
-    last = float(time[-1])
-    spans = list(zip((0.0, *times), (*(times - side), last), strict=True))
+    spans = list(zip((0.0, *times), (*(times - side), float(time[-1])), strict=True))
     if not is_recorded_beyond(time, times):
         spans.pop()
     pieces = [samples_within(time, columns, *span) for span in spans]
+    for place, (_, angles, velocities) in enumerate(pieces):
+        for row, touch, rates in end_fits(touches, place):
+            angles[row] = touch.fit.angle[order]
+            if velocity is None and rates is not None:
+                velocities[row] = rates[order]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
-    times_s, angles, velocities = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    lengths = lengths_of(model, angles, step, len(times))
-    scatter = float(np.median([touch.scatter_rad for touch in ends]))
-    return RecordedSteps(times_s, step, angles, velocities, times, lengths, scatter, swapped, origin)
+    times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    lengths = lengths_of(model, angles_rad, step, len(times))
+    scatter = float(np.median([touch.fit.scatter for touch in touches[1:]]))
+    return RecordedSteps(times_s, step, angles_rad, velocities_rad_s, times, lengths, scatter, swapped, origin, doubts)
+
+
+def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
+    """Return for the ends of a step the row of its samples, the heel strike there, and the rates on the step's side."""
+    ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
+    if step + 1 < len(touches):
+        ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))
+    return ends
 
 
 def is_recorded_beyond(time: Array, touches: Array) -> bool:

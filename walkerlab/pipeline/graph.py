@@ -254,6 +254,7 @@ PIPELINE = Graph(
             Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV."),
             Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Columns of that file.", needs=("--with",)),
             Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", needs=("--with",)),
+            Option("--walks", "recording.walks", "left|right|away|towards", "Direction of markers.", needs=("--with",)),
         ),
     ),
     Stage(
@@ -330,6 +331,7 @@ PIPELINE = Graph(
             Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", bool),
             Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
             Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file lacks."),
+            Option("--walks", "identify.walks", "left|right|away|towards", "Direction of markers."),
             Option("--plan", "", "", "Without data: predict the errors of each way of measuring.", bool, runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),

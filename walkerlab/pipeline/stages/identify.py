@@ -22,7 +22,7 @@ from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
-from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, read_divisions, read_measured
+from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, doubts_about, read_divisions, read_measured
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, over_time
 from walkerlab.pipeline.store.columns import numbered, rows_group
@@ -51,6 +51,8 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     block = config.identify
     assert block is not None, "refuse rejects a config without the block"
     gait = inputs["fixedpoint"].summary
+    for doubt in doubts_about(block, config) if block.level == "angles" else ():
+        progress.note(doubt)
 
     def begin(label: str, rounds: int) -> Callable[[], None]:
         progress.start(label, rounds)

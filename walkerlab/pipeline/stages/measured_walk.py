@@ -13,6 +13,7 @@ import numpy as np
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk, as_walk, named_column, plain, refuse_gaps, refuse_units, unit_value
+from walkerlab.exchange.leg_angles import mend_angles
 from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
@@ -80,6 +81,15 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
         raise problem
 
 
+def doubts_about(block: Identify, config: RigidConfig) -> tuple[str, ...]:
+    """Return sentences about what is odd in the block's angles, and what was done about it."""
+    walk, _ = read_angles(block)
+    try:
+        return (*walk.doubts, *divide_into_steps(walk, rigid_walker(config), block.data).doubts)
+    except ConfigError:
+        return walk.doubts
+
+
 def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
     if measured.count > MOST_STEPS:
         raise ConfigError(
@@ -111,7 +121,7 @@ def read_angles(block: Identify) -> tuple[RecordedWalk, float]:
     That is 0 for angles that are computed from markers.
     """
     recording = read_recording(Path(block.data), DATA_KEY)
-    walk = as_walk(recording, block.columns, block.units)
+    walk = mend_angles(as_walk(recording, block.columns, block.units, block.walks or ""), block.data)
     source = walk.sources["angle 1"]
     written = recording.columns.get(source)
     if written is None:

@@ -12,6 +12,7 @@ import numpy as np
 from walkerlab.config.reads import RecordedWalkConfig
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import OF_LEG, OF_WALKER, RecordedWalk, as_walk
+from walkerlab.exchange.leg_angles import mend_angles
 from walkerlab.exchange.recording import NO_FILE, TIME, Recording, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps
 from walkerlab.outcome import Outcome
@@ -48,12 +49,15 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     for doubt in doubts:
         progress.note(doubt)
     steps = divide_into_steps(walk, rigid_walker(config), block.file)
+    for doubt in steps.doubts:
+        progress.note(doubt)
     progress.advance()
-    return content_of(block, config, walk, steps, doubts)
+    return content_of(block, config, walk, steps, [*doubts, *steps.doubts])
 
 
 def doubts_about(walk: RecordedWalk) -> Iterator[str]:
-    """Yield a sentence for each reason to doubt the steps: noise, and columns or samples that are not used."""
+    """Yield a sentence for each reason to doubt the steps: odd angles, noise, columns or samples that are not used."""
+    yield from walk.doubts
     angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
     # noise dominates the third differences of a smooth motion; their variance is 20 times its own
     noise = (
@@ -76,7 +80,7 @@ def read_walk(block: RecordedFile) -> RecordedWalk:
     path = Path(block.file)
     key = "recording", "file"
     recording = read_file(path, read_artifact, key) if path.suffix.lower() == ".h5" else read_recording(path, key)
-    return as_walk(recording, block.columns, block.units)
+    return mend_angles(as_walk(recording, block.columns, block.units, block.walks or ""), block.file)
 
 
 def read_artifact(path: Path) -> Recording:

@@ -1,0 +1,349 @@
+"""Heel strikes of recordings that are cut anywhere, noisy, swapped, turned or off."""
+
+import functools
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+import walkerlab
+from walkerlab.config.loader import load
+from walkerlab.config.reads import only
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.columns import SAMPLE, RecordedWalk
+from walkerlab.exchange.leg_angles import mend_angles
+from walkerlab.exchange.walk_in_steps import divide_into_steps
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import fixedpoint, simulate
+from walkerlab.scene.rigid import rigid_walker
+
+PERIOD_S, LENGTH_M = 0.7035968805, 0.3714302
+SLOPE = 0.0174
+LEGS = {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}
+
+
+@functools.cache
+def splines():
+    """The paper's walk: a spline through the leg angles of each step."""
+    trajectory = walkerlab.simulate(strides=4).content["trajectory"]
+    pieces = []
+    for step in range(8):
+        rows = trajectory["step"] == step
+        time = trajectory["time"][rows]
+        pieces.append((time, CubicHermiteSpline(time, trajectory["angle"][rows], trajectory["velocity"][rows])))
+    return pieces
+
+
+def angles_at(time):
+    """Leg angles (samples, 2) of the paper's walk, whose first heel strike is at time 0."""
+    angle = np.empty((time.size, 2))
+    for instants, spline in splines():
+        rows = (time >= instants[0]) & (time <= instants[-1])
+        angle[rows] = spline(time[rows])
+    return angle
+
+
+def sampled(begin=0.0, end=7.5 * PERIOD_S, fps=100.0, noise=0.0, seed=0):
+    time = np.arange(begin, end, 1.0 / fps)
+    return time, angles_at(time) + noise * np.random.default_rng(seed).standard_normal((time.size, 2))
+
+
+def read(folder, time, angle, header="time (s),angle 1 (rad),angle 2 (rad)", **options):
+    rows = "\n".join(f"{t:.9f},{a:.12g},{b:.12g}" for t, (a, b) in zip(time, angle, strict=True))
+    path = folder / "walk.csv"
+    path.write_text(f"{header}\n{rows}\n", encoding="utf-8")
+    return walkerlab.read_walk(path, slope_deg=math.degrees(SLOPE), **options).summary
+
+
+def all_steps_are_right(summary, period=1e-5, length=1e-5):
+    return summary["step_periods_s"] == pytest.approx([PERIOD_S] * summary["steps"], abs=period) and summary[
+        "step_lengths_m"
+    ] == pytest.approx([LENGTH_M] * summary["steps"], abs=length)
+
+
+@pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0, 1000.0])
+@pytest.mark.parametrize("cut_ms", [5, 10, 15, 20, 25])
+def test_a_recording_that_begins_shortly_after_a_heel_strike_begins_at_the_next(cut_ms, fps, tmp_path):
+    summary = read(tmp_path, *sampled(begin=1e-3 * cut_ms, fps=fps))
+    assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=2e-5)
+    assert all_steps_are_right(summary, period=3e-5, length=3e-5)
+
+
+@pytest.mark.parametrize("fps", [60.0, 100.0, 240.0])
+@pytest.mark.parametrize("cut_ms", [10, 15, 20, 25])
+def test_noise_does_not_make_the_first_sample_a_heel_strike(cut_ms, fps, tmp_path):
+    """A hundredth of the angles as noise locates a heel strike to about a millisecond."""
+    for seed in range(3):
+        summary = read(tmp_path, *sampled(begin=1e-3 * cut_ms, fps=fps, noise=1e-3, seed=seed))
+        assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=4e-3)
+        assert all_steps_are_right(summary, period=5e-3, length=6e-3)
+
+
+@pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0, 1000.0])
+@pytest.mark.parametrize("noise", [0.0, 2e-4])
+def test_a_recording_that_begins_on_a_heel_strike_keeps_its_first_step(noise, fps, tmp_path):
+    summary = read(tmp_path, *sampled(fps=fps, noise=noise, seed=1))
+    assert summary["first_heel_strike_s"] == 0.0
+    assert summary["steps"] == 7
+    assert all_steps_are_right(summary, period=3e-5 + 4.0 * noise, length=3e-5 + 4.0 * noise)
+
+
+@pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0])
+@pytest.mark.parametrize("after_ms", [-20, -10, -5, -2, 0, 2, 5, 10, 25])
+def test_a_heel_strike_near_the_end_is_right_or_left_out(after_ms, fps, tmp_path):
+    end = 4.0 * PERIOD_S + 1e-3 * after_ms
+    count = int((end - 0.3) * fps)
+    time = end - np.arange(count, -1, -1) / fps
+    summary = read(tmp_path, time, angles_at(time))
+    assert all_steps_are_right(summary, period=1e-4, length=1e-4)
+    assert summary["steps"] >= (3 if after_ms >= 0 else 2)
+
+
+def test_a_recording_that_begins_just_before_a_heel_strike_begins_on_it(tmp_path):
+    summary = read(tmp_path, *sampled(begin=PERIOD_S - 5e-3))
+    assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=1e-5)
+    assert all_steps_are_right(summary)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_standing_before_the_walk_is_no_step(noise, tmp_path):
+    time, angle = sampled(begin=0.0, noise=noise)
+    still = angle[0] + noise * np.random.default_rng(5).standard_normal((75, 2))
+    summary = read(tmp_path, np.append(np.arange(75) / 100.0, 0.75 + time), np.concatenate((still, angle)))
+    assert max(summary["step_periods_s"]) == pytest.approx(PERIOD_S, abs=1e-4 + 5.0 * noise)
+    assert summary["steps"] >= 6
+
+
+def test_an_outlier_far_from_a_heel_strike_changes_nothing_and_is_named(tmp_path):
+    time, angle = sampled()
+    angle[250, 1] = 0.0
+    summary = read(tmp_path, time, angle)
+    assert all_steps_are_right(summary)
+    assert summary["doubts"] == ["Angle 2 is off its course at sample 251 (time 2.5 s), which is left out."]
+
+
+def test_three_flipped_samples_are_named_and_left_out(tmp_path):
+    time, angle = sampled()
+    angle[290:293, 0] *= -1.0
+    summary = read(tmp_path, time, angle)
+    assert all_steps_are_right(summary)
+    assert summary["doubts"] == [
+        "Angle 1 is off its course at samples 291 to 293 (time 2.9 to 2.92 s), which is left out."
+    ]
+
+
+def test_swapped_legs_are_named_and_swapped_back(tmp_path):
+    time, angle = sampled()
+    angle[180:190] = angle[180:190, ::-1]
+    summary = read(tmp_path, time, angle)
+    assert all_steps_are_right(summary)
+    assert summary["doubts"] == [
+        "The legs are swapped at samples 181 to 190 (time 1.8 to 1.89 s), and are swapped back there."
+    ]
+
+
+def test_legs_that_are_swapped_as_they_pass_cut_the_walk(tmp_path):
+    """From then on the same leg seems to strike twice in a row."""
+    time, angle = sampled(fps=1000.0)
+    rows = time > 4.0 * PERIOD_S
+    first = np.flatnonzero(rows & (angle[:, 0] - angle[:, 1] > 0.0))[0]
+    angle[first:] = angle[first:, ::-1]
+    summary = read(tmp_path, time, angle)
+    assert summary["steps"] == 4
+    assert all_steps_are_right(summary)
+    assert "The same leg strikes twice in a row (leg 2 at time 2.81439 and 3.51798 s)" in summary["doubts"][0]
+
+
+def test_angles_from_the_upward_vertical_are_unwrapped_and_named(tmp_path):
+    time, angle = sampled()
+    wrapped = np.degrees((angle + 2.0 * math.pi) % (2.0 * math.pi) - math.pi)
+    summary = read(tmp_path, time, wrapped, "time (s),angle 1 (deg),angle 2 (deg)")
+    assert all_steps_are_right(summary)
+    assert summary["steps"] == 7
+    assert [doubt.partition(" is measured from the upward vertical")[0] for doubt in summary["doubts"]] == [
+        "Angle 1", "Angle 2",
+    ]  # fmt: skip
+
+
+def test_angles_from_zero_to_a_full_turn_are_unwrapped(tmp_path):
+    time, angle = sampled()
+    summary = read(tmp_path, time, angle % (2.0 * math.pi))
+    assert all_steps_are_right(summary)
+    assert summary["doubts"] == []
+
+
+def test_a_leg_that_lies_level_is_refused(tmp_path):
+    time, angle = sampled()
+    with pytest.raises(ConfigError, match=r"angle 2 lies around -9\d degrees from the vertical"):
+        read(tmp_path, time, angle - [0.0, 0.5 * math.pi])
+
+
+@pytest.mark.parametrize(
+    ("signs", "words"), [([1, -1], "angle 2"), ([-1, 1], "angle 1"), ([-1, -1], "angle 1 and angle 2")]
+)
+def test_reversed_signs_are_named(signs, words, tmp_path):
+    time, angle = sampled()
+    summary = read(tmp_path, time, angle * signs)
+    assert all_steps_are_right(summary)
+    assert summary["steps"] == 7
+    assert summary["doubts"] == [f"Heel strikes are found with the sign of {words} reversed."]
+
+
+def test_the_way_back_is_named_and_left_out(tmp_path):
+    both = np.concatenate((sampled(end=7.2 * PERIOD_S)[1], -sampled(end=5.0 * PERIOD_S)[1]))
+    summary = read(tmp_path, np.arange(len(both)) / 100.0, both)
+    assert summary["steps"] == 7
+    assert all_steps_are_right(summary)
+    assert any("The walk turns round at time" in doubt for doubt in summary["doubts"])
+
+
+def test_an_offset_of_one_sensor_is_named(tmp_path):
+    summary = read(tmp_path, *(sampled()[0], sampled()[1] + [0.02, 0.0]))
+    offset = re.search(r"before the feet are level; angle 1 is (\S+) degrees too large", summary["doubts"][0])
+    assert float(offset[1]) == pytest.approx(math.degrees(0.02), abs=0.1)
+
+
+def test_angles_from_the_floor_are_named_as_a_tilt(tmp_path):
+    time, angle = sampled(fps=60.0, noise=2e-4)
+    summary = read(tmp_path, time, angle + SLOPE)
+    tilt = re.search(r"a tilt explains it, with both angles (\S+) degrees too large", summary["doubts"][0])
+    assert float(tilt[1]) == pytest.approx(math.degrees(SLOPE), abs=0.05)
+
+
+@pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0])
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_angles_without_offset_raise_no_doubts(noise, fps, tmp_path):
+    assert read(tmp_path, *sampled(begin=0.3, fps=fps, noise=noise))["doubts"] == []
+
+
+def test_legs_too_far_apart_are_refused_until_the_unit_is_stated(tmp_path):
+    time, angle = sampled()
+    wide = 5.0 * (angle + SLOPE)
+    rows = "\n".join(f"{t:.9f}\t{a:.12g}\t{b:.12g}" for t, (a, b) in zip(time, wide, strict=True))
+    path = tmp_path / "walk.sto"
+    path.write_text(f"walk\nversion=1\ninDegrees=no\nendheader\ntime\tangle_1\tangle_2\n{rows}\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="the legs are 107 degrees apart at time"):
+        walkerlab.read_walk(path, slope_deg=0.0)
+    assert walkerlab.read_walk(path, units={"angle": "rad"}, slope_deg=0.0).summary["steps"] == 7
+
+
+def places_of(angle, belt_m_s=0.0, fps=100.0):
+    """Places (samples, marker, axis) of hip and feet in m, x along the slope, y up, z sideways; the hip sways."""
+    time = np.arange(len(angle)) / fps
+    stride = np.arange(len(angle)) / fps / PERIOD_S
+    from_hip = np.stack([np.sin(angle), -np.cos(angle), np.broadcast_to([0.1, -0.1], angle.shape)], axis=2)
+    stance = np.where(np.floor(stride) % 2 == 0, 1, 0)
+    foothold = np.floor(stride) * LENGTH_M * np.cos(SLOPE), -np.floor(stride) * LENGTH_M * np.sin(SLOPE)
+    rows = np.arange(len(angle))
+    hip = np.zeros((len(angle), 3))
+    hip[:, 0] = foothold[0] - from_hip[rows, stance, 0] - belt_m_s * time
+    hip[:, 1] = foothold[1] - from_hip[rows, stance, 1]
+    feet = hip[:, None] + from_hip
+    sway = 0.03 * np.sin(math.pi * stride)
+    return np.concatenate((hip[:, None] + sway[:, None, None] * [0.0, 0.0, 1.0], feet), axis=1)
+
+
+def read_places(folder, places, fps=100.0, **options):
+    """Read a .trc file of the markers HIP, FOOT1 and FOOT2 (mm)."""
+    names = ("HIP", "FOOT1", "FOOT2")
+    rows = [
+        "\t".join([str(n + 1), f"{n / fps:.6f}", *(f"{value:.6f}" for value in 1e3 * row.ravel())])
+        for n, row in enumerate(places)
+    ]
+    head = [
+        "PathFileType\t4\t(X/Y/Z)\twalk.trc",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{fps}\t{fps}\t{len(rows)}\t3\tmm\t{fps}\t1\t{len(rows)}",
+        "Frame#\tTime\t" + "\t\t\t".join(names),
+        "\t\t" + "\t".join(f"{axis}{n}" for n in (1, 2, 3) for axis in "XYZ"),
+        "",
+    ]
+    path = folder / "walk.trc"
+    path.write_text("\n".join([*head, *rows]), encoding="utf-8")
+    return walkerlab.read_walk(path, LEGS, slope_deg=math.degrees(SLOPE), **options).summary
+
+
+@pytest.mark.parametrize("belt_m_s", [0.0, 0.5279, 0.53, 0.56])
+def test_markers_on_floor_and_treadmill_walk_where_the_feet_go(belt_m_s, tmp_path):
+    """On a treadmill the hip drifts forwards, backwards or only sideways."""
+    summary = read_places(tmp_path, places_of(sampled()[1], belt_m_s))
+    assert summary["steps"] == 7
+    assert all_steps_are_right(summary)
+    assert summary["doubts"] == []
+
+
+@pytest.mark.parametrize("degrees", [30.0, 90.0, 200.0])
+def test_a_walk_may_cross_the_floor_in_any_direction(degrees, tmp_path):
+    turn = math.radians(degrees)
+    around = np.array([[math.cos(turn), 0.0, math.sin(turn)], [0.0, 1.0, 0.0], [-math.sin(turn), 0.0, math.cos(turn)]])
+    summary = read_places(tmp_path, places_of(sampled()[1], 0.53) @ around)
+    assert summary["steps"] == 7
+    assert all_steps_are_right(summary)
+
+
+def test_a_stated_direction_is_taken(tmp_path):
+    places = places_of(sampled()[1], 0.53)
+    assert all_steps_are_right(read_places(tmp_path, places, walks="right"))
+    for direction in ("left", "away"):
+        with pytest.raises(ConfigError, match="holds no complete step"):
+            read_places(tmp_path, places, walks=direction)
+    assert all_steps_are_right(read_places(tmp_path, places[:, :, [2, 1, 0]] * [1.0, 1.0, -1.0], walks="away"))
+
+
+def test_a_walk_there_and_back_is_cut_where_the_hip_turns(tmp_path):
+    there = places_of(sampled(end=7.2 * PERIOD_S)[1])
+    back = there * [-1.0, 1.0, 1.0] + (there[-1, 0] + there[0, 0]) * [1.0, 0.0, 0.0]
+    summary = read_places(tmp_path, np.concatenate((there, back[:400])))
+    assert summary["steps"] == 7
+    assert all_steps_are_right(summary)
+    assert "The walk turns round at time 5.06 s" in summary["doubts"][0]
+
+
+def test_a_marker_that_was_not_seen_is_a_gap_and_a_foot_at_the_origin_is_not(tmp_path):
+    places = places_of(sampled()[1])
+    places -= places[20, 2]
+    assert np.abs(places[:70, 2]).max() < 1e-9
+    assert all_steps_are_right(read_places(tmp_path, places))
+    places[100:112, 1] = 0.0
+    with pytest.raises(ConfigError, match=r"FOOT1\.x. lacks 12 of \d+ values, the first at sample 101"):
+        read_places(tmp_path, places)
+
+
+def test_a_jump_of_a_legs_length_is_named(tmp_path):
+    places = places_of(sampled()[1])
+    places[250, 1, 1] += 0.1
+    summary = read_places(tmp_path, places)
+    assert summary["doubts"] == ["The length of HIP>FOOT1 jumps at samples 251 to 252 (time 2.5 to 2.51 s)."]
+    assert all_steps_are_right(summary)
+
+
+def test_running_is_named(tmp_path):
+    """A runner's hip is lowest as the legs pass each other."""
+    places = places_of(sampled()[1])
+    spread = np.abs(places[:, 1, 0] - places[:, 2, 0])
+    places[:, :, 1] += (0.4 * spread)[:, None]
+    with pytest.raises(ConfigError, match="this is running, not walking"):
+        read_places(tmp_path, places)
+
+
+@functools.cache
+def kneed_walk():
+    config = load(Path("kneed"), ("strides=3",)).config
+    gait = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    return simulate.run(only(config, PIPELINE["simulate"].takes), gait, Silent()).groups["trajectory"], config
+
+
+@pytest.mark.parametrize(("name", "count"), [("angle", 0), ("shank_angle", 2)])
+def test_shank_angles_of_a_kneed_walker_are_named(name, count):
+    trajectory, config = kneed_walk()
+    rising = np.append(True, np.diff(trajectory["time"]) > 1e-9)
+    angle = {f"angle {leg}": trajectory[name][rising, leg - 1] for leg in (1, 2)}
+    quantities = {**angle, SAMPLE: 1.0 + np.arange(rising.sum())}
+    walk = mend_angles(RecordedWalk(trajectory["time"][rising], quantities), "kneed.csv")
+    steps = divide_into_steps(walk, rigid_walker(config), "kneed.csv")
+    assert sum("as a shank does" in doubt for doubt in steps.doubts) == count
+    assert np.diff(steps.touch_time_s) == pytest.approx(np.full(5, steps.touch_time_s[0]), abs=2e-4)
