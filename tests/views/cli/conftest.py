@@ -59,6 +59,17 @@ def walker(tmp_path):
 
 
 @pytest.fixture(scope="module")
+def edited(tmp_path_factory):
+    """The real command line in a folder with a run whose config file was edited afterwards."""
+    walker = Program("walkerlab", tmp_path_factory.mktemp("edited"))
+    file = walker.folder / "light.yaml"
+    file.write_text("extends: paper\nstrides: 1\n")
+    walker("compare", "-c", "light.yaml")
+    file.write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\n")
+    return walker
+
+
+@pytest.fixture(scope="module")
 def swept(tmp_path_factory):
     """The toy pipeline's command line in a folder with one sweep, and what that printed."""
     folder = tmp_path_factory.mktemp("sweep")

@@ -1,7 +1,6 @@
 """`walkerlab export RUN model` in a process of its own."""
 
 import pytest
-from conftest import Program
 
 from walkerlab.errors import NoAnswer
 from walkerlab.exchange.export import ENDINGS
@@ -79,23 +78,9 @@ EXPORTS = {
 }
 
 
-@pytest.fixture(scope="module")
-def edited(tmp_path_factory):
-    """A folder with a run whose config file was edited afterwards."""
-    folder = tmp_path_factory.mktemp("edited")
-    (folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
-    execute_in(folder, "compare", "-c", "light.yaml")
-    (folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\n")
-    return folder
-
-
-def execute_in(folder, *arguments):
-    return Program("walkerlab", folder)(*arguments)
-
-
 @pytest.mark.parametrize("what", EXPORTS)
 def test_an_export_of_a_run_says_that_its_config_was_edited_since(edited, what):
-    done = execute_in(edited, *EXPORTS[what])
+    done = edited(*EXPORTS[what])
     assert done.returncode == 0, done.stderr
     assert "light.yaml was edited (walker.hip_mass_kg 10.0 -> 15.0)" in done.stderr
 

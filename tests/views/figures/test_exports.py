@@ -143,6 +143,7 @@ def test_a_trajectory_as_netcdf_opens_without_a_group(run):
     with xarray.open_dataset(path, engine="h5netcdf") as dataset:
         assert dataset["angle"].dims == ("time", "leg")
         assert dataset["time"].attrs["units"] == "s"
+        assert dataset.attrs["title"] == "walkerlab contact-sim"
 
 
 def test_a_table_for_latex_guards_its_letters(run):

@@ -260,7 +260,7 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
             "Conventions": hdf5.CONVENTIONS,
             "content_digest": stored.digest(),
         }
-        return hdf5.image({"/": replace(group, attrs={**group.attrs, **about})}, {})
+        return hdf5.image({"": group}, {**group.attrs, **about})
     columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
         if variable.dims == ("time",):
