@@ -159,8 +159,8 @@ def refuse_gaps(recording: Recording, source: str, part: slice) -> None:
             raise ConfigError(
                 f"{recording.path}: {column!r} lacks {gaps.size} of {values.size} values, the first at sample "
                 f"{gaps[0] + 1}.",
-                "Fill the gaps, or cut the recording to a part without them. A marker at (0, 0, 0) counts as a gap if its "
-                "leg would have another length.",
+                "Fill the gaps, or cut the recording to a part without them. A marker at (0, 0, 0) counts as a gap if "
+                "its leg would have another length.",
             )
 
 
