@@ -16,12 +16,13 @@ class Robustness(Block):
     model: Literal["rigid", "contact", "both"] | None = key(
         None, "", "which model walks", default_in_words="both, rigid where there is no contact block"
     )
-    to: tuple[str, ...] = key(
-        (),
+    to: tuple[str, ...] | None = key(
+        None,
         "",
-        "parameters with respect to which the gait is differentiated",
+        "parameters with respect to which the gait is differentiated; an empty list leaves the derivatives out",
         bounds="a list of dotted paths of config keys",
         default_in_words="every parameter that the model reads",
+        sequence=True,
     )
     steps: int = key(50, "1", "steps that a walk must take after a single disturbance", ge=1, le=10_000)
     roughness_m: tuple[Roughness, ...] = key(

@@ -239,3 +239,11 @@ def test_the_terminal_shows_two_tables_and_the_rest_on_request(both):
     assert others
     assert not {*heads} & {*others}
     assert shown[-1].startswith(f"The option -v shows {len(others)} more table")
+
+
+def test_an_empty_list_of_parameters_leaves_the_derivatives_out():
+    asked = ("robustness.model=rigid", "robustness.to=[]", "robustness.roughness_m=[]", "robustness.steps=3")
+    summary = run("slope-3deg", *asked).summary
+    assert summary["sensitivity"] == []
+    assert summary["gait_sensitivity_norm"]
+    assert "Most effective change" not in " ".join(answer("robustness", summary))

@@ -156,7 +156,7 @@ def refuse(config: RobustnessConfig) -> None:
     block = config.robustness
     if block.model in (CONTACT, "both") and config.contact is None:
         raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or choose rigid.")
-    for place, key in enumerate(block.to):
+    for place, key in enumerate(block.to or ()):
         parameter_of(key, config, ("robustness", "to", place))
         refuse_unread("robustness.to", key, config, models_of(config))
     half = 0.5 * config.walker.leg_length_m
@@ -271,7 +271,11 @@ def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
 
 
 def sensitivities(
-    subject: ModelUnderTest, requested: tuple[str, ...], numbers: Mapping[str, float], progress: Progress, jobs: int
+    subject: ModelUnderTest,
+    requested: tuple[str, ...] | None,
+    numbers: Mapping[str, float],
+    progress: Progress,
+    jobs: int,
 ) -> Rows:
     """Return rows of derivatives in order of decreasing relative effect; parameters of value 0 come last."""
     keys = numbers_read(subject, requested)
@@ -300,8 +304,7 @@ def gradients_of(subject: ModelUnderTest, key: str) -> dict[str, Gradient]:
     return subject.gradients(parameter_of(key, subject.config), names)
 
 
-def numbers_read(subject: ModelUnderTest, requested: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the dotted keys of the parameters that the model reads, either the requested ones or all."""
-    return tuple(
-        key for key in requested or parameter_keys(subject.config) if model_reads(subject.model, subject.config, key)
-    )
+def numbers_read(subject: ModelUnderTest, requested: tuple[str, ...] | None = None) -> tuple[str, ...]:
+    """Return the dotted keys of the parameters that the model reads, either the requested ones or, for None, all."""
+    selection = parameter_keys(subject.config) if requested is None else requested
+    return tuple(key for key in selection if model_reads(subject.model, subject.config, key))
