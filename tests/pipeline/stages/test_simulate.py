@@ -291,6 +291,12 @@ def test_a_walk_that_settles_on_a_gait_of_two_steps_says_that_it_alternates():
     )
 
 
+def test_a_walk_that_has_just_settled_shows_the_steps_between_which_it_alternates():
+    # the second walk, at tighter tolerances, still leaves the gait
+    summary = run(slope_rad=math.radians(4.7), strides=60, outputs=[]).summary
+    assert "between steps of 0.787082 and 0.715713 s" in " ".join(answer("simulate", summary))
+
+
 def test_a_walk_on_a_stable_gait_leaves_none_and_repeats_every_step(paper):
     assert (paper.summary["repeats_after"], paper.summary["leaves_gait_at"]) == (1, None)
     assert "In the end" not in " ".join(answer("simulate", paper.summary))

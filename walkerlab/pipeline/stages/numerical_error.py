@@ -81,21 +81,23 @@ def steps_later(first: Summary, again: Summary) -> int | None:
 def step_changes(first: Values, again: Values, period: int, later: int | None) -> Floats:
     """Return the largest change of the values (steps,) up to each step; NaN where a walk has no value.
 
-    period, later  steps after which both walks repeat, and how many steps later the second one takes the same steps
+    period  steps after which the first walk repeats in the end, or 0
+    later   how many steps later the second walk takes the same steps, or None if it does not repeat
 
     Rounding decides with which step a walk begins to repeat itself, so a walk that has settled is compared with the
-    same step of the cycle, however many steps later it comes.
+    same step of the cycle, however many steps later it comes. If the second walk has not settled yet, the error of one
+    step stands in for the error of the cycle.
     """
     count = min(len(first), len(again))
     values, others = (np.array(each[:count], float) for each in (first, again))
     apart = np.abs(values - others)
     largest = np.where(np.isnan(apart), np.nan, np.fmax.accumulate(apart))
-    if later is None or count < 2 * period:
+    if not period or count < 2 * period:
         return largest
-    end, steps = count - 1 - later, np.arange(count)
+    end, steps = count - 1 - (later or 0), np.arange(count)
     last = end - (end - steps) % period  # the last such step with a partner
-    of_cycle = np.abs(values - values[last]) + np.abs(values[last] - others[last + later])
-    return np.asarray(np.fmin(largest, of_cycle))
+    between = apart[0] if later is None else np.abs(values[last] - others[last + later])
+    return np.asarray(np.fmin(largest, np.abs(values - values[last]) + between))
 
 
 def evenly_spread(count: int, wanted: int) -> list[int]:

@@ -35,6 +35,8 @@ MAX_BETWEEN = 50_000
 """Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
 MIN_REPEATED, MAX_REPEATED = 4, 32
 """Numbers of steps at the end of a walk that may repeat: minimum, and maximum unless a quarter of the walk is more."""
+FEWEST_SETTLED = 8
+"""Fewest last steps in which a walk that has just settled may repeat."""
 REPEATED, SETTLED = 1e-5, 1e-2
 """Largest difference between steps that repeat, relative to the first step, and relative to the spread of the steps."""
 ON_GAIT, OFF_GAIT = 1e-6, 1e-2
@@ -235,9 +237,17 @@ def settling(walk: WalkRecord) -> dict[str, int | None]:
     left = np.flatnonzero(off > OFF_GAIT)
     on_gait = off[1] < ON_GAIT
     return {
-        "repeats_after": steps_to_repeat(steps[-max(MAX_REPEATED, walk.steps // 4) :]),
+        "repeats_after": steps_to_repeat_last(steps),
         "leaves_gait_at": int(left[0]) + 1 if on_gait and left.size else None,
     }
+
+
+def steps_to_repeat_last(steps: Floats) -> int:
+    """Return the number of steps after which the last steps (steps, n) repeat, in the longest end that does; or 0."""
+    longest = max(MAX_REPEATED, len(steps) // 4)
+    ends = (longest >> halvings for halvings in range(longest.bit_length()))
+    periods = (steps_to_repeat(steps[-end:]) for end in ends if end >= FEWEST_SETTLED)
+    return next((period for period in periods if period), 0)
 
 
 def steps_to_repeat(steps: Floats) -> int:

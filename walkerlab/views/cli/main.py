@@ -58,7 +58,7 @@ GROUPS = {
         "compare", "diff", "recorded-walk", "identify", "plan", "tune", "engines", "accuracy", "stability",
         "stability-maps", "known-problems",
     ),
-    "Keep house": ("status", "show", "schema", "rerun", "clean"),
+    "Keep house": ("status", "show", "schema", "rerun", "compile", "clean"),
 }  # fmt: skip
 """Commands by purpose, in the order of the help; a command that is in no group is listed with the last one."""
 
