@@ -122,8 +122,11 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     spread, begin = angle[:, 0] - angle[:, 1], float(time[0])
     if abs(spread[0]) <= AHEAD * np.abs(spread).max():
         return None
-    t, y = samples_near(time, angle, begin, period)
-    fit = fit_of_degree(t, y, 0.0, best_degree(t, y, 0.0))
+    rows = time - begin <= WIDEST * period
+    t, y = time[rows] - begin, angle[rows]
+    degree = best_degree(t, y, 0.0)
+    # The best degree balances bias and scatter. One degree more keeps the bias within the standard error.
+    fit = fit_of_degree(t, y, 0.0, degree + 1) or fit_of_degree(t, y, 0.0, degree)
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
     return touch if touch and touch.error_s < PRECISE_S and off <= ERRORS * touch.error_s else None
