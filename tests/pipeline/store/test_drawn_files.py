@@ -55,3 +55,13 @@ def test_clean_does_not_follow_a_list_out_of_the_run_folder(folder, identity, or
     forged["file"][0] = "../precious"
     artifact.write(folder.artifact("plot"), Content({index.GROUP: forged}), identity, origin)
     assert files_of(folder, ["plot"]) == [folder.figures / "figure-02.svg", folder.artifact("plot")]
+
+
+def test_leftovers_are_sought_only_in_the_folders_of_a_run(tmp_path):
+    strange = tmp_path / "photos" / ".notes.12345678.tmp"
+    strange.parent.mkdir()
+    strange.touch()
+    unfinished = tmp_path / "figures" / ".figure-02.svg.12345678.tmp"
+    unfinished.parent.mkdir()
+    unfinished.touch()
+    assert files_of(RunFolder.at(tmp_path), ()) == [unfinished]

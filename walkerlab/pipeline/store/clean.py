@@ -12,6 +12,7 @@ from walkerlab.pipeline.store.runfolder import LOCK, RECORD, WORKER, RunFolder
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
 """Patterns of the files that drawing stages write, needed if their index is lost."""
 CHUNKS, FIGURES = "sweep-chunks", "figures"
+UNFINISHED = (TEMPORARY, f"{FIGURES}/{TEMPORARY}", f"{CHUNKS}/{TEMPORARY}")
 SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
 STATE_FILES = (RECORD, LOCK, WORKER)
 STATE_ENDINGS = (".h5", ".parts")
@@ -20,7 +21,7 @@ COMPARED = ("figures/diff-*.svg", "figures/diff-*.png")
 
 def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
     """Return the existing files of a run: results of these stages, drawings, sweeps and leftovers of killed writers."""
-    files = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, f"**/{TEMPORARY}") for path in folder.path.glob(pattern)}
+    files = {path for pattern in (*DRAWN, *SWEPT, *COMPARED, *UNFINISHED) for path in folder.path.glob(pattern)}
     inside = folder.path.resolve()
     for stage in stages:
         files |= {folder.artifact(stage), folder.checkpoint(stage)}
