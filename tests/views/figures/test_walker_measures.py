@@ -45,8 +45,8 @@ def test_pictures_of_the_docs_are_current(pictures):
 
 
 def test_every_picture_stands_in_the_docs(pictures):
-    page = SCRIPT["PAGE"].read_text(encoding="utf-8")
-    assert [name for name in pictures if f"images/{name}" not in page] == []
+    pages = "".join(page.read_text(encoding="utf-8") for page in SCRIPT["PAGE"].parent.glob("*.md"))
+    assert [name for name in pictures if f"images/{name}" not in pages] == []
 
 
 def test_every_length_of_the_walker_is_named_with_its_value():
