@@ -1,13 +1,17 @@
 """What engines are told of a walker, and how a walk is judged from outside: no engine is needed for this."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from engine_scenes import compass, kneed
 
+from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.benchmarks.engines.experiments import simulate
 from walkerlab.evidence.benchmarks.engines.follow import RuleFollower, crossing
 from walkerlab.evidence.benchmarks.engines.runs import pinned_model
+from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
 from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.friction import friction_coefficient
@@ -16,6 +20,8 @@ from walkerlab.physics.ground.walker import BENT, LOCKED
 from walkerlab.physics.hybrid.contact_result import walk_contact
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.solvers.registry import Tolerances
+from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.results import MemoryResults
 
 
 @pytest.fixture(params=[(), ("contact.terrain=after-mid-swing",)], ids=["pads", "after-mid-swing"])
@@ -58,7 +64,9 @@ def test_locked_thigh_and_shank_are_one_body_and_the_released_ones_two():
 
 
 def test_feet_ahead_of_the_shanks_are_ahead_in_an_engine_too():
-    scene = kneed("walker.foot_centre_ahead_m=0.03", "walker.foot_radius_m=0.2")
+    config = load(Path("kneed"), ["walker.foot_centre_ahead_m=0.03", "walker.foot_radius_m=0.2"]).config
+    gait = answer_in_memory(config, "fixedpoint", MemoryResults()).summary
+    scene = supported_scene(config, gait["step_length_m"], tuple(gait["state"]))
     bent, straight = (scene.model.balls[foot] for foot in (0, 1))
     # of the swing leg in its shank's frame, of the stance leg, which is one link, in its thigh's
     assert bent.centre_m == pytest.approx((0.03, 0.2 - 0.5))
