@@ -71,7 +71,8 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     if walks:
         return WalkPlane(up, stated_direction(walks, up))
     against = [bottom - top for top, bottom in legs]
-    motion = against[0] - (against[1] if len(legs) > 1 else 0.0)
+    two = len(legs) > 1 and not np.array_equal(against[0], against[1], equal_nan=True)  # one leg may stand for both
+    motion = against[0] - (against[1] if two else 0.0)
     motion = (motion - np.mean(motion, axis=0)) * ~vertical
     ahead = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0][:, 0]
     drift = float((legs[0][0][-1] - legs[0][0][0]) @ ahead)
