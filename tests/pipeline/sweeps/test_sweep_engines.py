@@ -276,6 +276,16 @@ def test_a_slurm_job_that_ends_without_a_result_is_noticed_without_accounting(an
     SlurmQueue("60").wait(SimpleNamespace(job_id="42", paths=paths))
 
 
+def test_a_slurm_job_that_the_last_list_is_too_old_for_is_not_gone(tmp_path, monkeypatch):
+    program = tmp_path / "squeue"
+    program.write_text("#!/bin/sh\necho 41 RUNNING\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    queue = SlurmQueue("60")
+    assert queue.state("42", time.monotonic() - 1.0) == "gone"
+    assert queue.state("42", time.monotonic()) == "UNKNOWN"
+
+
 @pytest.mark.filterwarnings("ignore")  # of the library's own
 def test_processes_of_other_engines_import_nothing_from_the_current_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

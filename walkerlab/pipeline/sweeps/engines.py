@@ -203,9 +203,9 @@ class SlurmQueue:
 
     def wait(self, job: Any) -> None:
         """Wait until a job has stored its result; raises JobEndedError if it ended without one."""
-        seen_alive = time.monotonic()
+        submitted = seen_alive = time.monotonic()
         while not job.paths.result_pickle.exists():
-            state = self.state(job.job_id)
+            state = self.state(job.job_id, submitted)
             if state in ENDED_STATES:
                 if time.monotonic() - seen_alive > RESULT_S:
                     raise JobEndedError(self.describe(job, state))
@@ -213,8 +213,12 @@ class SlurmQueue:
                 seen_alive = time.monotonic()
             time.sleep(1.0)
 
-    def state(self, job_id: str) -> str:
-        """Return a job's state; GONE if the queue no longer lists it, SILENT if Slurm has not answered for long."""
+    def state(self, job_id: str, submitted: float) -> str:
+        """Return the state of a job that was submitted at a time of the monotonic clock.
+
+        GONE if the queue no longer lists the job, SILENT if Slurm has not answered for long, UNKNOWN before the first
+        list that may hold it.
+        """
         with self._lock:
             now = time.monotonic()
             if now - self._listed_at >= LISTING_S:
@@ -225,7 +229,7 @@ class SlurmQueue:
                 if done.returncode == 0:
                     self._answered_at = now
                     self._states = dict(line.split()[:2] for line in done.stdout.splitlines())
-            if self._answered_at == self._listed_at:
+            if self._answered_at == self._listed_at and self._listed_at > submitted:
                 return self._states.get(job_id, GONE)
             return SILENT if now - self._answered_at > SILENCE_S else "UNKNOWN"
 
