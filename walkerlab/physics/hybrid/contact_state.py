@@ -32,13 +32,12 @@ from walkerlab.physics.hybrid.contact_events import (
     VERTICAL_VELOCITY,
     JudgedGround,
 )
+from walkerlab.physics.hybrid.endings import ON_GROUND, STRAIGHT_KNEE
 from walkerlab.physics.kernels import by_reference, kernel_part
 from walkerlab.physics.solvers.system import State
 
 # release of the trailing knee: not due, due when the leading foot stops sinking in, due when the push-off ends
 NOT_DUE, AT_COMPRESSION, AT_PULSE_END = range(3)
-STRAIGHT_KNEE = 1e-9  # rad or rad/s, largest difference between thigh and shank of a straight leg
-ON_GROUND = 1e-9  # largest difference between the feet's heights in leg lengths with both on the ground
 START_ROUNDING = 1e-14  # relative rounding error of a start's coordinates and velocities
 
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.outcome import Outcome
+from walkerlab.physics.hybrid.endings import ON_GROUND, STRAIGHT_KNEE
 from walkerlab.physics.hybrid.rigid_record import Observer, RigidTally, new_observer, observe_start
 from walkerlab.physics.hybrid.rigid_walk import (
     EVENTS,
     LONGEST_SWING,
     SHORTEST_LANDING,
-    STRAIGHT_KNEE,
     hip_above_fall,
     knee_angle,
     new_heel_strikes,
@@ -43,7 +43,6 @@ from walkerlab.physics.solvers.system import State
 STEPS_AT_ONCE = 64
 BUDGET_OF_A_STEP = 50_000  # evaluations of the right-hand side; the tightest tolerance needs about 700
 MAX_FRICTION = 1.0  # friction coefficient, about as for rubber on dry concrete
-ON_GROUND = 1e-9  # height in leg lengths up to which the swing foot starts on the ground
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 

@@ -55,7 +55,6 @@ SHORTEST_LANDING = 0.25  # fraction of the gait's step length; on uneven ground 
 # fraction of a swing's first solver step at which the search for a knee strike starts; before 1e-9, rounding makes a
 # straight knee at rest cross zero
 SEARCH_START = 1e-6
-STRAIGHT_KNEE = 1e-9  # rad or rad/s, largest difference between thigh and shank of a straight leg
 # event functions, rows of the finder
 HEEL_STRIKE, HIP_FALL, AHEAD, KNEE = range(4)
 LEG_RATE = 4  # row of the legs' relative angular velocity, not an event
@@ -145,7 +144,7 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
     fall, knee_strike = first_crossing(finder, HIP_FALL, FALLING, 0.0, False), NO_CROSSING
     if is_bent(system):
-        straight = at_start and abs(finder.values[KNEE, 0]) < STRAIGHT_KNEE
+        straight = at_start and abs(finder.values[KNEE, 0]) < endings.STRAIGHT_KNEE
         knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if straight else 0.0, straight)
     return strike, fall, knee_strike
 
