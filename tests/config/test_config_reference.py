@@ -1,13 +1,17 @@
 """The reference lists every key there is, with what a reader needs to set it."""
 
 import json
+import re
 import runpy
 from pathlib import Path
+
+import pytest
 
 from walkerlab.config.drives import Hip
 from walkerlab.config.fields import leaves, leaves_of_other_kinds
 from walkerlab.config.reference import as_json_schema, keys, select_keys
 from walkerlab.config.schema import METHODS, Config
+from walkerlab.errors import ConfigError
 
 
 def test_every_key_is_in_the_reference_and_so_are_the_two_of_files() -> None:
@@ -24,6 +28,16 @@ def test_a_key_that_every_type_of_walker_has_is_listed_once() -> None:
         "walker(straight-legs).foot_centre_ahead_m", "walker(kneed).foot_centre_ahead_m",
     ]  # fmt: skip
     assert [row.key for row in select_keys("walker(kneed).hip.torque_N_m")] == ["walker(kneed).hip.torque_N_m"]
+
+
+def test_keys_that_hold_the_word_are_suggested() -> None:
+    with pytest.raises(ConfigError) as error:
+        select_keys("mass")
+    suggested = re.findall(r"walker[.a-z_]+mass_kg", error.value.message)
+    assert len(suggested) > 2
+    assert {"walker.hip_mass_kg", "walker.leg_mass_kg"} <= set(suggested)
+    for key in suggested:
+        assert select_keys(key)
 
 
 def test_each_row_has_type_bounds_default_meaning_and_source() -> None:

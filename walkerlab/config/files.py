@@ -164,6 +164,7 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
     if file.text is not None:
         return file.text
     kind = "file" if purpose else "config"
+    advice = KEYS_ARE_LISTED if purpose else "`walkerlab init` writes a config to start from"
     try:
         mode = file.path.stat().st_mode
         if not stat.S_ISREG(mode):
@@ -173,13 +174,12 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
         there_is = purpose or _what_there_is() if reference else f"a run, {_what_there_is()}"
-        advice = KEYS_ARE_LISTED if purpose else "`walkerlab init` writes a config to start from"
         beyond = "" if purpose or file.path.suffix else beyond_scope(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
         raise problem_error(reference, text, there_is, "" if beyond else _near(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: null byte in the name; RuntimeError: link loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise problem_error(reference, f"{kind} {file.label} cannot be read: {reason.lower()}") from None
+        raise problem_error(reference, f"{kind} {file.label} cannot be read: {reason.lower()}", advice=advice) from None
     if len(data) > 4 * MAX_CHARACTERS:
         raise problem_error(Position(file.label, 1, 1), f"longer than {MAX_CHARACTERS} characters: not a config")
     try:

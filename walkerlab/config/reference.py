@@ -18,6 +18,7 @@ from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
 COLUMNS: Final = 79
+SHOWN_KEYS: Final = 4  # largest number of keys that a message suggests
 OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
 """Kind in parentheses in a key's name, such as `(kneed)`: only blocks of that kind have the key."""
 SCHEMA_REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
@@ -96,9 +97,10 @@ def select_keys(selection: str) -> list[KeyReference]:
         if not selection or any(f"{name}.".startswith(f"{selection}.") for name in (key.key, plain[key]))
     ]
     if not matches:
-        names = [".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3)]
+        names = dict.fromkeys(".".join(name.split(".")[:depth]) for name in plain.values() for depth in (1, 2, 3))
+        alike = " or ".join([name for name in names if selection in name.split(".")[-1]][:SHOWN_KEYS])
         by_end = {name.split(".")[-1]: name for name in reversed(names)}
-        near = nearest(selection, names) or by_end.get(nearest(selection, by_end), "")
+        near = alike or nearest(selection, names) or by_end.get(nearest(selection, by_end), "")
         meant = f" Did you mean {near}?" if near else ""
         raise ConfigError(f"the config has no key {selection}.{meant}", "`walkerlab schema` lists every key")
     everywhere = {key for key in matches if key.key == plain[key]}

@@ -76,14 +76,16 @@ def resolve(
 def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
     """Return the file of a run's config, and the changes made in it since the run as KEY OLD -> NEW.
 
-    Keys that the run sets itself are not compared. A file that does not exist has no changes.
+    Keys that the run sets itself are not compared.
     """
     source = folder.source.partition(" with ")[0]
     is_builtin = source.startswith(BUILTIN)
     path = BUILTIN_FOLDER / source.removeprefix(BUILTIN) if is_builtin else folder.runs_dir / source
     file = ConfigFile(path, source if is_builtin else os.path.relpath(path))
+    if not source:
+        return "", []
     if not is_file(path):
-        return file.label, []
+        return file.label, ["it is no longer there"]
     try:
         edited = load(file).config
     except ConfigError:
@@ -108,8 +110,8 @@ def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str]
     if edits:
         more = ", ..." if len(edits) > SHOWN_CHANGES else ""
         warn(
-            f"{folder.path} was computed before {file} was edited ({', '.join(edits[:SHOWN_CHANGES])}{more}), and is "
-            "exported as it was; give the edited file to compute it again."
+            f"{file} has changed since {folder.path} was computed ({', '.join(edits[:SHOWN_CHANGES])}{more}); what is "
+            "exported is the run as it was. Give the file itself to compute it again."
         )
 
 

@@ -82,7 +82,23 @@ EXPORTS = {
 def test_an_export_of_a_run_says_that_its_config_was_edited_since(edited, what):
     done = edited(*EXPORTS[what])
     assert done.returncode == 0, done.stderr
-    assert "light.yaml was edited (walker.hip_mass_kg 10.0 -> 15.0)" in done.stderr
+    assert "light.yaml has changed since runs/light was computed (walker.hip_mass_kg 10.0 -> 15.0)" in done.stderr
+
+
+def test_an_export_of_a_run_says_that_its_config_was_moved(walker):
+    (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
+    walker("fixedpoint", "-c", "light.yaml")
+    (walker.folder / "light.yaml").rename(walker.folder / "lighter.yaml")
+    done = walker("export", "light", "model", "--to", "mjcf")
+    assert done.returncode == 0, done.stderr
+    assert "light.yaml has changed since runs/light was computed (it is no longer there)" in done.stderr
+
+
+def test_a_figure_that_the_run_lacks_is_not_taken_for_another(edited):
+    done = edited("export", "light", "figure-3")
+    assert done.returncode == 3
+    assert "this run has no item figure-03" in done.stderr
+    assert "Did you mean" not in done.stderr
 
 
 def test_a_model_of_an_edited_config_is_that_of_the_file(walker):
@@ -90,7 +106,7 @@ def test_a_model_of_an_edited_config_is_that_of_the_file(walker):
     walker("fixedpoint", "-c", "light.yaml")
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\n")
     done = walker("export", "light.yaml", "model", "--to", "mjcf")
-    assert "edited" not in done.stderr
+    assert "has changed" not in done.stderr
     assert "under 25 kg" in (walker.folder / "light.xml").read_text()
 
 
@@ -102,7 +118,7 @@ def test_what_a_run_sets_itself_is_no_edit_of_its_file(walker):
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\nslope_deg: 2\n")
     done = walker("export", "own", "model", "--to", "mjcf")
     assert done.returncode == 0, done.stderr
-    assert "edited" not in done.stderr
+    assert "has changed" not in done.stderr
 
 
 def test_a_model_takes_settings_and_nothing_else_does(walker):

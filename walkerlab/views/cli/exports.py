@@ -168,7 +168,7 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     names += [name for name in (STEPS, TRAJECTORY) if any(name in result.groups for result in stored.values())]
     nothing = f"{folder.path} has no results yet: {command(folder, PIPELINE['report'])} computes them all."
     advice = "\n  ".join([f"Items of {folder.path}:", *names]) if names else nothing
-    near = suggestion(name, names)
+    near = "" if name.startswith("figure-") else suggestion(name, names)  # numbers of figures are not misspelt
     raise ConfigError(f"this run has no item {name}.{near}", advice)
 
 
