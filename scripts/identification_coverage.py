@@ -1,19 +1,21 @@
 """Identify walkers from synthetic walks and compare errors with the spread of the estimates.
 
 Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles | contact] [CONFIG ...]
+       [--disturbed-by floor | kicks | slope]
 
-Walks go over a rough floor from a disturbed start, and are measured with noise; `contact` are steps of the contact
-model. Printed for each walker: the number of walks that took all steps and that the model fits; the share of these
-whose 95 % region holds the truth, with the binomial error of that share; and for each parameter the mean standard
-error over the spread of the estimates.
+Walks start off the gait, are disturbed on their way, and are measured with noise; `contact` are steps of the contact
+model. The disturbance is a rough floor; random changes of the rates at each heel strike; or a slope that varies
+smoothly along the ramp. Printed for each walker: the number of walks that took all steps and that the model fits, and
+the share without doubt; the share whose 95 % region holds the truth, with its binomial error; and for each parameter
+the mean standard error over the spread of the estimates.
 """
 
+import argparse
 import os
 
 # Matrices are small: threads that share one would wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import math
-import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -24,8 +26,12 @@ from scipy.stats import f as fisher
 from walkerlab.api import in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
+from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
+from walkerlab.physics.hybrid.rigid_record import new_observer
+from walkerlab.physics.mechanics.rigid_model import step_lengths
 from walkerlab.physics.orbits.family_search import CONTACT, RIGID
+from walkerlab.physics.orbits.rigid_map import state_on_section, unit_kicks
 from walkerlab.scene.identification import ConfigFamily, identify_walk, step_map_of
 from walkerlab.scene.subject import find_model_gait
 
@@ -44,10 +50,44 @@ DISTURBANCE, DISTURBANCES = (0.01, 1e-4), {"simplest": (0.002, 5e-5)}
 less."""
 
 
+KICK, RAMP, WAVE = 2e-3, 1e-4, 7.0
+"""Changes of the rates at heel strikes, as a fraction of the rates; largest change of a varying slope's rise per step,
+in leg lengths; steps of its wave."""
+
+
+def kicked_walk(walks, z, p, kick, draw):
+    """Walk on even ground with random changes of the rates after each heel strike but the first."""
+    unit = walks._unit_at(p)
+    start, periods, lengths, parts = np.array(state_on_section(unit.walker, z)), [], [], []
+    for step in range(STEPS):
+        if step:
+            kicks = unit_kicks(unit, start)
+            start = start + kick * draw.normal(size=len(kicks)) @ kicks
+        walk = walks._exact.walk(unit.section, z, 1, False, start=start)
+        if walk.outcome is not Outcome.WALKED:
+            return None
+        parts.append(start)
+        periods.append(walk.time[0] * unit.units.time)
+        lengths.append(step_lengths(unit.walker, start[None], walk.strikes.before)[0] * unit.units.length)
+        start = walk.strikes.after[0]
+    touches = np.append(0.0, np.cumsum(periods))
+
+    def sampled(times):
+        angles = []
+        for step, start in enumerate(parts):
+            own = times[(times >= touches[step]) & (times < touches[step + 1])] - touches[step]
+            observer = new_observer(own / unit.units.time, start.size)
+            walks._exact.walk(unit.section, z, 1, False, start=start, observer=observer)
+            angles.append(observer.states[:, [0, 1] if step % 2 == 0 else [1, 0]])
+        return np.concatenate(angles)
+
+    return np.array(periods), np.array(lengths), sampled
+
+
 class Truth:
     """A walker of a config, and synthetic walks of it."""
 
-    def __init__(self, name, keys, level="steps"):
+    def __init__(self, name, keys, level="steps", disturbed_by="floor"):
         self.config, self.keys, self.level = load(Path(name)).config, keys, level
         self.gait = in_memory("fixedpoint", self.config).summary
         self.model = CONTACT if level == "contact" else RIGID
@@ -57,6 +97,7 @@ class Truth:
         self.z, self.leg = subject.z, self.config.walker.leg_length_m
         self.values, self.clock = np.array(self.family.start), math.sqrt(self.leg / (self.config.gravity_m_s2 / 9.81))
         self.start_change, self.roughness = DISTURBANCES.get(name, DISTURBANCE)
+        self.disturbed_by = disturbed_by
 
     def walk(self, seed):
         """Measure a walk; None if it ends early. Returns also a weighing of the last parameter."""
@@ -64,18 +105,35 @@ class Truth:
         heights = draw.normal(0.0, self.roughness * self.leg, STEPS + 1)
         z = self.z * (1.0 + self.start_change * draw.normal(0.0, 1.0, self.z.size))
         z = self.walks.settled(z, tuple(self.values))
-        walk = self.walks.disturbed(z, tuple(self.values), heights)
         weighed = self.values[-1] * (1.0 + PRIOR * draw.normal())
+        walked = self.disturbed(z, heights, draw)
+        if walked is None:
+            return None
+        periods, lengths, sampled = walked
+        noisy = periods + draw.normal(0.0, NOISE[0] * self.clock, STEPS)
+        if self.level != "angles":
+            return MeasuredWalk(noisy, lengths + draw.normal(0.0, NOISE[1] * self.leg, STEPS)), weighed
+        touches = np.append(0.0, np.cumsum(periods))
+        times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3 * self.clock)
+        angles = sampled(times)
+        return split_into_steps(times, angles + draw.normal(0.0, ANGLE_NOISE, angles.shape), touches), weighed
+
+    def disturbed(self, z, heights, draw):
+        """Return periods, lengths and a function that samples the angles of a walk; None if it ends early."""
+        p, relative = tuple(self.values), self.roughness / DISTURBANCE[1]
+        if self.disturbed_by == "kicks":
+            return kicked_walk(self.walks, z, p, KICK * relative, draw)
+        if self.disturbed_by == "slope":
+            heights = (
+                RAMP
+                * relative
+                * self.leg
+                * np.cumsum(np.sin(2.0 * np.pi * (np.arange(STEPS + 1) / WAVE + draw.uniform())))
+            )
+        walk = self.walks.disturbed(z, p, heights)
         if walk.durations_s.size < STEPS:
             return None
-        periods = walk.durations_s + draw.normal(0.0, NOISE[0] * self.clock, STEPS)
-        lengths = walk.lengths_m + draw.normal(0.0, NOISE[1] * self.leg, STEPS)
-        if self.level != "angles":
-            return MeasuredWalk(periods, lengths), weighed
-        touches = np.append(0.0, np.cumsum(walk.durations_s))
-        times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3 * self.clock)
-        angles = self.walks.sampled(z, tuple(self.values), heights, times)
-        return split_into_steps(times, angles + draw.normal(0.0, ANGLE_NOISE, angles.shape), touches), weighed
+        return walk.durations_s, walk.lengths_m, lambda times: self.walks.sampled(z, p, heights, times)
 
     def identify(self, measured, weighed):
         prior = {self.keys[-1]: [weighed, PRIOR * self.values[-1]]}
@@ -93,7 +151,7 @@ def region_holds(result, truth):
 
 def coverage(truth, seeds):
     """Return whether regions cover, estimates and standard errors of the walks of these seeds that the model fits."""
-    inside, estimates, errors = [], [], []
+    inside, estimates, errors, fits = [], [], [], []
     for seed in seeds:
         walk = truth.walk(seed)
         if walk is None:
@@ -101,39 +159,45 @@ def coverage(truth, seeds):
         result = truth.identify(*walk)
         if not result.verdict.usable:
             continue
+        fits.append(result.verdict.fit == "fits")
         inside.append(region_holds(result, truth.values))
         estimates.append([estimate.value for estimate in result.estimates])
         errors.append(np.sqrt(np.diag(result.information.covariance)))
-    return np.array(inside), np.array(estimates), np.array(errors)
+    return np.array(inside), np.array(estimates), np.array(errors), np.array(fits)
 
 
-def coverage_on_all_cores(name, level, walks):
+def coverage_on_all_cores(name, level, walks, disturbed_by):
     """Return the same for seeds 0 to walks, with a process for each core."""
     cores = os.process_cpu_count() if hasattr(os, "process_cpu_count") else os.cpu_count()
     with ProcessPoolExecutor(cores) as pool:
-        parts = pool.map(coverage_of, [(name, level, range(core, walks, cores)) for core in range(cores)])
+        parts = pool.map(coverage_of, [(name, level, disturbed_by, range(core, walks, cores)) for core in range(cores)])
         return (np.concatenate(columns) for columns in zip(*parts, strict=True))
 
 
 def coverage_of(task):
-    name, level, seeds = task
-    return coverage(Truth(name, WALKERS[name], level), seeds)
+    name, level, disturbed_by, seeds = task
+    return coverage(Truth(name, WALKERS[name], level, disturbed_by), seeds)
 
 
-def main(walks, level, names):
+def main(walks, level, names, disturbed_by):
     for name in names:
         begun = time.perf_counter()
-        inside, estimates, errors = coverage_on_all_cores(name, level, walks)
+        inside, estimates, errors, fits = coverage_on_all_cores(name, level, walks, disturbed_by)
         share, spread = inside.mean(), estimates.std(axis=0, ddof=1)
         ratios = np.sqrt((errors**2).mean(axis=0)) / spread
         print(
-            f"{name}: {inside.size} of {walks} walks fitted, {100 * share:.1f} % inside "
-            f"(+- {196 * np.sqrt(0.95 * 0.05 / inside.size):.1f} %), standard error over spread "
-            f"{' '.join(f'{ratio:.2f}' for ratio in ratios)}, {time.perf_counter() - begun:.0f} s",
+            f"{name}: {inside.size} of {walks} walks fitted, {100 * fits.mean():.0f} % without doubt, "
+            f"{100 * share:.1f} % inside (+- {196 * np.sqrt(0.95 * 0.05 / inside.size):.1f} %), standard error over "
+            f"spread {' '.join(f'{ratio:.2f}' for ratio in ratios)}, {time.perf_counter() - begun:.0f} s",
             flush=True,
         )
 
 
 if __name__ == "__main__":
-    count, level, *names = [*sys.argv[1:], *("1000", "steps")[len(sys.argv) - 1 :]]
-    main(int(count), level, names or WALKERS)
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
+    parser.add_argument("walks", type=int, nargs="?", default=1000)
+    parser.add_argument("level", nargs="?", default="steps", choices=("steps", "angles", "contact"))
+    parser.add_argument("configs", nargs="*")
+    parser.add_argument("--disturbed-by", default="floor", choices=("floor", "kicks", "slope"))
+    options = parser.parse_args()
+    main(options.walks, options.level, options.configs or WALKERS, options.disturbed_by)

@@ -14,7 +14,7 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.judgement import implausible_floor
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
-from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
+from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, reduce
 from walkerlab.scene.identification import identify_walk
 from walkerlab.scene.rigid import rigid_walker
 
@@ -260,7 +260,7 @@ def test_many_noise_levels_of_a_long_walk_need_little_memory():
         rng.normal(size=count), rng.normal(size=(count, 3)), rng.normal(size=(count, count)), np.zeros(count, int),
         np.zeros((0, 4)), np.ones(1),
     )  # fmt: skip
-    products, levels = products_of(data), np.linspace(0.5, 2.0, 200)
+    products, levels = reduce(data), np.linspace(0.5, 2.0, 200)
     tracemalloc.start()
     together = evaluate(products, Noise(levels[:, None], np.full(200, 0.1)))
     _, peak = tracemalloc.get_traced_memory()

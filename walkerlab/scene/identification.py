@@ -16,7 +16,7 @@ from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitProblem, Fitted, eva
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measurements import MeasuredWalk
-from walkerlab.physics.estimation.mixed_model import estimate_noise, evaluate, products_of
+from walkerlab.physics.estimation.mixed_model import estimate_noise, evaluate, reduce
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import USABLE, Estimate, Identification, ModelFit, Pull, StepTable, Uncertain
 from walkerlab.physics.orbits.family_search import RIGID
@@ -133,6 +133,8 @@ def identify_with(
     """Fit one model; return the reason as text if no walk of the model can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
+    kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
+    problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
         fit(problem, start, begin(f"{model} model, start {place} of {question.starts}", MAX_ROUNDS))
         for place, start in enumerate(starts_of(problem, question.starts), 1)
@@ -274,15 +276,15 @@ def better_with(subject: ModelUnderTest, question: Identify, fitted: Fitted) -> 
     left = (data.residuals.size - fitted.u.size - 1) / data.residuals.size
     best, wider = fitted.evaluation.likelihood, None
     for name, value, slope in slopes_of_others(subject, question, fitted):
-        products = products_of(replace(data, J=np.column_stack((data.J, slope)), prior=priors))
-        evaluation = evaluate(products, fitted.noise)
+        rows = reduce(replace(data, J=np.column_stack((data.J, slope)), prior=priors))
+        evaluation = evaluate(rows, fitted.noise)
         moves = np.abs([*evaluation.move[:count], evaluation.move[-1] if value else 0.0])
         if evaluation.likelihood > best and moves.max() < LINEAR_MOVE:
-            best, wider = evaluation.likelihood, (name, products)
+            best, wider = evaluation.likelihood, (name, rows)
     if wider is not None:
-        name, products = wider
-        noise = estimate_noise(products, problem.floors, problem.leg_length_m, fitted.noise)
-        gain = evaluate(products, noise).likelihood - fitted.evaluation.likelihood
+        name, rows = wider
+        noise = estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise)
+        gain = evaluate(rows, noise).likelihood - fitted.evaluation.likelihood
         if gain * left > DECISIVE_GAIN:
             yield f"estimating {name}, too, would raise the log-likelihood by about {gain:.2g}"
 
@@ -328,18 +330,29 @@ def measurement_noise(fitted: Fitted) -> dict[str, float]:
     return dict(zip(fitted.forecast.quantities, fitted.scatter.tolist(), strict=True))
 
 
-def process_noise(fitted: Fitted) -> dict[str, float | bool | None]:
-    """Return the floor's roughness, with its standard error from the curvature of the restricted likelihood."""
-    roughness = fitted.noise.roughness_m
-    if roughness == 0.0:
-        return {"roughness_m": 0.0, "share_of_leg": 0.0, "standard_error": None, "at_bound": True}
-    h = 1e-2
-    moved = fitted.noise._replace(roughness_m=roughness * np.exp([-h, 0.0, h]))
-    logs = evaluate(fitted.products, moved).restricted
+def process_noise(fitted: Fitted) -> dict[str, Any]:
+    """Return the floor's roughness and the kicks, with standard errors; kicks are None where they are not estimated."""
+    noise, kicks = fitted.noise, fitted.data.kicks
+    unseen = "" if kicks else "only steps with lengths, or angles, of the rigid model tell kicks from a rough floor"
+    return {
+        "roughness_m": noise.roughness_m,
+        "share_of_leg": noise.roughness_m / fitted.problem.leg_length_m,
+        "standard_error": error_of_noise(fitted, "roughness_m"),
+        "at_bound": noise.roughness_m == 0.0,
+        "kick": noise.kick if kicks else None,
+        "kick_standard_error": error_of_noise(fitted, "kick"),
+        "kick_unknown": unseen,
+    }
+
+
+def error_of_noise(fitted: Fitted, name: str) -> float | None:
+    """Return the standard error of a disturbance from the curvature of the restricted likelihood; None at zero."""
+    h, value = 1e-2, getattr(fitted.noise, name)
+    if value == 0.0:
+        return None
+    logs = evaluate(fitted.rows, fitted.noise._replace(**{name: value * np.exp([-h, 0.0, h])})).restricted
     curvature = (2.0 * logs[1] - logs[0] - logs[2]) / h**2
-    error = float(roughness / math.sqrt(curvature)) if curvature > 0.0 else None
-    share = roughness / fitted.problem.leg_length_m
-    return {"roughness_m": roughness, "share_of_leg": share, "standard_error": error, "at_bound": False}
+    return float(value / math.sqrt(curvature)) if curvature > 0.0 else None
 
 
 def rms_residuals(fitted: Fitted) -> dict[str, float]:
@@ -355,7 +368,7 @@ def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
     """Tabulate measured steps, predicted steps on even ground, and the standard deviation of their difference."""
     forecast = fitted.forecast
     steps, variance = forecast.measured.count, fitted.noise.measurement[forecast.quantity] ** 2
-    total = np.sqrt(variance + (fitted.noise.roughness_m**2) * (fitted.data.G**2).sum(axis=1))
+    total = np.sqrt(variance + ((fitted.data.G * fitted.data.spread(fitted.noise)) ** 2).sum(axis=1))
     return tuple(
         StepTable(name, values, fitted.predicted.values[first : first + steps], total[first : first + steps])
         for first, (name, values) in zip(

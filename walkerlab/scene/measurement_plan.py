@@ -20,7 +20,7 @@ from walkerlab.physics.estimation.measurements import (
     MeasuredWalk,
     split_into_steps,
 )
-from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, products_of
+from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, reduce
 from walkerlab.physics.estimation.prediction import DELAY, Forecast
 from walkerlab.physics.estimation.result import Unidentifiable
 from walkerlab.scene.identification import ConfigFamily, problem_of, step_map_of
@@ -141,7 +141,7 @@ def expected_errors(
     rows = np.isin(data.quantity, [quantities.index(name) for name in measured]) & (walk.step < steps)
     seen = replace(data, residuals=data.residuals[rows], J=data.J[rows], G=data.G[rows], quantity=data.quantity[rows])
     deviations = Noise(np.array([noise[name] for name in quantities]), plan.roughness_m)
-    whole = evaluate(products_of(seen), deviations).information
+    whole = evaluate(reduce(seen), deviations).information
     information = information_from(whole, keys, walk.forecast.scales, int(np.count_nonzero(rows)))
     combinations, left_open = open_combinations(information)
     errors = zip(keys, np.sqrt(np.diag(information.covariance)).tolist(), strict=True)

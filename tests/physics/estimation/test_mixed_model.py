@@ -1,5 +1,7 @@
 """The likelihood of a linear model with random heights, against dense linear algebra."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -10,8 +12,10 @@ from walkerlab.physics.estimation.mixed_model import (
     Noise,
     estimate_noise,
     evaluate,
-    most_probable_heights,
-    products_of,
+    most_probable_disturbances,
+    noise_at,
+    reduce,
+    restricted_with_slope,
     whitening,
 )
 
@@ -37,7 +41,7 @@ def test_the_likelihood_is_that_of_a_normal_distribution(data):
     information = data.J.T @ inverse @ data.J
     move = np.linalg.solve(information, data.J.T @ inverse @ data.residuals)
     left = data.residuals - data.J @ move
-    answer = evaluate(products_of(no_prior), NOISE)
+    answer = evaluate(reduce(no_prior), NOISE)
     assert answer.information == pytest.approx(information, rel=1e-12)
     assert answer.move == pytest.approx(move, rel=1e-9)
     assert answer.likelihood == pytest.approx(multivariate_normal(np.zeros(16), S).logpdf(left), rel=1e-12)
@@ -45,7 +49,29 @@ def test_the_likelihood_is_that_of_a_normal_distribution(data):
     ratio = 0.5 * np.var(np.log(NOISE.measurement)) / NOISE_RATIO**2
     assert answer.restricted == pytest.approx(restricted - ratio, rel=1e-12)
     heights = NOISE.roughness_m**2 * data.G.T @ inverse @ left
-    assert most_probable_heights(products_of(no_prior), NOISE, answer.move) == pytest.approx(heights, rel=1e-9)
+    assert most_probable_disturbances(reduce(no_prior), NOISE, answer.move) == pytest.approx(heights, rel=1e-9)
+
+
+@pytest.mark.parametrize("kicks", [0, 2])
+def test_the_slope_of_the_likelihood_is_its_difference_quotient(data, kicks):
+    rows, logs = reduce(replace(data, kicks=kicks)), np.log([0.3, 0.5, 0.2, 0.1])
+    noise = noise_at(logs, (0, 1))
+    likelihood, slope = restricted_with_slope(rows, noise)
+    assert likelihood == pytest.approx(float(evaluate(rows, noise).restricted), rel=1e-12)
+    for place, unit in enumerate(np.eye(4)):
+        ends = [float(evaluate(rows, noise_at(logs + sign * 1e-5 * unit, (0, 1))).restricted) for sign in (1, -1)]
+        assert slope[place] == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-7)
+
+
+def test_heights_and_kicks_are_told_apart():
+    draw = np.random.default_rng(2)
+    J, G, quantity = draw.normal(size=(600, 2)), draw.normal(size=(600, 80)), np.zeros(600, int)
+    noise, disturbances = draw.normal(0.0, 0.3, 600), draw.normal(size=80)
+    for floor, kick in ((0.1, 0.0), (0.0, 0.05), (0.1, 0.05)):
+        spread = np.repeat([floor, kick], 40)
+        data = Linearised(noise + G @ (spread * disturbances), J, G, quantity, np.zeros((0, 3)), np.ones(1), 0.0, 40)
+        found = estimate_noise(reduce(data), np.full(1, 1e-6), 1.0, Noise(np.ones(1), 0.0))
+        assert found.process == pytest.approx([floor, kick], abs=0.02)
 
 
 def test_a_prior_is_one_more_measurement(data):
@@ -54,7 +80,7 @@ def test_a_prior_is_one_more_measurement(data):
     S = np.eye(17)
     S[:16, :16] = covariance(data, NOISE)
     information = weighed.T @ np.linalg.solve(S, weighed)
-    answer = evaluate(products_of(data), NOISE)
+    answer = evaluate(reduce(data), NOISE)
     assert answer.information == pytest.approx(information, rel=1e-12)
     assert answer.move == pytest.approx(
         np.linalg.solve(information, weighed.T @ np.linalg.solve(S, residuals)), rel=1e-9
@@ -64,7 +90,7 @@ def test_a_prior_is_one_more_measurement(data):
 @pytest.mark.parametrize("roughness", [0.0, 0.2])
 def test_whitening_makes_values_independent(data, roughness):
     noise = NOISE._replace(roughness_m=roughness)
-    whiten = whitening(data.G, data.quantity, noise)
+    whiten = whitening(data, noise)
     root = whiten(np.eye(16))
     assert root @ covariance(data, noise) @ root.T == pytest.approx(np.eye(16), abs=1e-12)
 
@@ -75,7 +101,7 @@ def test_standard_deviations_of_many_values_are_found():
     J, G = draw.normal(size=(8000, 2)), draw.normal(size=(8000, 60))
     noise = np.array([0.3, 0.6])[quantity] * draw.normal(size=8000)
     residuals = J @ [1.0, -2.0] + 0.1 * G @ draw.normal(size=60) + noise
-    products = products_of(Linearised(residuals, J, G, quantity, np.zeros((0, 3)), np.ones(2)))
+    products = reduce(Linearised(residuals, J, G, quantity, np.zeros((0, 3)), np.ones(2)))
     found = estimate_noise(products, np.full(2, 1e-6), 1.0, Noise(np.ones(2), 0.0))
     assert found.measurement == pytest.approx([0.3, 0.6], rel=0.04)
     assert found.roughness_m == pytest.approx(0.1, rel=0.3)
@@ -84,7 +110,7 @@ def test_standard_deviations_of_many_values_are_found():
 def test_an_even_floor_is_found_even():
     draw = np.random.default_rng(6)
     G = draw.normal(size=(400, 20))
-    products = products_of(
+    products = reduce(
         Linearised(draw.normal(size=400), np.ones((400, 1)), G, np.zeros(400, int), np.zeros((0, 2)), np.ones(1))
     )
     found = estimate_noise(products, np.array([1e-6]), 1.0, Noise(np.ones(1), 0.0))
@@ -96,7 +122,7 @@ def test_heights_that_act_alike_on_a_very_rough_floor_leave_a_finite_likelihood(
     G = np.outer(rng.normal(size=400), np.ones(6))
     values = rng.normal(0.0, 1e-9, 400)
     data = Linearised(values, np.ones((400, 1)), G, np.zeros(400, int), np.zeros((0, 2)), np.ones(1))
-    products, noise = products_of(data), Noise(np.array([1e-9]), 10.0)
+    products, noise = reduce(data), Noise(np.array([1e-9]), 10.0)
     answer = evaluate(products, noise)
     assert np.isfinite(answer.restricted)
-    assert np.isfinite(most_probable_heights(products, noise, answer.move)).all()
+    assert np.isfinite(most_probable_disturbances(products, noise, answer.move)).all()

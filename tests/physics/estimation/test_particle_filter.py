@@ -13,7 +13,7 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.fit import linearise
 from walkerlab.physics.estimation.measurements import MeasuredWalk
-from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, most_probable_heights, products_of
+from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, most_probable_disturbances, reduce
 from walkerlab.scene.identification import problem_of
 from walkerlab.scene.subject import find_model_gait
 
@@ -42,9 +42,9 @@ def likelihood(problem, u):
     for _ in range(3):
         data = linearise(problem, u, heights)
         known = Linearised(data.residuals, data.J[:, :0], data.G, data.quantity, np.zeros((0, 1)), data.sizes)
-        products, noise = products_of(known), Noise(NOISE, ROUGHNESS_M)
+        products, noise = reduce(known), Noise(NOISE, ROUGHNESS_M)
         evaluation = evaluate(products, noise)
-        heights = most_probable_heights(products, noise, evaluation.move)
+        heights = most_probable_disturbances(products, noise, evaluation.move)
     return float(evaluation.likelihood)
 
 

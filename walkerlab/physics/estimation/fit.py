@@ -15,11 +15,11 @@ from walkerlab.physics.estimation.mixed_model import (
     Evaluation,
     Linearised,
     Noise,
-    Products,
+    Reduced,
     estimate_noise,
     evaluate,
-    most_probable_heights,
-    products_of,
+    most_probable_disturbances,
+    reduce,
     whitening,
 )
 from walkerlab.physics.estimation.prediction import Forecast, Prediction
@@ -92,7 +92,7 @@ class FitProblem:
 class Fitted:
     problem: FitProblem
     u: Floats  # (unknowns,) scaled unknowns
-    heights_m: Floats  # (heights,) most probable floor heights
+    disturbances: Floats  # (heights + kicks,) most probable floor heights (m) and kicks
     noise: Noise
     evaluation: Evaluation
     data: Linearised
@@ -104,13 +104,18 @@ class Fitted:
         return self.problem.forecast
 
     @cached_property
-    def products(self) -> Products:
-        return products_of(self.data)
+    def rows(self) -> Reduced:
+        return reduce(self.data)
+
+    @property
+    def heights_m(self) -> Floats:
+        """Most probable floor heights (heights,)."""
+        return self.disturbances[: self.forecast.heights]
 
     @property
     def residuals(self) -> Floats:
-        """Measured minus predicted values (values,) over the most probable floor."""
-        return np.asarray(self.data.residuals + self.data.trimmed - self.data.G @ self.heights_m)
+        """Measured minus predicted values (values,) over the most probable floor, with the most probable kicks."""
+        return np.asarray(self.data.residuals + self.data.trimmed - self.data.G @ self.disturbances)
 
     @property
     def scatter(self) -> Floats:
@@ -140,18 +145,19 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
             data = linearise(problem, u, heights, robust=robust)
         if data is None:
             return NO_NEIGHBOURS
-        products, earlier = products_of(data), noise
-        noise = estimate_noise(products, problem.floors, problem.leg_length_m, noise)
-        if done >= FREE_ROUNDS and gain_of(products, earlier, noise) < ALIKE:
+        rows, earlier = reduce(data), noise
+        noise = estimate_noise(rows, problem.floors, problem.leg_length_m, noise)
+        if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < ALIKE:
             noise = between(earlier, noise) if done == FREE_ROUNDS else earlier
-        evaluation, robust = evaluate(products, noise), robust_at(products, noise)
-        likeliest = most_probable_heights(products, noise, evaluation.move)
+        evaluation, robust = evaluate(rows, noise), robust_at(rows, noise)
+        disturbances = most_probable_disturbances(rows, noise, evaluation.move)
+        likeliest = disturbances[: heights.size]
         heights = passable(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
         if why == NO_NEIGHBOURS:
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
         moved = float(np.max(np.abs(u - before) / errors))
-        if moved < SETTLED_MOVE and settled(products, earlier, noise, problem.leg_length_m):
+        if moved < SETTLED_MOVE and settled(rows, earlier, noise, problem.leg_length_m):
             why = ""
             break
         if forecast.walks_taken > problem.max_walks:
@@ -161,21 +167,24 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return NO_NEIGHBOURS
-    return Fitted(problem, u, heights, noise, evaluate(products_of(data), noise), data, predicted, why)
+    disturbances[: heights.size] = heights
+    return Fitted(problem, u, disturbances, noise, evaluate(reduce(data), noise), data, predicted, why)
 
 
 def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     """Estimate the standard deviations at u (unknowns,), starting from another fit; None if a walk ends early."""
     problem, even = like.problem, np.zeros(like.forecast.heights)
-    robust = robust_at(like.products, like.noise)
+    robust = robust_at(like.rows, like.noise)
     data, predicted = linearise(problem, u, even, robust=robust), problem.forecast.predict(u, even)
     if data is None or predicted is None:
         return None
-    products = products_of(data)
-    noise = estimate_noise(products, problem.floors, problem.leg_length_m, like.noise)
-    evaluation = evaluate(products, noise)
-    heights = most_probable_heights(products, noise, evaluation.move)
-    return replace(like, u=u, heights_m=heights, noise=noise, evaluation=evaluation, data=data, predicted=predicted)
+    rows = reduce(data)
+    noise = estimate_noise(rows, problem.floors, problem.leg_length_m, like.noise)
+    evaluation = evaluate(rows, noise)
+    disturbances = most_probable_disturbances(rows, noise, evaluation.move)
+    return replace(
+        like, u=u, disturbances=disturbances, noise=noise, evaluation=evaluation, data=data, predicted=predicted
+    )
 
 
 def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
@@ -187,21 +196,21 @@ def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
 def between(before: Noise, after: Noise) -> Noise:
     """Return standard deviations halfway between two."""
     middle = np.sqrt(before.measurement * after.measurement)
-    return Noise(middle, 0.5 * (before.roughness_m + after.roughness_m))
+    return Noise(middle, *(0.5 * (before.process + after.process)).tolist())
 
 
-def settled(products: Products, before: Noise, after: Noise, leg_length_m: float) -> bool:
+def settled(rows: Reduced, before: Noise, after: Noise, leg_length_m: float) -> bool:
     """Whether standard deviations have stopped changing, or change without becoming likelier."""
     same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED_NOISE)
-    change = abs(after.roughness_m - before.roughness_m)
-    if same and change < SETTLED_NOISE * max(after.roughness_m, 1e-7 * leg_length_m):
+    change, least = np.abs(after.process - before.process), 1e-7 * np.array((leg_length_m, 1.0))
+    if same and np.all(change < SETTLED_NOISE * np.maximum(after.process, least)):
         return True
-    return gain_of(products, before, after) < SETTLED_LIKELIHOOD
+    return gain_of(rows, before, after) < SETTLED_LIKELIHOOD
 
 
-def gain_of(products: Products, before: Noise, after: Noise) -> float:
+def gain_of(rows: Reduced, before: Noise, after: Noise) -> float:
     """Return how much the restricted log-likelihood rises from one noise to another."""
-    return float(evaluate(products, after).restricted - evaluate(products, before).restricted)
+    return float(evaluate(rows, after).restricted - evaluate(rows, before).restricted)
 
 
 def typical_sizes(forecast: Forecast) -> Floats:
@@ -219,15 +228,16 @@ def linearise(
     """
     forecast = problem.forecast
     prediction = forecast.predict(u, heights)
-    derivatives = forecast.differentiate(u, heights, np.eye(heights.size), exact)
+    derivatives = forecast.differentiate(u, heights, exact)
     if prediction is None or derivatives is None:
         return None
     J, G = derivatives
     residuals = whole = forecast.values - prediction.values
     if problem.loss == "soft_l1" and robust is not None:
         residuals = trim(whole, forecast.quantity, robust)
-    rows, sizes = problem.prior_rows(u), typical_sizes(forecast)
-    return Linearised(residuals + G @ heights, J, G, forecast.quantity, rows, sizes, whole - residuals)
+    rows, sizes, kicks = problem.prior_rows(u), typical_sizes(forecast), G.shape[1] - heights.size
+    from_even = residuals + G[:, : heights.size] @ heights
+    return Linearised(from_even, J, G, forecast.quantity, rows, sizes, whole - residuals, kicks)
 
 
 def trim(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floats:
@@ -253,13 +263,15 @@ class Robust(NamedTuple):
     absorbed: Floats  # (quantities,) share of the noise's variance that the fitted unknowns and floor absorb
 
 
-def robust_at(products: Products, noise: Noise) -> Robust:
-    informations = products.sums[:, 1:, 1:] * noise.measurement[:, None, None] ** -2.0
+def robust_at(rows: Reduced, noise: Noise) -> Robust:
+    columns = np.column_stack((rows.fixed[:, 1:], rows.G)) / noise.measurement[rows.quantity][:, None]
+    informations = np.array([own.T @ own for own in (columns[rows.quantity == q] for q in range(rows.sizes.size))])
     whole = informations.sum(axis=0)
-    unknowns, roughness = products.unknowns, max(noise.roughness_m, 1e-12)
-    whole[:unknowns, :unknowns] += products.prior[1:, 1:]
-    whole[unknowns:, unknowns:] += np.eye(len(whole) - unknowns) / roughness**2
-    absorbed = np.einsum("qij,ji->q", informations, np.linalg.pinv(whole, hermitian=True)) / products.counts
+    unknowns = rows.unknowns
+    whole[:unknowns, :unknowns] += rows.prior[1:, 1:]
+    spread = noise.spread(rows.G.shape[1], rows.kicks)
+    whole[unknowns:, unknowns:] += np.diag(np.maximum(spread, 1e-12) ** -2.0)
+    absorbed = np.einsum("qij,ji->q", informations, np.linalg.pinv(whole, hermitian=True)) / rows.counts
     return Robust(math.sqrt(SOFT_EFFICIENCY) * noise.measurement, absorbed)
 
 
@@ -271,8 +283,8 @@ def least_squares_fit(
 
     forecast, low_high = problem.forecast, problem.limits()
     inside = np.clip(u, low_high[0] + INSIDE, low_high[1] - INSIDE)
-    whiten, known = whitening(data.G, forecast.quantity, noise), (inside, data.J)
-    offset = forecast.values - data.trimmed + data.G @ heights
+    whiten, known = whitening(data, noise), (inside, data.J)
+    offset = forecast.values - data.trimmed + data.G[:, : heights.size] @ heights
 
     def residuals(x: Floats) -> Floats:
         prediction = forecast.predict(x, heights)
@@ -282,7 +294,7 @@ def least_squares_fit(
     def jacobian(x: Floats) -> Floats:
         nonlocal known
         if np.abs(x - known[0]).max() > SAME_DERIVATIVES:
-            derivatives = forecast.differentiate(x, heights, np.zeros((heights.size, 0)), exact=False)
+            derivatives = forecast.differentiate(x, heights, exact=False, disturbed=False)
             known = x.copy(), np.zeros((offset.size, x.size)) if derivatives is None else derivatives[0]
         own = -whiten(known[1])
         return np.vstack((own, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))

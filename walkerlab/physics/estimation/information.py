@@ -65,12 +65,11 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     """Average the covariance along directions `basis` (directions, parameters) over plausible standard deviations."""
     # The weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
     noise, count = fitted.noise, basis.shape[1]
-    rough = float(noise.roughness_m > 0.0)
-    centre = np.log(np.append(noise.measurement, noise.roughness_m or 1.0))
+    sources = tuple(np.flatnonzero(noise.process).tolist())
+    centre = np.log(np.append(noise.measurement, noise.process[list(sources)]))
 
     def evaluate_at(logs: Floats) -> Evaluation:
-        drawn = noise_at(logs, True)
-        return evaluate(fitted.products, drawn._replace(roughness_m=rough * drawn.roughness_m))
+        return evaluate(fitted.rows, noise_at(logs, sources))
 
     draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
     logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(evaluate_at, centre)))
@@ -148,7 +147,7 @@ def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
     for place in range(len(quantities)):
         noise = fitted.noise.measurement.copy()
         noise[place] *= 1e6
-        without = evaluate(fitted.products, fitted.noise._replace(measurement=noise)).information
+        without = evaluate(fitted.rows, fitted.noise._replace(measurement=noise)).information
         left = np.diag(basis @ free_the_rest(without, count) @ basis.T)
         losses.append(float(np.mean(1.0 - np.clip(left / whole, 0.0, 1.0))))
     return dict(zip(quantities, losses, strict=True))

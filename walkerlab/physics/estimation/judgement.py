@@ -45,7 +45,7 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
         return "not-converged", fitted.why
     if fitted.noise.roughness_m > ROUGHEST * fitted.problem.leg_length_m:
         return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough could explain the steps"
-    white = whitening(fitted.data.G, forecast.quantity, fitted.noise)(fitted.data.residuals)
+    white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
     steps = forecast.measured.count
     for place, quantity in enumerate(forecast.channels):
         own, name = white[place * steps : (place + 1) * steps], name_and_unit(quantity)[0]
@@ -81,7 +81,7 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     measured = fitted.forecast.measured
     if not measured.sampled or fitted.forecast.in_phase:
         return
-    white = whitening(fitted.data.G, fitted.forecast.quantity, fitted.noise)(fitted.data.residuals).reshape(-1, 2)
+    white = whitening(fitted.data, fitted.noise)(fitted.data.residuals).reshape(-1, 2)
     half = 2 * measured.step + (measured.phase >= 0.5)
     counts = np.bincount(half)
     sums = np.array([np.bincount(half, leg) for leg in white.T])[:, counts > 0]

@@ -1,15 +1,15 @@
-"""Linear model with random heights: whitening, restricted likelihood of its standard deviations, and information.
+"""Linear model of a disturbed walk: whitening, restricted likelihood of its standard deviations, and information.
 
-All results follow from the sums of squares and products of each quantity's residuals and derivatives, so the cost of a
-likelihood does not depend on the number of samples.
+The floor's heights, and kicks that change the rates at heel strikes, disturb the walk; noise disturbs its measurement.
+The values of each quantity are first reduced to as many rows as there are derivatives, so the cost of a likelihood does
+not depend on the number of samples.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 from walkerlab.physics.solvers.system import Floats
 
-NOISE_STARTS: Final = tuple(product((1e-3, 1e-2, 0.1, 1.0, 10.0), (1e-5, 1e-4, 1e-3, 1e-2)))
-"""Candidate starts of the search: factor on the measurement noise so far, roughness as a fraction of the leg length."""
-ROUGHNESS_BOUNDS: Final = (1e-8, 0.2)  # fractions of the leg length
-NEARLY_EVEN: Final = 1e-5  # fraction of the leg length; a smaller roughness may be no roughness
+NOISE_FACTORS: Final = (1e-3, 1e-2, 0.1, 1.0, 10.0)
+DISTURBANCES: Final = (1e-5, 1e-4, 1e-3, 1e-2)
+"""Candidate starts of the search: factors on the measurement noise so far; roughness as a fraction of the leg length,
+and kicks as a fraction of the rates."""
+DISTURBANCE_BOUNDS: Final = (1e-8, 0.2)  # the same fractions
+NEARLY_NONE: Final = 1e-5  # the same; a smaller disturbance may be none
 NOISE_RATIO: Final = 1.0
 """Prior standard deviation of the logarithm of the quantities' relative noises.
 
@@ -32,33 +34,46 @@ Source: Chung et al., A nondegenerate penalized likelihood estimator for varianc
 Psychometrika 78 (2013).
 """
 MOST_NUMBERS: Final = 4_000_000  # of the matrices of all noise levels that are evaluated together
-ROUNDING: Final = 1e-14  # relative rounding error of sums of products
-# difference step in the logarithms of the standard deviations, for derivatives of the restricted likelihood
-LOG_STEP: Final = 1e-4
+ROUNDING: Final = 1e-14  # relative rounding error of a covariance
+SIMPLER: Final = 1e-6  # gain of the log-likelihood up to which the simpler explanation wins
 # eigenvalues of scaled information below this fraction of the largest are rounding errors
 LOST_INFORMATION: Final = 1e-13
 
 
 class Noise(NamedTuple):
-    """Standard deviations of the measurement by quantity, and of the floor's heights (m)."""
+    """Standard deviations of the measurement by quantity, of the floor's heights (m), and of kicks."""
 
     measurement: Floats  # (quantities,)
     roughness_m: Any  # a float, or an array (...,) for several sets of standard deviations
+    kick: Any = 0.0  # the same; as a fraction of the rates
+
+    @property
+    def process(self) -> Floats:
+        """Standard deviations (..., 2) of heights and kicks."""
+        return np.stack(np.broadcast_arrays(self.roughness_m, self.kick), axis=-1)
+
+    def spread(self, disturbances: int, kicks: int) -> Floats:
+        """Return the standard deviations (disturbances,) of heights and kicks, of which `kicks` are kicks."""
+        return np.repeat(self.process, (disturbances - kicks, kicks))
 
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """Measured minus predicted values of a walk, and derivatives of the predicted values."""
 
-    residuals: Floats  # (values,) relative to the walk over even ground
+    residuals: Floats  # (values,) relative to the walk over even ground without kicks
     J: Floats  # (values, unknowns) derivatives with respect to the scaled unknowns
-    G: Floats  # (values, heights) derivatives with respect to the heights, 1/m
+    G: Floats  # (values, heights + kicks) derivatives with respect to the heights, 1/m, and to kicks
     quantity: NDArray[np.int64]  # (values,) index of the quantity of each value
     prior: Floats  # (priors, 1 + unknowns) whitened residuals and derivatives of priors
     sizes: Floats  # (quantities,) typical size of each quantity
-    trimmed: Floats | float = (
-        0.0  # (values,) parts of the measured values that a robust loss leaves out of the residuals
-    )
+    # (values,) parts of the measured values that a robust loss leaves out of the residuals
+    trimmed: Floats | float = 0.0
+    kicks: int = 0  # number of kicks
+
+    def spread(self, noise: Noise) -> Floats:
+        """Return the standard deviations (heights + kicks,) of the disturbances."""
+        return noise.spread(self.G.shape[1], self.kicks)
 
 
 class Evaluation(NamedTuple):
@@ -71,77 +86,119 @@ class Evaluation(NamedTuple):
     squares: Any  # sum of squares of whitened residuals
 
 
-class Products(NamedTuple):
-    """Sums of squares and products of [residual, J, G], by quantity."""
+class Reduced(NamedTuple):
+    """Values of a walk as rows with the same sums of squares and products, at most one a quantity and column."""
 
-    sums: Floats  # (quantities, k, k)
+    fixed: Floats  # (rows, 1 + unknowns) residuals, and derivatives with respect to the unknowns
+    G: Floats  # (rows, heights + kicks)
+    covariance: Floats  # (2, rows, rows) of the rows due to heights and to kicks of unit variance
+    quantity: NDArray[np.int64]  # (rows,)
     counts: NDArray[np.int64]  # (quantities,) number of values
     prior: Floats  # (1 + unknowns, 1 + unknowns)
     priors: int
-    unknowns: int
     sizes: Floats  # (quantities,) typical size of each quantity
+    kicks: int
+
+    @property
+    def unknowns(self) -> int:
+        return int(self.fixed.shape[1]) - 1
+
+    def disturbed_by(self) -> tuple[tuple[int, ...], ...]:
+        """Return the possible disturbances, the simplest first: none, heights (0), kicks (1), or both."""
+        return ((), (0,), (1,), (0, 1)) if self.kicks else ((), (0,))
 
 
-def products_of(data: Linearised) -> Products:
+def reduce(data: Linearised) -> Reduced:
     columns = np.column_stack((data.residuals, data.J, data.G))
     parts = [columns[data.quantity == q] for q in range(data.sizes.size)]
-    sums = np.array([part.T @ part for part in parts])
-    counts = np.array([len(part) for part in parts])
-    return Products(sums, counts, data.prior.T @ data.prior, len(data.prior), data.J.shape[1], data.sizes)
+    rows = [part if len(part) <= part.shape[1] else np.linalg.qr(part, mode="r") for part in parts]
+    counts, first = np.array([len(part) for part in parts]), 1 + data.J.shape[1]
+    whole, heights = np.concatenate(rows), columns.shape[1] - data.kicks
+    covariance = np.array([part @ part.T for part in (whole[:, first:heights], whole[:, heights:])])
+    quantity = np.repeat(np.arange(data.sizes.size), [len(part) for part in rows])
+    prior = data.prior.T @ data.prior
+    return Reduced(
+        whole[:, :first], whole[:, first:], covariance, quantity, counts, prior, len(data.prior), data.sizes, data.kicks
+    )
 
 
-def evaluate(products: Products, noise: Noise) -> Evaluation:
+def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     """Evaluate the likelihoods for one or more noise levels; `noise.measurement` has shape (..., quantities)."""
-    deviations, rough = np.asarray(noise.measurement), np.asarray(noise.roughness_m)
-    fixed, size = 1 + products.unknowns, products.sums.shape[-1]
-    sets = np.broadcast_shapes(deviations.shape[:-1], rough.shape)
-    if sets and sets[0] > 1 and sets[0] * size**2 > MOST_NUMBERS:
-        both = np.broadcast_to(deviations, (*sets, deviations.shape[-1])), np.broadcast_to(rough, sets)
-        halves = zip(*(np.array_split(values, 2) for values in both), strict=True)
-        return Evaluation(
-            *map(np.concatenate, zip(*(evaluate(products, Noise(*half)) for half in halves), strict=True))
-        )
-    total = np.einsum("qij,...q->...ij", products.sums, deviations**-2.0)
-    # The Cholesky factor of [[K, R^T], [R, large]], with R the rows of the fixed part, holds the determinant of K and
-    # R K^-1 R^T, which the heights explain.
-    joint = np.empty((*sets, size, size))
-    joint[..., : size - fixed, : size - fixed] = matrix_of_heights(total, rough, fixed)
-    joint[..., size - fixed :, : size - fixed] = rough[..., None, None] * total[..., :fixed, fixed:]
-    large = 1.0 + np.trace(total, axis1=-2, axis2=-1)
-    joint[..., size - fixed :, size - fixed :] = large[..., None, None] * np.eye(fixed)
-    joint[..., size - fixed :, size - fixed :] += total[..., :fixed, :fixed]
+    deviations, process = np.asarray(noise.measurement), noise.process
+    fixed, count = 1 + rows.unknowns, len(rows.fixed)
+    sets = np.broadcast_shapes(deviations.shape[:-1], process.shape[:-1])
+    if sets and sets[0] > 1 and sets[0] * (count + fixed) ** 2 > MOST_NUMBERS:
+        both = [np.broadcast_to(each, (*sets, each.shape[-1])) for each in (deviations, process)]
+        halves = [Noise(own, *of_process.T) for own, of_process in zip(*map(np.array_split, both, (2, 2)), strict=True)]
+        return Evaluation(*map(np.concatenate, zip(*(evaluate(rows, half) for half in halves), strict=True)))
+    scaled = rows.fixed / deviations[..., rows.quantity][..., None]
+    # The Cholesky factor of [[V, F], [F^T, F^T F + large]], with V the covariance of the rows in units of their noise
+    # and F the fixed part, holds the determinant of V and V^-1/2 F.
+    joint = np.empty((*sets, count + fixed, count + fixed))
+    joint[..., :count, :count] = covariance_in_noise(rows, noise)
+    joint[..., count:, :count] = np.swapaxes(scaled, -1, -2)
+    squares = np.swapaxes(scaled, -1, -2) @ scaled
+    large = 1.0 + np.trace(squares, axis1=-2, axis2=-1)
+    joint[..., count:, count:] = squares + large[..., None, None] * np.eye(fixed)
     factor = np.linalg.cholesky(joint)
-    explained = factor[..., size - fixed :, : size - fixed]
-    diagonal = np.diagonal(factor, axis1=-2, axis2=-1)[..., : size - fixed]
-    log_determinant = 2.0 * (np.log(deviations) @ products.counts + np.log(diagonal).sum(axis=-1))
-    by_data = total[..., :fixed, :fixed] - explained @ explained.swapaxes(-1, -2)
+    white, diagonal = factor[..., count:, :count], np.diagonal(factor, axis1=-2, axis2=-1)[..., :count]
+    log_determinant = 2.0 * (np.log(deviations) @ rows.counts + np.log(diagonal).sum(axis=-1))
+    by_data = white @ white.swapaxes(-1, -2)
     # Without priors: a prior that contradicts the data says nothing about the noise.
     _, _, squares, log_information = most_likely(by_data)
-    restricted = -0.5 * (log_determinant + squares + log_information)
-    relative = np.log(deviations / products.sizes)
-    if products.sizes.size == 1:
-        restricted = restricted + relative[..., 0]
-    restricted -= 0.5 * np.var(relative, axis=-1) / NOISE_RATIO**2
-    information, move, squares, _ = most_likely(by_data + products.prior)
-    count = int(products.counts.sum()) + products.priors
-    likelihood = -0.5 * (log_determinant + squares + count * math.log(2.0 * math.pi))
+    restricted = prior_of_noise(rows, deviations)[0] - 0.5 * (log_determinant + squares + log_information)
+    information, move, squares, _ = most_likely(by_data + rows.prior)
+    values = int(rows.counts.sum()) + rows.priors
+    likelihood = -0.5 * (log_determinant + squares + values * math.log(2.0 * math.pi))
     return Evaluation(restricted, likelihood, information, move, squares)
 
 
-def matrix_of_heights(total: Floats, rough: Any, fixed: int) -> Floats:
-    """Return K (..., heights, heights): the identity plus the information on heights relative to their roughness."""
-    random, rho2 = total[..., fixed:, fixed:], (rough**2)[..., None, None]
-    # On a very rough floor, rounding errors of the products would make K singular.
-    rounding = ROUNDING * np.trace(random, axis1=-2, axis2=-1)[..., None]
-    matrix = rho2 * random
-    np.einsum("...ii->...i", matrix)[...] += 1.0 + rho2[..., 0] * rounding
-    return np.asarray(matrix)
+def prior_of_noise(rows: Reduced, deviations: Floats) -> tuple[Any, Floats]:
+    """Return the logarithm of the prior density (...,) of noises (..., quantities), and its slope in log noises."""
+    relative = np.log(deviations / rows.sizes)
+    alone = rows.sizes.size == 1
+    centred = relative - relative.mean(axis=-1, keepdims=True)
+    density = -0.5 * np.mean(centred**2, axis=-1) / NOISE_RATIO**2
+    return density + alone * relative[..., 0], alone - centred / (rows.sizes.size * NOISE_RATIO**2)
+
+
+def restricted_with_slope(rows: Reduced, noise: Noise) -> tuple[float, Floats]:
+    """Return the restricted likelihood of one noise level, and its slope in the logarithms (quantities + 2,).
+
+    Source: Lindstrom and Bates, J. Am. Stat. Assoc. 83 (1988), with P = V^-1 - V^-1 J (J^T V^-1 J)^-1 J^T V^-1.
+    """
+    scale, quantities = 1.0 / noise.measurement[rows.quantity], np.eye(rows.sizes.size)[rows.quantity]
+    V, fixed = covariance_in_noise(rows, noise), rows.fixed * scale[:, None]
+    inverse = np.linalg.inv(V)
+    solved = inverse @ fixed
+    information, move, squares, log_information = most_likely(fixed.T @ solved)
+    left = solved @ np.append(1.0, -move)
+    P = inverse - solved[:, 1:] @ np.linalg.pinv(information, LOST_INFORMATION, hermitian=True) @ solved[:, 1:].T
+    unexplained = P - np.outer(left, left)
+    density, slope = prior_of_noise(rows, noise.measurement)
+    log_determinant = 2.0 * np.log(noise.measurement) @ rows.counts + np.linalg.slogdet(V)[1]
+    by_noise = slope - np.diag(unexplained) @ quantities - (rows.counts - quantities.sum(axis=0))
+    scaled = unexplained * scale * scale[:, None]
+    by_process = -(noise.process**2) * np.einsum("ij,sij->s", scaled, rows.covariance)
+    restricted = density - 0.5 * (log_determinant + squares + log_information)
+    return float(restricted), np.append(by_noise, by_process)
+
+
+def covariance_in_noise(rows: Reduced, noise: Noise) -> Floats:
+    """Return the covariance (..., rows, rows) of the rows in units of their measurement noise."""
+    scale = 1.0 / np.asarray(noise.measurement)[..., rows.quantity]
+    disturbed = np.einsum("...s,sij->...ij", noise.process**2, rows.covariance)
+    covariance = disturbed * scale[..., None, :] * scale[..., :, None]
+    # Large disturbances would hide the noise in rounding errors, and make the matrix singular.
+    rounding = ROUNDING * np.trace(covariance, axis1=-2, axis2=-1)[..., None]
+    np.einsum("...ii->...i", covariance)[...] += 1.0 + rounding
+    return np.asarray(covariance)
 
 
 def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
     """Return information, step to the most likely unknowns, sum of squares there, and the information's determinant.
 
-    reduced  (..., 1 + unknowns, 1 + unknowns) products of residuals and derivatives, without what the heights explain
+    reduced  (..., 1 + unknowns, 1 + unknowns) products of whitened residuals and derivatives
 
     The determinant is returned as its logarithm, over those eigenvalues that exceed rounding errors.
     """
@@ -155,58 +212,80 @@ def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
     return information, move, squares, np.log(sizes).sum(axis=-1)
 
 
-def most_probable_heights(products: Products, noise: Noise, move: Floats) -> Floats:
-    """Return the most probable floor heights (heights,) for one noise level, at a step (unknowns,) of the unknowns."""
-    total = np.einsum("qij,q->ij", products.sums, noise.measurement**-2.0)
-    fixed, rough = 1 + products.unknowns, np.asarray(noise.roughness_m)
-    seen = total[fixed:, :fixed] @ np.append(1.0, -move)
-    return np.asarray(rough**2 * np.linalg.solve(matrix_of_heights(total, rough, fixed), seen))
+def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Floats:
+    """Return the most probable heights (m) and kicks (heights + kicks,) at a step (unknowns,) of the unknowns."""
+    scale = 1.0 / noise.measurement[rows.quantity]
+    left = scale * (rows.fixed @ np.append(1.0, -move))
+    spread = noise.spread(rows.G.shape[1], rows.kicks)
+    return np.asarray(spread**2 * (rows.G.T @ (scale * np.linalg.solve(covariance_in_noise(rows, noise), left))))
 
 
-def noise_at(logs: Floats, rough: bool) -> Noise:
-    """Return the standard deviations from their logarithms (..., quantities); if `rough`, the roughness comes last."""
-    own = np.exp(logs)
-    return Noise(own[..., :-1], own[..., -1]) if rough else Noise(own, np.zeros(own.shape[:-1]))
-
-
-def estimate_noise(products: Products, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
+def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    The search starts from the likeliest of `start` and several rough floors, and from even ground.
+    Without disturbances, with each alone and with both, the search starts from the likeliest of several; fewer
+    disturbances are the simpler explanation, which wins unless another raises the likelihood.
     """
-    from scipy.optimize import minimize
-
-    def costs(logs: Floats, rough: bool) -> tuple[float, Floats]:
-        moves = LOG_STEP * np.vstack((np.zeros(logs.size), np.eye(logs.size), -np.eye(logs.size)))
-        own = -evaluate(products, noise_at(logs + moves, rough)).restricted
-        return own[0], (own[1 : 1 + logs.size] - own[1 + logs.size :]) / (2.0 * LOG_STEP)
-
-    low, high = (math.log(share * leg_length_m) for share in ROUGHNESS_BOUNDS)
-    widest = np.maximum(products.sizes, 2.0 * floors)
-    bounds = [*zip(np.log(floors).tolist(), np.log(widest).tolist(), strict=True), (low, high)]
-    middle = np.maximum(start.measurement, 2.0 * floors)
-    pairs = [np.append(np.maximum(share * middle, floors), rough * leg_length_m) for share, rough in NOISE_STARTS]
-    if start.roughness_m > NEARLY_EVEN * leg_length_m:
-        pairs.append(np.append(middle, start.roughness_m))
-    likelihoods = evaluate(products, noise_at(np.log(pairs), True)).restricted
+    units = np.array((leg_length_m, 1.0))
+    widest, middle = np.maximum(rows.sizes, 2.0 * floors), np.maximum(start.measurement, 2.0 * floors)
+    measured = np.log([np.clip(factor * middle, floors, widest) for factor in NOISE_FACTORS])
+    levels = np.log(DISTURBANCES)
+    found: dict[tuple[int, ...], Floats] = {}
     best, most = start, -math.inf
-    for logs in (np.log(pairs[int(np.argmax(likelihoods))]), np.log(middle)):
-        rough = logs.size > middle.size
-        result = minimize(costs, logs, (rough,), "L-BFGS-B", jac=True, bounds=bounds[: logs.size])
-        # Even ground is the simpler explanation, so it wins unless a roughness raises the likelihood.
-        if -result.fun > most or (not rough and -result.fun > most - 1e-6):
-            likeliest = noise_at(result.x, rough)
-            best, most = Noise(likeliest.measurement, float(likeliest.roughness_m)), float(-result.fun)
+    for sources in rows.disturbed_by():
+        starts = [np.append(own, level) for own in measured for level in levels] if sources else [np.log(middle)]
+        if len(sources) == 2:  # one disturbance more than what explains the walk best alone
+            starts = [np.insert(found[(0,)], middle.size + 1, level) for level in levels]
+            starts += [np.insert(found[(1,)], middle.size, level) for level in levels]
+        before = (start.process / units)[list(sources)]
+        if sources and before.min() > NEARLY_NONE:
+            starts.append(np.log(np.append(middle, before)))
+        ends = zip((floors, widest), DISTURBANCE_BOUNDS, strict=True)
+        bounds = np.log([np.append(own, [bound] * len(sources)) for own, bound in ends]).T
+        found[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
+        if likelihood > most + SIMPLER:
+            best, most = noise_at(found[sources], sources, leg_length_m), likelihood
     return best
 
 
-def whitening(G: Floats, quantity: NDArray[np.int64], noise: Noise) -> Callable[[Floats], Floats]:
+def climb(
+    rows: Reduced, starts: Sequence[Floats], bounds: Floats, sources: tuple[int, ...], leg_length_m: float
+) -> tuple[Floats, float]:
+    """Maximise the restricted likelihood over logarithms as in `noise_at`; return them, and the likelihood there.
+
+    The search starts from the likeliest of `starts`.
+    """
+    from scipy.optimize import minimize
+
+    free = [*range(rows.sizes.size), *(rows.sizes.size + source for source in sources)]
+
+    def costs(logs: Floats) -> tuple[float, Floats]:
+        restricted, slope = restricted_with_slope(rows, noise_at(logs, sources, leg_length_m))
+        return -restricted, -slope[free]
+
+    likelihoods = evaluate(rows, noise_at(np.array(starts), sources, leg_length_m)).restricted
+    result = minimize(costs, starts[int(np.argmax(likelihoods))], method="L-BFGS-B", jac=True, bounds=bounds)
+    return result.x, float(-result.fun)
+
+
+def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) -> Noise:
+    """Return the standard deviations from their logarithms (..., quantities + sources); other disturbances are zero.
+
+    leg_length_m  unit of the heights' deviation (m)
+    """
+    own, count = np.exp(logs), logs.shape[-1] - len(sources)
+    process = np.zeros((*logs.shape[:-1], 2))
+    process[..., list(sources)] = own[..., count:]
+    return Noise(own[..., :count], leg_length_m * process[..., 0], process[..., 1])
+
+
+def whitening(data: Linearised, noise: Noise) -> Callable[[Floats], Floats]:
     """Return a function that whitens values (values,), or columns (values, n), of a walk with this noise.
 
-    It makes values of covariance G G^T roughness^2 + noise^2 independent, of unit variance.
+    It makes values of covariance G D^2 G^T + noise^2 independent, of unit variance, with D the disturbances' spread.
     """
-    scale = 1.0 / noise.measurement[quantity]
-    U, s, _ = np.linalg.svd(noise.roughness_m * G * scale[:, None], full_matrices=False)
+    scale = 1.0 / noise.measurement[data.quantity]
+    U, s, _ = np.linalg.svd(data.G * data.spread(noise) * scale[:, None], full_matrices=False)
     shrink = 1.0 - 1.0 / np.sqrt(1.0 + s**2)
 
     def whiten(values: Floats) -> Floats:

@@ -51,8 +51,10 @@ class WalkMap(Protocol):
     def sampled(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
         """Return the legs' angles (times, 2), first swing leg first, at times counted from the first heel strike."""
 
-    def varied(self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ...) -> VariedWalk | None:
-        """Differentiate the walk and its samples along columns (d + steps + 1, columns) of start and heights."""
+    def varied(
+        self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ..., kicked: bool = ...
+    ) -> VariedWalk | None:
+        """Differentiate the walk and its samples along columns (d + steps + 1, columns), and by kicks if `kicked`."""
 
 
 class Prediction(NamedTuple):
@@ -82,6 +84,7 @@ class Forecast:
     measured: MeasuredWalk
     nuisances: tuple[str, ...] = ()
     in_phase: bool = True  # whether angles are compared at fractions of each step rather than at their sample times
+    kicked: bool = False  # whether kicks disturb the walk besides the floor's heights
 
     @property
     def unknowns(self) -> int:
@@ -160,17 +163,20 @@ class Forecast:
         values = np.concatenate((*self._by_step(walk, sensors), (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
         return Prediction(values, walk, times, inside, angles)
 
-    def differentiate(self, u: Floats, heights_m: Floats, lifts: Floats, exact: bool) -> tuple[Floats, Floats] | None:
-        """Return derivatives for the unknowns, (values, unknowns), and for heights along `lifts`, (values, lifts).
+    def differentiate(
+        self, u: Floats, heights_m: Floats, exact: bool, disturbed: bool = True
+    ) -> tuple[Floats, Floats] | None:
+        """Return derivatives for the unknowns, (values, unknowns), and for disturbances, (values, heights + kicks).
 
-        lifts  (heights, lifts) changes of the heights
-        exact  whether differences over parameters are of 4th order, one-sided where a walk on one side fails
+        exact      whether differences over parameters are of 4th order, one-sided where a walk on one side fails
+        disturbed  whether derivatives for disturbances are wanted, too
         """
         # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
         prediction, starts = self.predict(u, heights_m), self.directions.shape[1]
         if prediction is None:
             return None
         by_parameter = [self.slope_along(u, unit, heights_m, exact) for unit in np.eye(u.size)[: self.scales.size]]
+        lifts = np.eye(heights_m.size, heights_m.size if disturbed else 0)
         tangents = self._tangents(u, heights_m, lifts, prediction)
         if tangents is None or any(column is None for column in by_parameter):
             return None
@@ -215,19 +221,20 @@ class Forecast:
     def _tangents(
         self, u: Floats, heights_m: Floats, lifts: Floats, prediction: Prediction
     ) -> tuple[Floats, Floats] | None:
-        """Return derivatives for start and heights, (values, starts + lifts), and for sensors, (values, nuisances)."""
+        """Return derivatives for start and disturbances, (values, columns), and for sensors, (values, nuisances)."""
         sensors, walk = self.sensors(u), prediction.walk
         z, starts = self.start(u), self.directions.shape[1]
         along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
         settling = settling_along(self.walks, self._unsettled(u), self.parameters(u), self.directions)
         along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
-        varied = self.walks.varied(z, self.parameters(u), heights_m, along, prediction.times_s)
+        kicked = self.kicked and lifts.size > 0
+        varied = self.walks.varied(z, self.parameters(u), heights_m, along, prediction.times_s, kicked)
         if varied is None:
             return None
         angles, count = prediction.angles_rad, self.measured.count
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
         moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
-        moves = np.concatenate((*self._by_step(varied, sensors), moving.swapaxes(1, 2).reshape(-1, along.shape[1])))
+        moves = np.concatenate((*self._by_step(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1])))
         clock = 0.0 if self.in_phase else -self._measured_times()[:, None] / sensors[CLOCK] ** 2
         own = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
         by_sensor = np.zeros((self.values.size, len(self.nuisances)))

@@ -365,6 +365,15 @@ def step_length_changes(model: RigidModel, ends: Any, starts_turn: Any, ends_tur
     return np.asarray(ahead - model.radius * (ends_turn[:, :, STANCE] - starts_turn[:, :, STANCE]))
 
 
+def mass_matrix(model: RigidModel, y: Any) -> Floats:
+    """Compute the mass matrix (n, n) of the bodies' rates (kg m^2), without couplings."""
+    n = len(model.arm_x)
+    s, c, F, U, r = np.zeros((5, n))
+    M = np.zeros((n, n))
+    equations(model, y, s, c, F, U, M, r)
+    return M
+
+
 def kinetic_energy(model: RigidModel, y: Any) -> float:
     """Compute the kinetic energy (J)."""
     return energies(model, y)[0]

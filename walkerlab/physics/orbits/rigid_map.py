@@ -29,6 +29,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     SWING,
     RigidModel,
     feet_on_slope,
+    mass_matrix,
     momentum,
     step_length_changes,
     step_lengths,
@@ -63,6 +64,7 @@ LONG_WALKS = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)  # tolerances for attrac
 MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 KEPT_METHODS = 4  # one for each number of tangent columns
+LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples count as at this time
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
@@ -121,6 +123,17 @@ class Steps(NamedTuple):
     z: Floats  # (steps, d) section coordinates after each step
     DP: Floats  # (steps, d, d) derivatives with respect to the start; empty unless requested
     strikes: HeelStrikes
+
+
+class StepTangents(NamedTuple):
+    """Derivatives of a step by its start (m = 2 n values) and by the rise of its foothold."""
+
+    end: Floats  # (m,) state before the heel strike
+    rates: Floats  # (times, 2) rates of swing and stance leg at the sample times
+    waits: Floats  # (m + 1,) derivatives of the duration
+    before: Floats  # (m + 1, m) of the state before the heel strike
+    after: Floats  # (m + 1, m) of the state after it
+    samples: Floats  # (times, m + 1, 2) of the angles of swing and stance leg at the sample times
 
 
 class Memory(NamedTuple):
@@ -186,21 +199,27 @@ class RigidStepper(local):
         status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)
         return Outcome(status), completed
 
-    def walk_along(
-        self,
-        section: StrikeSection,
-        start: Floats,
-        columns: Floats,
-        lift: Floats,
-        floor: tuple[Floats, float],
-        observer: Observer,
-    ) -> tuple[Outcome, HeelStrikes, int]:
-        """Walk from a state (2 n,) with tangent columns (columns, 2 n), along which the rises change by `lift`."""
-        y = np.concatenate((start, columns.ravel()))
-        strikes: HeelStrikes = new_heel_strikes(floor[0].size - 1, y.size, True, *floor, len(columns))
-        strikes.lift[:] = lift
-        outcome, completed = self._walk(section, self.with_columns(len(columns)), observer, y, strikes)
-        return outcome, strikes, completed
+    def differentiate(
+        self, section: StrikeSection, start: Floats, floor: tuple[Floats, float], times: Floats
+    ) -> StepTangents | None:
+        """Differentiate a step from a state (2 n,) by that state and the step's rise; None if the step fails.
+
+        floor  rises (2,) and nearest landing, as in `HeelStrikes`
+        times  of samples, from the start of the step
+        """
+        m = start.size
+        y = np.concatenate((start, TANGENT_SCALE * np.eye(m + 1, m).ravel()))
+        strikes: HeelStrikes = new_heel_strikes(1, y.size, True, *floor, m + 1)
+        strikes.lift[1, m] = TANGENT_SCALE
+        observer = new_observer(times, y.size)._replace(watching=times.size > 0)
+        outcome, _ = self._walk(section, self.with_columns(m + 1), observer, y, strikes)
+        if outcome is not Outcome.WALKED:
+            return None
+        before, after = (states.reshape(m + 2, m) for states in (strikes.before, strikes.after))
+        samples, legs = observer.states.reshape(times.size, m + 2, m), [SWING, STANCE]
+        rates = samples[:, 0, m // 2 :][:, legs]
+        by = (strikes.waits[0], before[1:], after[1:], samples[:, 1:, legs])
+        return StepTangents(before[0], rates, *(each / TANGENT_SCALE for each in by))
 
     def solve_starts(self, section: StrikeSection, gaits: list[tuple[Floats, Floats]], starts: Floats) -> Integers:
         """Run Newton's method from starts (starts, d), overwritten with the last points tried.
@@ -360,37 +379,55 @@ class RigidMap(StepMap):
         return by_leg(observer.states[:, [SWING, STANCE]], observer.steps)
 
     def varied(
-        self, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats = NO_TIMES
+        self,
+        z: Floats,
+        p: float,
+        heights_m: Floats,
+        along: Floats,
+        times_s: Floats = NO_TIMES,
+        kicked: bool = False,
     ) -> VariedWalk | None:
-        """Differentiate a walk with tangent columns: variational equations in swings, saltation at strikes."""
+        """Differentiate a walk by the chain rule over its steps, each by its whole start and its rise."""
         unit = self._unit_at(p)
         if unit is None:
             return None
-        walker, units, d = unit.walker, unit.units, z.size
-        start, (n, count) = np.array(state_on_section(walker, z)), (len(walker.arm_x), along.shape[1])
-        columns = TANGENT_SCALE * along[:d].T @ unit.section.basis
-        lift = TANGENT_SCALE / units.length * np.diff(along[d:], axis=0, prepend=along[d : d + 1])
-        observer = new_observer(times_s / units.time, 2 * n * (1 + count))._replace(watching=times_s.size > 0)
-        outcome, strikes, steps = self._exact.walk_along(
-            unit.section, start, columns, lift, unit.floor(z, heights_m), observer
-        )
-        if outcome is not Outcome.WALKED:
+        walker, units, (d, m), steps = unit.walker, unit.units, unit.section.basis.shape, heights_m.size - 1
+        rises, nearest = unit.floor(z, heights_m)
+        walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
+        if walk.outcome is not Outcome.WALKED:
             return None
-        before, after = (
-            states.reshape(steps, 1 + count, 2 * n)[:, 1:] / TANGENT_SCALE for states in (strikes.before, strikes.after)
-        )
-        starts = np.concatenate((columns[None] / TANGENT_SCALE, after))[:-1]
-        lengths = step_length_changes(walker, strikes.before[:, : 2 * n], starts, before)
-        samples = observer.states.reshape(times_s.size, 1 + count, 2 * n)[:, :, [SWING, STANCE]]
-        since = np.concatenate((np.zeros((1, count)), np.cumsum(strikes.waits, axis=0)))[observer.steps] / TANGENT_SCALE
-        rates = observer.states[:, [n + SWING, n + STANCE]]
-        by = samples[:, 1:] / TANGENT_SCALE - since[:, :, None] * rates[:, None]
+        starts, touches = np.vstack((state_on_section(walker, z), walk.strikes.after)), np.append(0.0, walk.time)
+        kicks = [unit_kicks(unit, start) for start in starts[1:-1]] if kicked else []
+        given, count = along.shape[1], along.shape[1] + sum(map(len, kicks))
+        lifts = np.zeros((steps + 1, count))
+        lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
+        columns, since = np.zeros((count, m)), np.zeros(count)
+        columns[:given] = along[:d].T @ unit.section.basis
+        of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
+        parts = list[tuple[Floats, ...]]()
+        for step, start in enumerate(starts[:-1]):
+            room = LAST_SAMPLE * (touches[step + 1] - touches[step])
+            times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
+            tangents = self._exact.differentiate(unit.section, start, (rises[step : step + 2], nearest), times)
+            if tangents is None:
+                return None
+            moved = np.column_stack((columns, lifts[step + 1]))
+            before, after = moved @ tangents.before, moved @ tangents.after
+            lengths = step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
+            samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
+            parts.append((moved @ tangents.waits, lengths, after[:, STANCE], tangents.rates, samples))
+            columns, since = after, since + parts[-1][0]
+            if step < len(kicks):
+                first = given + sum(map(len, kicks[:step]))
+                columns[first : first + len(kicks[step])] = kicks[step]
+        durations, lengths, angles = (np.array(each) for each in list(zip(*parts, strict=True))[:3])
+        rates, samples = (np.concatenate(each) for each in list(zip(*parts, strict=True))[3:])
         return VariedWalk(
-            strikes.waits * (units.time / TANGENT_SCALE),
+            durations * units.time,
             lengths * units.length,
-            after[:, :, STANCE],
-            by_leg(rates, observer.steps) / units.time,
-            by_leg(by, observer.steps),
+            angles,
+            by_leg(rates, of_step) / units.time,
+            by_leg(samples, of_step),
         )
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
@@ -444,6 +481,18 @@ def by_leg(angles: Floats, steps: Integers) -> Floats:
     """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
     swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
     return np.where(swaps, angles[..., ::-1], angles)
+
+
+def unit_kicks(unit: SimilarWalker, start: Floats) -> Floats:
+    """Return independent changes (kicks, 2 n) of the rates in a state (2 n,) just after heel strike.
+
+    Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
+    there. s makes the kinetic energy of such a change that of the walk, on average.
+    """
+    n, free = start.size // 2, unit.section.basis[1:]
+    M = mass_matrix(unit.walker, start)
+    size = math.sqrt(float(start[n:] @ M @ start[n:]) / len(free))
+    return np.asarray(size * np.linalg.solve(np.linalg.cholesky(free[:, n:] @ M @ free[:, n:].T), free))
 
 
 class SimilarWalker(NamedTuple):

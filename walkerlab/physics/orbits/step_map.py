@@ -117,11 +117,21 @@ class StepMap(Stepper, Protocol):
         """
 
     def varied(
-        self, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats = NO_TIMES
+        self,
+        z: Floats,
+        p: float,
+        heights_m: Floats,
+        along: Floats,
+        times_s: Floats = NO_TIMES,
+        kicked: bool = False,  # noqa: ARG002
     ) -> VariedWalk | None:
         """Differentiate `disturbed` and its samples along columns (d + steps + 1, columns) of z and heights (m).
 
-        Takes difference quotients unless overridden. Returns None if the walk, or a slightly changed one, ends early.
+        kicked  whether columns for changes of the rates at heel strikes follow, for each strike between two steps as
+                many as rates are free there
+
+        Takes difference quotients unless overridden, and knows no kicks. Returns None if the walk, or a slightly
+        changed one, ends early.
         """
         columns = [differentiate_along(self, z, p, heights_m, column, times_s) for column in along.T]
         if not columns or any(column is None for column in columns):
