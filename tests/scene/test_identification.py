@@ -38,7 +38,7 @@ def verdict(result):
 
 def test_regions_hold_the_truth_and_errors_are_as_large_as_the_spread():
     """Of twelve walks more than two lie outside with a probability of 2 %; the script does a thousand."""
-    inside, estimates, errors = CAMPAIGN["coverage"](truth(), range(12))
+    inside, estimates, errors, _ = CAMPAIGN["coverage"](truth(), range(12))
     assert inside.sum() >= 10
     ratio = np.sqrt((errors**2).mean(axis=0)) / np.abs(estimates - truth().values).std(axis=0, ddof=1)
     assert np.all((ratio > 0.4) & (ratio < 3.0))
@@ -99,7 +99,7 @@ def test_derivatives_equal_differences_of_other_sizes():
     forecast = problem_of(subject, measured, Identify(fit=dict.fromkeys(KEYS))).forecast
     u, heights = np.zeros(forecast.unknowns), np.zeros(forecast.heights)
     u[:2] = own.values / forecast.scales
-    J, _ = forecast.differentiate(u, heights, np.zeros((heights.size, 0)), exact=True)
+    J, _ = forecast.differentiate(u, heights, exact=True, disturbed=False)
     for place, unit in enumerate(np.eye(u.size)):
         for size in (3e-5, 3e-4):
             ends = [forecast.predict(u + sign * size * unit, heights).values for sign in (-2, -1, 1, 2)]

@@ -333,7 +333,7 @@ def measurement_noise(fitted: Fitted) -> dict[str, float]:
 def process_noise(fitted: Fitted) -> dict[str, Any]:
     """Return the floor's roughness and the kicks, with standard errors; kicks are None where they are not estimated."""
     noise, kicks = fitted.noise, fitted.data.kicks
-    unseen = "" if kicks else "only steps with lengths, or angles, of the rigid model tell kicks from a rough floor"
+    reason = "" if kicks else "only lengths or angles tell kicks from a rough floor, and only with the rigid model"
     return {
         "roughness_m": noise.roughness_m,
         "share_of_leg": noise.roughness_m / fitted.problem.leg_length_m,
@@ -341,7 +341,7 @@ def process_noise(fitted: Fitted) -> dict[str, Any]:
         "at_bound": noise.roughness_m == 0.0,
         "kick": noise.kick if kicks else None,
         "kick_standard_error": error_of_noise(fitted, "kick"),
-        "kick_unknown": unseen,
+        "kick_reason": reason,
     }
 
 

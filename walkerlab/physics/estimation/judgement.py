@@ -22,13 +22,14 @@ SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; the residual of
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
 PHASE_BINS: Final = 20
 UNUSUALLY_ROUGH: Final = 0.003  # fraction of the leg length; the floor of a laboratory is rough by about 0.001
+UNUSUAL_KICK: Final = 0.05  # fraction of the rates
 DEPENDENT: Final = 2.4  # largest acceptable scatter of averaged residuals, as a normal deviate: 0.8 % of right walks
 
 
 def judge(fitted: Fitted) -> tuple[Fit, tuple[str, ...]]:
     """Return whether a model fits, and the reasons if it does not or if its errors are doubtful."""
     fit, reason = judge_fit(fitted)
-    reasons = (reason,) if reason else (*implausible_floor(fitted), *dependent_residuals(fitted))
+    reasons = (reason,) if reason else (*implausible_disturbances(fitted), *dependent_residuals(fitted))
     return ("fits-but" if reasons and fit == "fits" else fit), reasons
 
 
@@ -65,13 +66,18 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
     return "fits", ""
 
 
-def implausible_floor(fitted: Fitted) -> Iterator[str]:
-    """Yield what is wrong with a floor that is rougher than floors are."""
+def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
+    """Yield what is wrong with a floor that is rougher than floors are, or with large kicks."""
     roughness, leg = fitted.noise.roughness_m, fitted.problem.leg_length_m
     if roughness > UNUSUALLY_ROUGH * leg:
         yield (
             f"the floor would be {1e3 * roughness:.2g} mm rough, {100.0 * roughness / leg:.2g} % of the leg "
             "(a laboratory's: 0.1 %), so something else disturbs the walk, or a fixed parameter is wrong"
+        )
+    if fitted.noise.kick > UNUSUAL_KICK:
+        yield (
+            f"the rates would change at random by {100.0 * fitted.noise.kick:.2g} % at heel strikes, so something else "
+            "disturbs the walk, or a fixed parameter is wrong"
         )
 
 

@@ -109,16 +109,22 @@ class Reduced(NamedTuple):
 
 
 def reduce(data: Linearised) -> Reduced:
-    columns = np.column_stack((data.residuals, data.J, data.G))
+    # In this order, triangular factors keep what only the noise explains apart from what disturbances explain.
+    columns = np.column_stack((data.G, data.J, data.residuals))
     parts = [columns[data.quantity == q] for q in range(data.sizes.size)]
     rows = [part if len(part) <= part.shape[1] else np.linalg.qr(part, mode="r") for part in parts]
-    counts, first = np.array([len(part) for part in parts]), 1 + data.J.shape[1]
-    whole, heights = np.concatenate(rows), columns.shape[1] - data.kicks
-    covariance = np.array([part @ part.T for part in (whole[:, first:heights], whole[:, heights:])])
-    quantity = np.repeat(np.arange(data.sizes.size), [len(part) for part in rows])
-    prior = data.prior.T @ data.prior
+    whole, disturbances = np.concatenate(rows), data.G.shape[1]
+    G, heights = whole[:, :disturbances], disturbances - data.kicks
     return Reduced(
-        whole[:, :first], whole[:, first:], covariance, quantity, counts, prior, len(data.prior), data.sizes, data.kicks
+        fixed=np.column_stack((whole[:, -1], whole[:, disturbances:-1])),
+        G=G,
+        covariance=np.array([part @ part.T for part in (G[:, :heights], G[:, heights:])]),
+        quantity=np.repeat(np.arange(data.sizes.size), [len(part) for part in rows]),
+        counts=np.array([len(part) for part in parts]),
+        prior=data.prior.T @ data.prior,
+        priors=len(data.prior),
+        sizes=data.sizes,
+        kicks=data.kicks,
     )
 
 
@@ -245,7 +251,7 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
         found[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
         if likelihood > most + SIMPLER:
             best, most = noise_at(found[sources], sources, leg_length_m), likelihood
-    return best
+    return Noise(best.measurement, float(best.roughness_m), float(best.kick))
 
 
 def climb(

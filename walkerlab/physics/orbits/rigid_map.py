@@ -487,12 +487,12 @@ def unit_kicks(unit: SimilarWalker, start: Floats) -> Floats:
     """Return independent changes (kicks, 2 n) of the rates in a state (2 n,) just after heel strike.
 
     Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
-    there. s makes the kinetic energy of such a change that of the walk, on average.
+    there. s makes such a change as large as the rates, on average.
     """
-    n, free = start.size // 2, unit.section.basis[1:]
-    M = mass_matrix(unit.walker, start)
-    size = math.sqrt(float(start[n:] @ M @ start[n:]) / len(free))
-    return np.asarray(size * np.linalg.solve(np.linalg.cholesky(free[:, n:] @ M @ free[:, n:].T), free))
+    free, rates = unit.section.basis[1:], coordinates_of(unit.walker, start)[1:]
+    M = free[:, start.size // 2 :] @ mass_matrix(unit.walker, start) @ free[:, start.size // 2 :].T
+    kicks = np.linalg.inv(np.linalg.cholesky(M))
+    return np.asarray(np.linalg.norm(rates) / np.linalg.norm(kicks) * kicks @ free)
 
 
 class SimilarWalker(NamedTuple):

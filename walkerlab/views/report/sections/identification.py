@@ -174,10 +174,12 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def noise_in_words(summary: Mapping[str, Any]) -> str:
-    """Describe the roughness of the floor and the noise of the measurement."""
+    """Describe the disturbances of the walk and the noise of the measurement."""
     process = summary["noise"]["process"]
     floor, share = (number(value, 2) for value in (1e3 * process["roughness_m"], 100.0 * process["share_of_leg"]))
     parts = [f"floor {floor} mm rough, {share} % of the leg" if process["roughness_m"] else "an even floor"]
+    if process["kick"]:
+        parts.append(f"rates that change by {number(100.0 * process['kick'], 2)} % at heel strikes")
     parts += [
         f"{axis_label(name)} measured to {quantity(value, unit_by_name(name), 2)}"
         for name, value in summary["noise"]["measurement"].items()
