@@ -13,6 +13,7 @@ from walkerlab.config.loader import load
 from walkerlab.errors import NoAnswer
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import MeasuredWalk
+from walkerlab.physics.estimation.result import USABLE
 from walkerlab.physics.orbits.step_map import StepMap
 from walkerlab.scene.identification import identify_walk, problem_of
 from walkerlab.scene.subject import find_model_gait
@@ -63,7 +64,7 @@ def test_steps_that_a_rough_floor_moves_far_from_the_gait_are_no_misfit(seed):
     """The floor alone moves the simplest walker's angles by 5 % of their size at the same phase of every step."""
     own = truth("angles", "simplest")
     result = own.identify(*own.walk(seed))
-    assert verdict(result) == "fits"
+    assert verdict(result) in USABLE
     assert CAMPAIGN["region_holds"](result, own.values)
 
 

@@ -35,7 +35,8 @@ Psychometrika 78 (2013).
 """
 MOST_NUMBERS: Final = 4_000_000  # of the matrices of all noise levels that are evaluated together
 ROUNDING: Final = 1e-14  # relative rounding error of a covariance
-SIMPLER: Final = 1e-6  # gain of the log-likelihood up to which the simpler explanation wins
+LEAST_GAINS: Final = (1e-6, 0.5)
+"""Gains of the log-likelihood up to which a walk without heights, or without kicks, is the better explanation."""
 # eigenvalues of scaled information below this fraction of the largest are rounding errors
 LOST_INFORMATION: Final = 1e-13
 
@@ -249,7 +250,7 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
         ends = zip((floors, widest), DISTURBANCE_BOUNDS, strict=True)
         bounds = np.log([np.append(own, [bound] * len(sources)) for own, bound in ends]).T
         found[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
-        if likelihood > most + SIMPLER:
+        if likelihood > most + LEAST_GAINS[1 in sources]:
             best, most = noise_at(found[sources], sources, leg_length_m), likelihood
     return Noise(best.measurement, float(best.roughness_m), float(best.kick))
 
