@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 
+from browser import PATIENCE
+
 
 class Served:
     def __init__(self, folder, *options):
@@ -26,7 +28,7 @@ class Served:
         """Status and answer; the token is given unless other headers are."""
         text = body if body is None or isinstance(body, str) else json.dumps(body)
         # Closed whatever happens: an error keeps the socket alive, and warns when it is freed, in any later test.
-        with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)) as connection:
+        with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)) as connection:
             connection.request("GET" if body is None else "POST", path, text, headers or self.bearer)
             answer = connection.getresponse()
             said = answer.read()
