@@ -118,7 +118,7 @@ def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkey
 
 def test_a_librarys_series_ends_with_the_run_that_exhausts_its_budget(reference, monkeypatch):
     sizes = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853", Checkpoint(None, "")).runs]
-    monkeypatch.setattr(ladder, "LIBRARY_BUDGET", sizes[2] - 1)
+    monkeypatch.setattr(ladder, "LIBRARY_RUN_BUDGET", sizes[2] - 1)
     monkeypatch.setattr(ladder, "LAST_RUN_SIZE", sizes[1] + 1)
     library, ours = (ascend(TRIAL, method, Checkpoint(None, "")) for method in ("scipy-dop853", "dop853"))
     rows = [make_row(library, run, reference) for run in library.runs]

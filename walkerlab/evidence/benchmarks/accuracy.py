@@ -8,7 +8,7 @@ from walkerlab.config.reads import SceneConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
 from walkerlab.evidence.benchmarks.ladder import (
-    LIBRARY_BUDGET,
+    LIBRARY_RUN_BUDGET,
     MAX_REPEATS,
     RUN_BUDGET,
     Ascent,
@@ -110,7 +110,7 @@ def summarise(
         "repeats": MAX_REPEATS,
         "rigid_velocity_factor": START_RATE_FACTOR,
         "budget": RUN_BUDGET,
-        "library_budget": LIBRARY_BUDGET,
+        "library_budget": LIBRARY_RUN_BUDGET,
         "reference": {
             name: {
                 "method": reference.first.method,

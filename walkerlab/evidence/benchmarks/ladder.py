@@ -21,7 +21,7 @@ from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
 # sizes of runs, in right-hand sides
 RUN_BUDGET = 200_000  # limit of a compiled run, which ends hopeless runs
 # A library's right-hand sides take a hundred times as long, because its steps run in Python.
-LIBRARY_BUDGET = 20_000  # limit of a library's run
+LIBRARY_RUN_BUDGET = 20_000  # limit of a library's run
 LAST_RUN_SIZE = 12_000  # size of a library's run after which its ladder ends
 WARM_UP_BUDGET = 2_000  # enough to compile and load everything
 MAX_REPEATS, REPEAT_TIME_S = 7, 0.2
@@ -94,7 +94,7 @@ def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
     """Run a method at tighter and tighter tolerances until a run is too expensive; resume runs of the checkpoint."""
     ladder, budget, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
     if method not in METHODS or not METHODS[method].compiled:
-        ladder, budget, last = LIBRARY_LADDER, LIBRARY_BUDGET, LAST_RUN_SIZE
+        ladder, budget, last = LIBRARY_LADDER, LIBRARY_RUN_BUDGET, LAST_RUN_SIZE
     trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     runs: list[MethodRun] = []
     for tolerance in ladder:
