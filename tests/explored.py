@@ -1,11 +1,14 @@
 """`walkerlab explore` as a process, and how it is asked."""
 
+import contextlib
 import http.client
 import json
 import re
 import signal
 import subprocess
 import sys
+
+from browser import PATIENCE
 
 
 class Served:
@@ -23,11 +26,12 @@ class Served:
 
     def asked(self, path, body=None, **headers):
         """Status and answer; the token is given unless other headers are."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
         text = body if body is None or isinstance(body, str) else json.dumps(body)
-        connection.request("GET" if body is None else "POST", path, text, headers or self.bearer)
-        answer = connection.getresponse()
-        said = answer.read()
+        # Closed whatever happens: an error keeps the socket alive, and warns when it is freed, in any later test.
+        with contextlib.closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)) as connection:
+            connection.request("GET" if body is None else "POST", path, text, headers or self.bearer)
+            answer = connection.getresponse()
+            said = answer.read()
         return answer.status, json.loads(said) if answer.headers[
             "Content-Type"
         ] == "application/json" else said.decode()

@@ -78,7 +78,8 @@ class Listener:
         self.ended.append(said)
 
     def announce_page(self, summary, folder):
-        self.pages.append((folder / summary["html"]).read_text())
+        if "html" in summary:
+            self.pages.append((folder / summary["html"]).read_text())
 
     def start(self, label, total=None):
         self.started.append((label, total))

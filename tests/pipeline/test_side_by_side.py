@@ -11,7 +11,7 @@ from walkerlab.pipeline.executor import any_side_by_side
 from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.store.artifact import read
 from walkerlab.pipeline.workers import WorkerDiedError
-from walkerlab.scene.omissions import STILL_COMPUTED
+from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED
 
 STEEP = "slope_rad=1.2"
 NUMBERS = ("drop", "roll", "bounce", "survey")
@@ -36,6 +36,33 @@ def test_processes_give_what_one_gives_and_none_is_left(toy, tmp_path, sets):
     assert set(two.left_out) == set(one.left_out)
     assert workers_below(os.getpid()) == []
     assert toy.execute("page", *sets, jobs=2).reused
+
+
+def with_picture_early(graph):
+    stages = with_page_early(graph).stages
+    walks = ("drop", "roll", "bounce")
+    return Graph(*(replace(stage, early_with=walks) if stage.name == "picture" else stage for stage in stages))
+
+
+def test_figures_are_on_the_page_before_the_long_stages_run(toy, listener):
+    toy.graph = with_picture_early(toy.graph)
+    toy.execute("page", reporter=listener)
+    walked = next(page for page in listener.pages if "'bounce'" in page)
+    assert "'picture'" in walked
+    assert f"survey: {STILL_COMPUTED}" in walked
+    assert "without ['survey']" not in (toy.runs / "paper/figures/figure-01.svg").read_text()
+
+
+@pytest.mark.parametrize(("jobs", "error"), [(1, KeyboardInterrupt), (2, WorkerDiedError)])
+def test_the_page_of_a_stopped_command_says_so(toy, jobs, error):
+    toy.graph = with_picture_early(toy.graph)
+    waits = "\n    while not (folder / 'report.html').exists():\n        time.sleep(0.01)\n    raise KeyboardInterrupt"
+    toy.edit("survey", "jobs):", f"jobs, folder):{waits}")
+    with pytest.raises(error):
+        toy.execute("page", jobs=jobs)
+    page = (toy.runs / "paper" / "report.html").read_text()
+    assert f"survey: {STOPPED}" in page
+    assert STILL_COMPUTED not in page
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

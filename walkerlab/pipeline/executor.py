@@ -18,7 +18,7 @@ from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.pipeline.task import Task, run_in_worker, task_of
 from walkerlab.pipeline.workers import WorkerPool
-from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
+from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ class Executor:
         self.answers: dict[str, Content] = {}
         self.left_out: dict[str, str] = {}
         self.done: list[Step] = []
+        self._early: dict[str, Content] = {}
         self._keys: dict[str, str] = {}
         self._waiting: list[Stage] = []
         self._running: dict[Future[Any] | None, RunningStage] = {}
@@ -88,7 +89,10 @@ class Executor:
                     self._start_ready_stages(pool if side_by_side else None)
                     while self._working and not self._events.get()():
                         pass
-                    self._draw_early()
+                    self._draw_early(self._waiting)
+        except BaseException:
+            self._draw_early(self._waiting[-1:], STOPPED)
+            raise
         finally:
             for running_stage in self._running.values():
                 running_stage.reporter.end("")
@@ -223,9 +227,10 @@ class Executor:
         if step.damaged is not None:
             self.reporter.warn(f"{step.damaged} is {step.reason}; recomputing it")
         stage, inputs = step.stage, self.inputs(step.stage)
-        offered = self.results.begin(step, self.config, inputs, self.force)
+        offered = dict(self.results.begin(step, self.config, inputs, self.force))
         absent = self.missing_inputs(stage)
-        task = task_of(stage, self.config, inputs, jobs=self.jobs, again=self.again, left_out=absent, **offered)
+        offered |= {"jobs": self.jobs, "again": self.again, "left_out": absent, "early": self._early.get(stage.name)}
+        task = task_of(stage, self.config, inputs, **offered)
         number = self._total - len(self._left) + 1 + len(self._running)
         total = max(self._total, number)
         place = [f"{number} of {total}"] if total > 1 else []
@@ -250,23 +255,26 @@ class Executor:
         rest = [f"still to run: {', '.join(self._left)}"] if self._left else []
         running_stage.reporter.end("; ".join([outcome_line(done), *answered, *rest]))
 
-    def _draw_early(self) -> None:
-        """Draw a partial page as soon as its main results exist, while other stages still run."""
+    def _draw_early(self, drawings: Sequence[Stage], why: str = STILL_COMPUTED) -> None:
+        """Draw what the results so far suffice for; `why`: reason why the others are missing.
+
+        Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
+        """
         unsettled = self._unsettled()
         folder = self.results.folder
-        if folder is None:
-            return
-        for stage in self._waiting:
-            inputs = self.inputs(stage)
-            missing = unsettled.intersection(stage.inputs(self.config))
+        for stage in drawings:
+            missing = unsettled.intersection(stage.results(self.config))
+            inputs = self.inputs(stage) | {name: self._early[name] for name in missing & self._early.keys()}
             pending = {name for name in missing if self.graph[name].why_unsuited(self.config) is None}
-            computing = [name for name in pending if not self.graph[name].draws]
-            if not stage.early_with or not computing or not inputs or unsettled & set(stage.early_with):
+            drawn = stage.name in self._early and stage is not self.stages[-1]
+            if folder is None or not stage.early_with or not pending or not inputs or drawn:
                 continue
-            absent = [entry for entry in self.missing_inputs(stage) if entry.what not in pending]
-            absent += [LeftOut(other.name, STILL_COMPUTED) for other in self.stages if other.name in pending]
-            task = task_of(stage, self.config, inputs, folder=folder, left_out=tuple(absent))
-            self.reporter.announce_page(task(Silent()).summary, folder)
+            if unsettled.isdisjoint(stage.early_with):
+                absent = [entry for entry in self.missing_inputs(stage) if entry.what not in pending]
+                absent += [LeftOut(other.name, why) for other in self.stages if other.name in pending]
+                task = task_of(stage, self.config, inputs, folder=folder, left_out=tuple(absent))
+                self._early[stage.name] = task(Silent())
+                self.reporter.announce_page(self._early[stage.name].summary, folder)
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:

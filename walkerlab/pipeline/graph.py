@@ -241,12 +241,6 @@ PIPELINE = Graph(
         does_without=contact_walk_omissions,
     ),
     Stage(
-        "tune", "walkerlab.evidence.paper.tune",
-        "Adjust the initial velocities until the contact model walks; report how much was needed, and why.",
-        reads.TuneConfig, results_of("fixedpoint"), requires=("contact",),
-        does_without=later("walkerlab.evidence.paper.omissions", "adjustment_omissions"),
-    ),
-    Stage(
         "compare", "walkerlab.evidence.paper.compare",
         "Compare both models with each other and with every value of the paper.", reads.CompareConfig,
         walks_and(), requires=("contact",),
@@ -256,6 +250,12 @@ PIPELINE = Graph(
             Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", needs=("--with",)),
             Option("--walks", "recording.walks", "left|right|away|towards", "Direction of markers.", needs=("--with",)),
         ),
+    ),
+    Stage(
+        "tune", "walkerlab.evidence.paper.tune",
+        "Adjust the initial velocities until the contact model walks; report how much was needed, and why.",
+        reads.TuneConfig, results_of("fixedpoint"), requires=("contact",),
+        does_without=later("walkerlab.evidence.paper.omissions", "adjustment_omissions"),
     ),
     Stage(
         "accuracy", "walkerlab.evidence.benchmarks.accuracy", "Measure error against run time, method by method.",
@@ -347,7 +347,7 @@ PIPELINE = Graph(
     ),
     Stage(
         "plot", "walkerlab.views.figures.stage", "Draw the figures from the stored results.", reads.NamedConfig,
-        walks_and("compare"), work="draws",
+        walks_and("compare"), work="draws", early_with=(*WALKED, "compare"),
         if_current=(
             "accuracy", "engines", "tune", "stability-maps", "continuation", "basin", "robustness", "identify", "plan",
         ),

@@ -40,6 +40,7 @@ def call_stage(
                again       whether to repeat walks to measure their numerical error
                folder      run folder that the stage draws into
                left_out    results that are missing in a drawing, with the reasons
+               early       what this run has drawn early from some of the results; None if nothing
     """
     # imported only now, because a stage loads libraries and compiled code
     run = importlib.import_module(module).run

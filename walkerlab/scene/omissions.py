@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Output
     from walkerlab.config.walkers import Walker
 
-# Reason why a figure drawn early lacks a result.
-STILL_COMPUTED = "still being computed"
+# Reasons why a figure or page drawn early lacks a result.
+STILL_COMPUTED, STOPPED = "still being computed", "the command was stopped"
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,11 @@ from walkerlab.evidence.benchmarks.ladder import (
     MethodRow,
     MethodRun,
     ascend,
-    complete_ascents,
     make_row,
     measure,
     omitted_tolerances,
 )
-from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, reference_for
+from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, reference_for
 from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
@@ -39,7 +38,7 @@ def reference():
 
 
 def measured(method, rtol, reference):
-    one = Ascent(TRIAL, method, LADDER, (), unfinished=False)
+    one = Ascent(TRIAL, method, LADDER, ())
     return make_row(one, measure(TRIAL, method, rtol, 10**5), reference)
 
 
@@ -101,7 +100,7 @@ def test_no_method_is_measured_by_its_own_end(rows, reference):
 def test_an_error_below_what_the_reference_is_known_to_is_marked():
     unsure = Reference(End("heyoka-taylor", np.zeros(4)), End("dop853", np.full(4, 1e-8)))
     ends = {1e-4: 2e-8, 1e-8: 1e-9}
-    climbed = Ascent(TRIAL, "radau5", tuple(ends), (), unfinished=False)
+    climbed = Ascent(TRIAL, "radau5", tuple(ends), ())
     runs = [MethodRun(rtol, TrialRun("walked", np.full(4, end), 1, 1, 0), (1.0,)) for rtol, end in ends.items()]
     assert [make_row(climbed, run, unsure).within_reference for run in runs] == [False, True]
 
@@ -117,19 +116,16 @@ def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkey
     assert all("budget-exhausted" in entry["why"] for entry in not_run)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_a_librarys_long_run_is_put_off_and_made_good(jobs, monkeypatch):
-    whole = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853", Checkpoint(None, "")).runs]
-    monkeypatch.setattr(ladder, "SHORT_RUN_BUDGET", whole[2] - 1)
-    short = ascend(TRIAL, "scipy-dop853", Checkpoint(None, ""))
-    assert short.unfinished
-    assert [run.result.rhs_evaluations for run in short.runs] == whole[:2]
-    other = ascend(TRIAL, "dop853", Checkpoint(None, ""))
-    (end,), (made_good, same) = complete_ascents([TRIAL], [short, other], Checkpoint(None, ""), jobs)
-    assert [run.result.rhs_evaluations for run in made_good.runs] == whole[:3]
-    assert len(omitted_tolerances(made_good)) == len(ladder.LIBRARY_LADDER) - 3
-    assert same is other
-    assert end.state == pytest.approx(made_good.runs[-1].result.state, abs=1e-5)
+def test_a_librarys_series_ends_with_the_run_that_exhausts_its_budget(reference, monkeypatch):
+    sizes = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853", Checkpoint(None, "")).runs]
+    monkeypatch.setattr(ladder, "LIBRARY_RUN_BUDGET", sizes[2] - 1)
+    monkeypatch.setattr(ladder, "LAST_RUN_SIZE", sizes[1] + 1)
+    library, ours = (ascend(TRIAL, method, Checkpoint(None, "")) for method in ("scipy-dop853", "dop853"))
+    rows = [make_row(library, run, reference) for run in library.runs]
+    assert [row.outcome for row in rows] == ["walked", "walked", "budget-exhausted"]
+    assert [row.rhs_evaluations for row in rows[:2]] == sizes[:2]
+    assert len(omitted_tolerances(library)) == len(ladder.LIBRARY_LADDER) - 3
+    assert len(ours.runs) == len(ladder.OWN_LADDER)
 
 
 class StopsAfter:
@@ -167,19 +163,10 @@ def test_a_stopped_measurement_resumes_with_the_runs_that_it_has_finished(tmp_pa
         assert run.result.rhs_evaluations == same.result.rhs_evaluations
 
 
-def test_a_stopped_measurement_keeps_its_references_and_long_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr(ladder, "SHORT_RUN_BUDGET", 300)
+def test_a_stopped_measurement_keeps_its_references(tmp_path):
     path = tmp_path / "accuracy.parts"
-    checkpoint = Checkpoint(path, "key")
-    ascents = [ascend(TRIAL, "scipy-dop853", checkpoint)]
-    assert ascents[0].unfinished
-    (end,), (completed,) = complete_ascents([TRIAL], ascents, checkpoint, 1)
-    shifted = replace(end, state=end.state + 1.0)
-    checkpoint.keep(ladder.unit_name(TRIAL.name, "first end"), shifted.packed())
-    (kept_end,), (resumed,) = complete_ascents([TRIAL], ascents, Checkpoint(path, "key"), 1)
-    assert kept_end.packed() == shifted.packed()
-    # Timings differ whenever a run is measured again.
-    assert resumed.runs[-1].walls_s == completed.runs[-1].walls_s
+    end = accuracy.resumed_end(TRIAL, "first end", first_end, Checkpoint(path, "key"))
+    assert accuracy.resumed_end(TRIAL, "first end", None, Checkpoint(path, "key")).packed() == end.packed()
 
 
 class SlowAtFirst:
@@ -250,17 +237,17 @@ def test_a_script_with_a_right_hand_side_of_its_own_is_not_the_library_of_the_fa
 
 
 def test_a_reference_says_by_whom_it_is_and_what_it_took(reference):
-    summary = summarise([], [], {"rigid": reference}, 1)["reference"]["rigid"]
+    summary = summarise([], [], {"rigid": reference})["reference"]["rigid"]
     assert summary["from_outside"] == (reference.first.method == "heyoka-taylor")
     ours = reference_for(replace(TRIAL, compass=None, steps=1))
-    told = summarise([], [], {"rigid": ours}, 1)["reference"]["rigid"]
+    told = summarise([], [], {"rigid": ours})["reference"]["rigid"]
     assert not told["from_outside"]
     assert told["tolerance"] == 1e-14
     assert told["rhs_evaluations"] == ours.first.rhs_evaluations > 100
 
 
 def test_the_summary_has_the_fixed_keys(rows, reference):
-    summary = summarise(rows, [], {"rigid": reference}, 1)
+    summary = summarise(rows, [], {"rigid": reference})
     assert {"rows", "repeats", "reference", "best"} <= summary.keys()
     fixed = {"scene", "method", "tolerance", "error", "wall_s", "rhs_evaluations", "accepted", "rejected", "outcome"}
     assert fixed <= summary["rows"][0].keys()

@@ -2,32 +2,30 @@
 
 import math
 
-import appendix_a as paper
 import pytest
-import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from late_imports import import_late
 from printed_compass import ground_reaction, kinetic_energy, potential_energy
 
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations
 
-POINT_MASSES = {paper.J: 0}
-ORIGIN = sp.zeros(2, 1)
-FREE_FOOT = sp.Matrix([paper.x, paper.y])
+sp = import_late("sympy")
+paper = import_late("appendix_a")
 
 
 @pytest.fixture(scope="module")
 def swing():
-    return paper.from_lagrange(paper.q, ORIGIN)
+    return paper.from_lagrange(paper.q, sp.zeros(2, 1))
 
 
 @pytest.fixture(scope="module")
 def released():
-    return paper.from_lagrange(paper.q_e, FREE_FOOT)
+    return paper.from_lagrange(paper.q_e, sp.Matrix([paper.x, paper.y]))
 
 
 def without_inertia(matrix):
-    return matrix.subs(POINT_MASSES)
+    return matrix.subs({paper.J: 0})
 
 
 def same(expression, other):
@@ -61,7 +59,7 @@ def test_printed_coriolis_matrix_with_the_foot_released_has_the_same_wrong_sign(
 
 
 def test_printed_foot_position_is_wrong_in_its_height():
-    wrong = paper.differing(paper.PRINTED_FOOT, paper.swing_foot(FREE_FOOT))
+    wrong = paper.differing(paper.PRINTED_FOOT, paper.swing_foot(sp.Matrix([paper.x, paper.y])))
     assert list(wrong) == [(1, 0)]
     assert same(wrong[1, 0], 2 * paper.L * (sp.cos(paper.theta_1) - sp.cos(paper.theta_2)))
 
@@ -92,7 +90,7 @@ states = st.tuples(angles, angles, rates, rates)
 def numeric(swing):
     """Derived D, bias, G, energies and ground reaction as functions of parameters, angles and rates."""
     names = sp.symbols("t1 t2 u1 u2 a1 a2")
-    stance_mass, hip, swing_mass = paper.leg_masses_and_hip(ORIGIN)
+    stance_mass, hip, swing_mass = paper.leg_masses_and_hip(sp.zeros(2, 1))
     bodies = ((paper.m, stance_mass), (paper.M_H, hip), (paper.m, swing_mass))
     momentum_rate = sum((mass * p.diff(paper.t, 2) for mass, p in bodies), sp.zeros(2, 1))
     weight = sp.Matrix([0, paper.g * (paper.M_H + 2 * paper.m)])

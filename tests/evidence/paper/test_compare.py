@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-import xarray
+from late_imports import import_late
 from numpy.testing import assert_allclose
 
 from walkerlab.config.loader import load
@@ -18,6 +18,8 @@ from walkerlab.pipeline.stages import simulate
 from walkerlab.pipeline.stages.walk import over_time, step_columns
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.runfolder import RunFolder
+
+xarray = import_late("xarray")
 
 SLOWER = 1.01
 TAKES = PIPELINE["compare"].takes

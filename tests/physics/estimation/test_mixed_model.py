@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from walkerlab.physics.estimation.mixed_model import (
     NOISE_RATIO,
@@ -35,6 +34,9 @@ def covariance(data, noise):
 
 
 def test_the_likelihood_is_that_of_a_normal_distribution(data):
+    # Imported here: it takes a second, in each process that collects the tests.
+    from scipy.stats import multivariate_normal
+
     no_prior = data.__class__(data.residuals, data.J, data.G, data.quantity, np.zeros((0, 4)), data.sizes)
     S = covariance(data, NOISE)
     inverse = np.linalg.inv(S)

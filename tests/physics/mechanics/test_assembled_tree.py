@@ -1,11 +1,10 @@
 """Any tree: a walker with torso and knee against Lagrange's equations, and what a body in free flight keeps."""
 
-import kneed_walker as kneed
 import numpy as np
 import pytest
-import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from late_imports import import_late
 from scipy.integrate import solve_ivp
 from system_rates import rate_of
 from tree_equations import mass_matrix_and_bias
@@ -17,6 +16,9 @@ from walkerlab.physics.ground.normal_force import NormalLaw
 from walkerlab.physics.ground.walker import on_ground
 from walkerlab.physics.mechanics.assembly import Anchor, levers, total_mass, tree_about_centre
 from walkerlab.physics.mechanics.parts import Assembly, Body, Revolute
+
+sp = import_late("sympy")
+kneed = import_late("kneed_walker")
 
 angles = st.tuples(*[st.floats(-3.0, 3.0)] * 4)
 rates = st.tuples(*[st.floats(-5.0, 5.0)] * 4)

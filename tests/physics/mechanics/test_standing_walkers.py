@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from late_imports import import_late
 from rigid_physics import heel_strike, knee_strike, potential_energy, rates, state_linked
 
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, accelerations, assembled
@@ -28,6 +28,8 @@ from walkerlab.physics.mechanics.rigid_model import (
 )
 from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
 from walkerlab.physics.solvers.system import derivative
+
+sp = import_late("sympy")
 
 THIGH = Limb(0.46, 1.1, 0.21, 0.02, 0.013)
 SHANK = Limb(0.52, 0.4, 0.17, -0.015, 0.004)

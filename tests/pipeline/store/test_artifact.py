@@ -8,9 +8,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from late_imports import import_late
 
 import walkerlab
 from walkerlab.config.schema import Config
@@ -20,6 +20,8 @@ from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.hdf5 import GroupOnDisk
 from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.provenance import begin
+
+xarray = import_late("xarray")
 
 NAMES = st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,8}", fullmatch=True)
 TEXTS = st.text(st.characters(blacklist_characters="\0", blacklist_categories=("Cs",)), max_size=8)

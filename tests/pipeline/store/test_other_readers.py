@@ -9,11 +9,13 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-import xarray
+from late_imports import import_late
 
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.hdf5 import GroupOnDisk
+
+xarray = import_late("xarray")
 
 TEXTS = {"mixed": ["", "walked", "θ₂ é"], "empty": ["", "", ""], "short": ["a", "b", "c"]}
 

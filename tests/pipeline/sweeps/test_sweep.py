@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
+from late_imports import import_late
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
@@ -28,6 +28,8 @@ from walkerlab.pipeline.sweeps.chunk import FOLDER, Chunk, PointResult, by_name,
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
 from walkerlab.pipeline.sweeps.result import Merge, as_csv, last_of_each
 from walkerlab.views.report.sweep_page import summary_lines
+
+xr = import_late("xarray")
 
 GRAVITIES = "gravity_m_s2=1:9:5"
 

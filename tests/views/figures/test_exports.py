@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
+from late_imports import import_late
 from PIL import Image
 from synthetic_families import families
 from synthetic_methods import everything
@@ -32,6 +32,8 @@ from walkerlab.views.figures import stage as plot
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.figures.style import WIDTH
 from walkerlab.views.report.tex import in_tex
+
+xarray = import_late("xarray")
 
 QUIET = Console(quiet=True)
 

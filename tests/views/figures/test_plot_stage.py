@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from synthetic_methods import measured_methods
 from synthetic_walks import both_models, rigid_alone
 
 from walkerlab.config.reads import only
@@ -31,8 +32,8 @@ class Count:
         pass
 
 
-def draw(folder, results, left_out=(), progress=None):
-    return plot.run(only(Config(), PIPELINE["plot"].takes), results, progress or Count(), folder, left_out)
+def draw(folder, results, left_out=(), progress=None, early=None):
+    return plot.run(only(Config(), PIPELINE["plot"].takes), results, progress or Count(), folder, left_out, early)
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,20 @@ def test_the_index_has_every_file_as_it_was_written(whole):
     folder, content = whole
     assert sorted(index.indexed_files(content)) == [f"figures/{name}" for name in names(folder)]
     assert index.broken_file(folder, content) is None
+
+
+def test_figures_drawn_early_are_those_of_all_results_and_not_drawn_again(tmp_path):
+    folder, content = tmp_path, draw(tmp_path, both_models())
+    results = both_models() | measured_methods()
+    written = {path: path.stat().st_mtime_ns for path in (folder / "figures").iterdir()}
+    final = draw(folder, results, early=content)
+    assert {path: path.stat().st_mtime_ns for path in written} == written
+    assert index.broken_file(folder, content) is None
+    entries = {entry["svg"]: entry for entry in final.summary["figures"]}
+    assert len(entries) > len(content.summary["figures"])
+    assert [entries[entry["svg"]] for entry in content.summary["figures"]] == content.summary["figures"]
+    anew = draw(folder, results)
+    assert index.indexed_files(anew) == index.indexed_files(final)
 
 
 def test_each_entry_has_the_words_and_the_files_of_its_figure(whole):

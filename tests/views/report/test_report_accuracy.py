@@ -37,6 +37,7 @@ SUMMARY = {
     "rows": ROWS,
     "repeats": 7,
     "budget": 200_000,
+    "library_budget": 20_000,
     "reference": {
         "rigid": {
             "method": "heyoka-taylor",
@@ -147,6 +148,7 @@ def test_a_budget_that_is_used_up_is_explained_as_such():
     assert costs.groups["contact"][-1][-1].text == "budget exhausted at 10⁻⁸"
     assert "Each run is limited to 200,000 right-hand sides" in costs.note
     assert "dop853 exhausts this budget at tight tolerances" in costs.note
+    assert "a library’s to 20,000" in costs.note
 
 
 def test_what_was_not_run_is_said_once_for_each_reason(made):

@@ -16,6 +16,7 @@ from synthetic_results import (
 )
 
 from walkerlab.config.schema import Source
+from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
 from walkerlab.views.report.stage import write_pages
 
 PATH = executable()
@@ -337,5 +338,5 @@ def test_nobody_is_told_on_paper_to_reload_the_page(browser, folder_with_pending
 
 @pytest.fixture
 def folder_with_pending(tmp_path):
-    write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, pending=("plot",))
+    write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, [LeftOut("plot", STILL_COMPUTED)])
     return tmp_path

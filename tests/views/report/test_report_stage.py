@@ -11,7 +11,7 @@ from walkerlab.errors import StorageError
 from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.index import broken_file, indexed_files
-from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
+from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 from walkerlab.views.report import stage as report
 from walkerlab.views.report.pictures import fitting
 from walkerlab.views.report.stage import write_pages
@@ -82,12 +82,13 @@ def test_the_report_of_another_scene_only_links_the_paper(tmp_path):
 
 
 def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
-    left_out = [LeftOut("compare", "not yet"), LeftOut("tune", "the config has no contact block")]
-    write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, left_out, ("compare", "accuracy"))
+    left_out = [LeftOut("compare", STILL_COMPUTED), LeftOut("accuracy", STILL_COMPUTED)]
+    left_out.append(LeftOut("tune", "the config has no contact block"))
+    write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, left_out)
     page = Page((tmp_path / "report.html").read_text())
     assert any("Not computed yet when this page was written: compare, accuracy." in text for text in page.said("p"))
     assert sum("Not computed yet: " in text for text in page.said("p")) == 2
-    assert "not yet" not in page.text
+    assert STILL_COMPUTED not in page.text
     assert [attrs for attrs in page.all("figure") if "data-player" in attrs]
 
 
@@ -104,6 +105,16 @@ def test_an_early_page_stays_true_when_its_command_is_stopped(tmp_path):
     assert "till being computed" not in html
     assert "If nothing runs any more, <code>walkerlab report -c stopped</code> computes the rest" in html
     assert "<code>walkerlab status -c stopped</code> shows what runs" in html
+
+
+def test_a_page_says_that_its_command_was_stopped(tmp_path):
+    folder = tmp_path / "stopped"
+    folder.mkdir()
+    run(folder, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("plot", STOPPED)])
+    html = (folder / "report.html").read_text()
+    said = "The command was stopped before it had computed: plot. <code>walkerlab report -c stopped</code>"
+    assert f"{said} computes the rest." in html
+    assert "Not computed yet when" not in html
 
 
 def test_a_page_that_there_is_nothing_for_any_more_is_removed(tmp_path):

@@ -1,6 +1,6 @@
 """Stage `accuracy`: error against run time of every method on every scene, over a ladder of tolerances."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -8,17 +8,17 @@ from walkerlab.config.reads import SceneConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.conditions import environment, pinning_left_out, plain_power
 from walkerlab.evidence.benchmarks.ladder import (
+    LIBRARY_RUN_BUDGET,
     MAX_REPEATS,
     RUN_BUDGET,
     Ascent,
     MethodRow,
     ascend,
-    complete_ascents,
     make_row,
     omitted_tolerances,
     unit_name,
 )
-from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, second_end
+from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, second_end
 from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial
 from walkerlab.evidence.benchmarks.words import words
 from walkerlab.evidence.paper.walker import compass_or_none
@@ -34,56 +34,50 @@ from walkerlab.scene.rigid import rigid_walker
 ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
 RIGID_TRIAL_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
 SLOW_CONTACT_STEPS = 4  # steps of walkers other than the compass; their right-hand sides take several times as long
-OMISSIONS_OFF_COMPASS = (
-    {"what": "accuracy of the scene contact-near-rigid", "why": "only the compass has it", "saves": "a minute"},
-    {"what": "libraries' longest runs on the contact model", "why": "they run in Python", "saves": "minutes"},
-)
+OMISSION_OFF_COMPASS = {
+    "what": "accuracy of the scene contact-near-rigid",
+    "why": "only the compass has it",
+    "saves": "a minute",
+}
 START_RATE_FACTOR = 0.98  # factor on the gait's angular velocities, so that no step repeats the previous one
 
 
-def run(
-    config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
-) -> Content:
-    """Measure every method on every scene, with reference solutions and postponed library runs in `jobs` processes."""
-    # all other runs are timed one after another, with nothing else running
-    trials: list[Trial] = []
-    second_ends: list[End] = []
+def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
+    """Measure every method on every scene, one run after another, because run times are compared."""
+    left_out: list[dict[str, Any]] = pinning_left_out(config, "methods")
+    if config.contact is not None and not is_passive_compass(config):
+        left_out.append(dict(OMISSION_OFF_COMPASS))
+    references: dict[str, Reference] = {}
     ascents: list[Ascent] = []
-    compass = is_passive_compass(config)
-    left_out = pinning_left_out(config, "methods") + (
-        [] if compass or config.contact is None else list(OMISSIONS_OFF_COMPASS)
-    )
-    for trial in trials_of_scene(config, inputs):
-        progress.start(f"accuracy: {trial.name}", len(trial.methods))
+    trials = [*trials_of_scene(config, inputs)]
+    progress.start("accuracy", sum(len(trial.methods) for trial in trials))
+    for trial in trials:
         try:
-            unit = unit_name(trial.name, "second end")
-            if unit not in checkpoint.kept:
-                checkpoint.keep(unit, second_end(trial).packed())
-            second_ends.append(End.unpack(checkpoint.kept[unit]))
+            second = resumed_end(trial, "second end", second_end, checkpoint)
+            references[trial.name] = Reference(resumed_end(trial, "first end", first_end, checkpoint), second)
         except WalkEndsError as problem:
             left_out.append(omitted_scene(trial, problem))
+            progress.advance(len(trial.methods))
             continue
-        trials.append(trial)
         for method in trial.methods:
             ascents.append(ascend(trial, method, checkpoint))
             progress.advance()
-    progress.start("accuracy: long runs")
-    first_ends, ascents = complete_ascents(trials, ascents, checkpoint, jobs, long_runs=compass)
-    references: dict[str, Reference] = {}
-    for trial, first, second in zip(trials, first_ends, second_ends, strict=True):
-        if isinstance(first, WalkEndsError):
-            left_out.append(omitted_scene(trial, first))
-        else:
-            references[trial.name] = Reference(first, second)
-    ascents = [ascent for ascent in ascents if ascent.trial.name in references]
     rows = [make_row(ascent, run, references[ascent.trial.name]) for ascent in ascents for run in ascent.runs]
     not_run = [entry for ascent in ascents for entry in omitted_tolerances(ascent)]
-    summary = {**summarise(rows, not_run, references, jobs), "left_out": left_out}
+    summary = {**summarise(rows, not_run, references), "left_out": left_out}
     groups = {
         f"{scene}/rows": rows_group([row for row in rows if row.scene == scene], labels_of(MethodRow))
         for scene in references
     }
     return Content(groups, summary, timed=("best", "conclusions", "environment"))
+
+
+def resumed_end(trial: Trial, name: str, compute: Callable[[Trial], End], checkpoint: Checkpoint) -> End:
+    """Return an end state from the checkpoint, or compute and keep it; may raise WalkEndsError."""
+    unit = unit_name(trial.name, name)
+    if unit not in checkpoint.kept:
+        checkpoint.keep(unit, compute(trial).packed())
+    return End.unpack(checkpoint.kept[unit])
 
 
 def omitted_scene(trial: Trial, why: WalkEndsError) -> dict[str, Any]:
@@ -109,13 +103,14 @@ def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Itera
 
 
 def summarise(
-    rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference], jobs: int
+    rows: Sequence[MethodRow], not_run: list[dict[str, Any]], references: Mapping[str, Reference]
 ) -> dict[str, Any]:
     return {
         "rows": [asdict(row) for row in rows],
         "repeats": MAX_REPEATS,
         "rigid_velocity_factor": START_RATE_FACTOR,
         "budget": RUN_BUDGET,
+        "library_budget": LIBRARY_RUN_BUDGET,
         "reference": {
             name: {
                 "method": reference.first.method,
@@ -131,7 +126,7 @@ def summarise(
         "best": {scene: best_methods(rows, scene) for scene in references},
         "conclusions": {scene: conclusion(rows, scene) for scene in references},
         "not_run": not_run,
-        "environment": environment() | {"processes": jobs},
+        "environment": environment(),
     }
 
 

@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass
 from statistics import median
 from typing import Annotated, Any
 
 import numpy as np
 
-from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end
+from walkerlab.evidence.benchmarks.references import Reference
 from walkerlab.evidence.benchmarks.trials import Trial, TrialRun
 from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS
 from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
-from walkerlab.pipeline.workers import in_order
 
 # sizes of runs, in right-hand sides
-RUN_BUDGET = 200_000  # limit of any run, which ends hopeless runs
-SHORT_RUN_BUDGET = 25_000  # limit of a library's run; longer runs are postponed until all others are done
-LAST_RUN_SIZE = 12_000  # a library's ladder ends with a run of this size, because Python takes a hundred times as long
+RUN_BUDGET = 200_000  # limit of a compiled run, which ends hopeless runs
+# A library's right-hand sides take a hundred times as long, because its steps run in Python.
+LIBRARY_RUN_BUDGET = 20_000  # limit of a library's run
+LAST_RUN_SIZE = 12_000  # size of a library's run after which its ladder ends
 WARM_UP_BUDGET = 2_000  # enough to compile and load everything
-MAX_REPEATS, REPEAT_TIME_S = 7, 0.3
+MAX_REPEATS, REPEAT_TIME_S = 7, 0.2
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
 LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 OUTCOMES = tuple(outcome.label for outcome in Outcome)
@@ -61,7 +60,6 @@ class Ascent:
     method: str
     ladder: tuple[float, ...]
     runs: tuple[MethodRun, ...]
-    unfinished: bool  # whether the run at the next tolerance is postponed because it takes long
 
 
 @dataclass(frozen=True)
@@ -94,65 +92,19 @@ def unit_name(*parts: object) -> str:
 
 def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
     """Run a method at tighter and tighter tolerances until a run is too expensive; resume runs of the checkpoint."""
-    ladder, short, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
+    ladder, budget, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
     if method not in METHODS or not METHODS[method].compiled:
-        ladder, short, last = LIBRARY_LADDER, min(SHORT_RUN_BUDGET, RUN_BUDGET), LAST_RUN_SIZE
+        ladder, budget, last = LIBRARY_LADDER, LIBRARY_RUN_BUDGET, LAST_RUN_SIZE
     trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     runs: list[MethodRun] = []
     for tolerance in ladder:
         unit = unit_name(trial.name, method, tolerance)
         if unit not in checkpoint.kept:
-            checkpoint.keep(unit, measure(trial, method, tolerance, short).packed())
-        run = MethodRun.unpack(checkpoint.kept[unit])
-        if run.result.outcome == "budget-exhausted" and short < RUN_BUDGET:
-            return Ascent(trial, method, ladder, tuple(runs), unfinished=True)
-        runs.append(run)
-        if run.result.rhs_evaluations >= last:
+            checkpoint.keep(unit, measure(trial, method, tolerance, budget).packed())
+        runs.append(MethodRun.unpack(checkpoint.kept[unit]))
+        if runs[-1].result.rhs_evaluations >= last:
             break
-    return Ascent(trial, method, ladder, tuple(runs), unfinished=False)
-
-
-def complete_ascents(
-    trials: Sequence[Trial], ascents: Sequence[Ascent], checkpoint: Checkpoint, jobs: int, long_runs: bool = True
-) -> tuple[list[End | WalkEndsError], list[Ascent]]:
-    """Compute each trial's first reference end (or why it is missing) and, with `long_runs`, the postponed runs."""
-    # longest first: the last trial is near the rigid limit, where the explicit reference method takes the most steps
-    calls: dict[str, Callable[[], End | WalkEndsError | MethodRun]] = {
-        unit_name(trial.name, "first end"): partial(try_first_end, trial) for trial in reversed(trials)
-    }
-    for ascent in ascents:
-        if ascent.unfinished and long_runs:
-            call = partial(long_run, ascent.trial, ascent.method, ascent.ladder[len(ascent.runs)])
-            calls[unit_name(ascent.trial.name, ascent.method, "long run")] = call
-    todo = {unit: call for unit, call in calls.items() if unit not in checkpoint.kept}
-    ends: dict[str, End | WalkEndsError] = {}
-    for unit, result in zip(todo, in_order(list(todo.values()), jobs), strict=True):
-        if isinstance(result, WalkEndsError):
-            ends[unit] = result
-        else:
-            checkpoint.keep(unit, result.packed())
-
-    def completed(ascent: Ascent) -> Ascent:
-        unit = unit_name(ascent.trial.name, ascent.method, "long run")
-        if unit not in calls:
-            return ascent
-        return replace(ascent, runs=(*ascent.runs, MethodRun.unpack(checkpoint.kept[unit])), unfinished=False)
-
-    units = [unit_name(trial.name, "first end") for trial in trials]
-    return [ends.get(unit) or End.unpack(checkpoint.kept[unit]) for unit in units], [*map(completed, ascents)]
-
-
-def try_first_end(trial: Trial) -> End | WalkEndsError:
-    try:
-        return first_end(trial)
-    except WalkEndsError as problem:
-        return problem
-
-
-def long_run(trial: Trial, method: str, tolerance: float) -> MethodRun:
-    """Time a run that was postponed, after a warm-up because it may be the first in its process."""
-    trial.prepare(method, tolerance, WARM_UP_BUDGET)()
-    return measure(trial, method, tolerance, RUN_BUDGET)
+    return Ascent(trial, method, ladder, tuple(runs))
 
 
 def measure(trial: Trial, method: str, tolerance: float, budget: int) -> MethodRun:
@@ -196,11 +148,8 @@ def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
 
 def omitted_tolerances(ascent: Ascent) -> list[dict[str, Any]]:
     """List the tolerances that were not run, with the reason."""
-    if ascent.unfinished:
-        why = f"more than {SHORT_RUN_BUDGET} right-hand sides, each in Python"
-    else:
-        last = ascent.runs[-1]
-        why = f"already {last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g}"
+    last = ascent.runs[-1]
+    why = f"already {last.result.outcome} with {last.result.rhs_evaluations} right-hand sides at {last.tolerance:g}"
     return [
         {"scene": ascent.trial.name, "method": ascent.method, "tolerance": rtol, "why": why}
         for rtol in ascent.ladder[len(ascent.runs) :]

@@ -1,5 +1,6 @@
 """Momentum and energy of walkers computed from their point masses, independently of the equations of motion."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +80,7 @@ class RigidMasses:
         self.owner = [assembly.index(anchor.body) for _, anchor in masses(assembly)]
         self.to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
         self.to_foot = levers(assembly, root, Anchor(trailing.body, trailing.centre_m))
+        self.shares = {leg: self.share_of(leg) for leg in (STANCE, SWING)}
 
     def pose(self, state: Floats) -> Moving:
         """Return the masses with their positions and velocities in a state of the rigid model (2 n,)."""
@@ -90,44 +92,53 @@ class RigidMasses:
         mass, inertia = self.masses.mass, self.masses.inertia
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
-    def momenta(self, state: Floats, new: bool) -> tuple[float, float]:
+    def poses(self, states: Floats) -> list[Moving]:
+        """Return the masses in each of the states (strikes, 2 n)."""
+        return [self.pose(state) for state in states]
+
+    def share_of(self, leg: int) -> Floats:
+        """Return the share (bodies,) of each body that belongs to a leg; coupled bodies belong to it in part."""
+        names, of_leg = [body.name for body in self.assembly.bodies], self.assembly.legs[leg]
+        share = np.array([1.0 if name in of_leg else 0.0 for name in names])
+        for coupling in self.assembly.couplings:
+            turning = (weight for name, weight in zip(coupling.of, coupling.weights, strict=True) if name in of_leg)
+            share[names.index(coupling.body)] = sum(turning)
+        return share
+
+    def momenta(self, moving: Moving, new: bool) -> tuple[float, float]:
         """Return the two angular momenta that a heel strike conserves (kg m^2/s).
 
         The first is the walker's about the new foothold; the second is the lifting leg's about the hip, including the
         leg's share of coupled bodies.
 
-        new  whether the state is after heel strike, with the roles of the legs exchanged
+        new  whether the pose is after heel strike, with the roles of the legs exchanged
         """
-        moving, leg = self.pose(state), self.assembly.legs[SWING if new else STANCE]
-        names = [body.name for body in self.assembly.bodies]
-        share = np.array([1.0 if name in leg else 0.0 for name in names])
-        for coupling in self.assembly.couplings:
-            turning = (weight for name, weight in zip(coupling.of, coupling.weights, strict=True) if name in leg)
-            share[names.index(coupling.body)] = sum(turning)
+        share = self.shares[SWING if new else STANCE]
         foothold = np.zeros(2) if new else moving.contact
         walker_momentum = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
         return walker_momentum, moving.about(moving.hip, share[self.owner], share)
 
-    def moment_of(self, push_off: float, state: Floats) -> float:
-        """Return the angular impulse (kg m^2/s) of a push-off (N s, from rear foot to hip) about the new foothold."""
-        moving = self.pose(state)
-        along, up = push_off * moving.hip / np.hypot(*moving.hip)
-        return float(moving.contact[1] * along - moving.contact[0] * up)
-
-    def momentum_change(self, before: Floats, after: Floats, push_off: float = 0.0) -> float:
-        """Return the largest relative change of the conserved momenta; before, after: (strikes, 2 n), push_off: N s."""
+    def momentum_change(self, before: Sequence[Moving], after: Sequence[Moving], push_off: float = 0.0) -> float:
+        """Return the largest relative change of the conserved momenta over heel strikes; push_off in N s."""
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
             at_start, at_end = np.array(self.momenta(old, new=False)), np.array(self.momenta(new, new=True))
-            at_start[0] += self.moment_of(push_off, old)
+            at_start[0] += moment_of(push_off, old)
             change, size = max(change, *np.abs(at_end - at_start)), max(size, *np.abs(at_start), *np.abs(at_end))
         return finite(change / size)
 
-    def energy_won(self, before: Floats, after: Floats) -> float:
-        """Return the largest gain of kinetic energy (J) in a heel strike; 0 if all of them lose energy."""
-        gains = [self.pose(new).kinetic - self.pose(old).kinetic for old, new in zip(before, after, strict=True)]
-        return max(0.0, *gains)
 
-    def feet_off_the_slope(self, before: Floats) -> float:
-        """Return the largest distance (m) of a landing foot from the slope at heel strike."""
-        return float(max(abs(self.pose(state).contact[1]) for state in before))
+def moment_of(push_off: float, moving: Moving) -> float:
+    """Return the angular impulse (kg m^2/s) of a push-off (N s, from rear foot to hip) about the new foothold."""
+    along, up = push_off * moving.hip / np.hypot(*moving.hip)
+    return float(moving.contact[1] * along - moving.contact[0] * up)
+
+
+def energy_won(before: Sequence[Moving], after: Sequence[Moving]) -> float:
+    """Return the largest gain of kinetic energy (J) in a heel strike; 0 if all of them lose energy."""
+    return max(0.0, *(new.kinetic - old.kinetic for old, new in zip(before, after, strict=True)))
+
+
+def feet_off_the_slope(before: Sequence[Moving]) -> float:
+    """Return the largest distance (m) of a landing foot from the slope at heel strike."""
+    return float(max(abs(moving.contact[1]) for moving in before))

@@ -9,7 +9,7 @@ import numpy as np
 from walkerlab.config.reads import WalksConfig
 from walkerlab.config.schema import MidStep, state_of
 from walkerlab.config.stability import Case
-from walkerlab.evidence.verification.masses import RigidMasses
+from walkerlab.evidence.verification.masses import RigidMasses, energy_won, feet_off_the_slope
 from walkerlab.evidence.verification.momentum import MEASURE, momentum_finding
 from walkerlab.evidence.verification.scaling import pendulum_time
 from walkerlab.evidence.verification.verdict import Measure, NotMeasured, finite
@@ -88,10 +88,10 @@ class RigidStart(CaseStart):
         if not record.steps:
             return []
         strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
-        distance = strikes.feet_off_the_slope(record.before) / self.walker.leg_length
-        push = float(self.walker.push_off)
-        momentum_change = strikes.momentum_change(record.before, record.after, push)
-        gain = 0.0 if push else strikes.energy_won(record.before, record.after) / self.energy
+        before, after, push = strikes.poses(record.before), strikes.poses(record.after), float(self.walker.push_off)
+        distance = feet_off_the_slope(before) / self.walker.leg_length
+        momentum_change = strikes.momentum_change(before, after, push)
+        gain = 0.0 if push else energy_won(before, after) / self.energy
         measured = {
             "distance of the feet from the slope at heel strike, in leg lengths": finite(distance),
             "momentum changed by a heel strike": momentum_change,

@@ -23,8 +23,13 @@ def run(
     progress: Progress,
     folder: Path,
     left_out: Sequence[LeftOut] = (),
+    early: Content | None = None,
 ) -> Content:
-    """Draw all figures whose results are available into the run's folder; StorageError if one cannot be stored."""
+    """Draw all figures whose results are available into the run's folder; StorageError if one cannot be stored.
+
+    early  figures that this run has drawn already, once all that they show was there
+    """
+    finished = {} if early is None else {entry["svg"]: entry for entry in early.summary["figures"]}
     make_folder(folder / FOLDER)
     absent = {entry.what: entry.why for entry in left_out}
     reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
@@ -32,7 +37,7 @@ def run(
     drawn, missing = [], []
     for figure, why in zip(FIGURES, reasons, strict=True):
         if why is None:
-            drawn.append(draw(figure, inputs, folder))
+            drawn.append(finished.get(paths_of(figure.name)["svg"]) or draw(figure, inputs, folder))
             progress.advance()
         else:
             for path in paths_of(figure.name).values():  # drawn by an earlier run from results that no longer exist

@@ -12,6 +12,7 @@ from markupsafe import Markup, escape
 
 from walkerlab.config.schema import Source
 from walkerlab.errors import add_run_options
+from walkerlab.scene.omissions import STOPPED, LeftOut
 from walkerlab.views.report.blocks import MAIN, Section
 from walkerlab.views.report.symbols import CARET, POWER, power, to_superscript
 
@@ -31,7 +32,7 @@ class Page:
     file: str = MAIN
     study: Source | None = None  # the study reproduced, or None
     relation: str = "Redoes"  # first word of the line about the study: Redoes, or After if the scene differs
-    pending: tuple[str, ...] = ()  # results still being computed
+    pending: tuple[LeftOut, ...] = ()  # results still being computed, or not yet when the command was stopped
     run: str = ""  # name of the run for suggested commands; empty for the default run
 
 
@@ -43,7 +44,7 @@ def render(page: Page) -> str:
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
     # Markup only for the package's own files; all other texts are escaped.
     own = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
-    return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, **own)
+    return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **own)
 
 
 def digest_of(script: str) -> str:

@@ -20,7 +20,7 @@ class Results:
     stored: Mapping[str, Content] = field(default_factory=dict)  # up-to-date results by stage
     pictures: tuple[Picture, ...] = ()  # embedded figures of `plot`
     absent: tuple[LeftOut, ...] = ()  # missing results, with reasons
-    pending: tuple[str, ...] = ()  # stages that are still running
+    pending: tuple[LeftOut, ...] = ()  # results still being computed, or not yet when the command was stopped
     failed: frozenset[str] = frozenset()  # stages that were run and failed
 
     @property

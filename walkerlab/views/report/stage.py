@@ -11,7 +11,7 @@ from walkerlab.pipeline.store import index
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import storing, write_atomically
-from walkerlab.scene.omissions import STILL_COMPUTED, LeftOut
+from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 from walkerlab.views.report.blocks import MAIN
 from walkerlab.views.report.page import Page, render
 from walkerlab.views.report.pictures import pictures
@@ -30,8 +30,7 @@ def run(
 ) -> Content:
     """Write the report's pages into the run's folder; StorageError if one cannot be stored."""
     progress.start("report", 1)
-    pending = [entry.what for entry in left_out if entry.why == STILL_COMPUTED]
-    written, results = write_pages(config, inputs, folder, left_out, pending)
+    written, results = write_pages(config, inputs, folder, left_out)
     progress.advance()
     blocks = (block for page in written for section in page.sections for block in section.blocks)
     return Content(
@@ -50,14 +49,14 @@ def write_pages(
     inputs: Mapping[str, Stored],
     folder: Path,
     left_out: Sequence[LeftOut] = (),
-    pending: Sequence[str] = (),
 ) -> tuple[tuple[Page, ...], Results]:
     """Write pages of the available results, and remove pages that have no content; StorageError if that fails."""
-    # also called while other stages are running, whose names are in `pending`
-    waited = [entry for entry in left_out if entry.what not in pending]
-    names = {entry.what for entry in waited}
+    # also called while other stages are running, and when the command is stopped
+    pending = tuple(entry for entry in left_out if entry.why in (STILL_COMPUTED, STOPPED))
+    absent = tuple(entry for entry in left_out if entry not in pending)
+    names = {entry.what for entry in absent}
     failed = frozenset(name for name in names if has_failed(config, name, names))
-    plain = Results(config, inputs, (), tuple(waited), tuple(pending), failed)
+    plain = Results(config, inputs, (), absent, pending, failed)
     results = replace(plain, pictures=pictures(inputs, folder, numbered=bool(plain.claims)))
     pages = pages_of(results, folder.name)
     for page in pages:

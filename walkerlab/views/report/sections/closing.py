@@ -25,7 +25,7 @@ def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section
     for file, sections in pages.items():
         findings = (section.finding for section in sections if file != PAPER_PAGE or results.claims)
         items.append((file, TITLES[file], " ".join(filter(None, findings))))
-    waiting = (Paragraph(words("closing.pending", name), "waiting") for name in results.pending)
+    waiting = (Paragraph(words("closing.pending", entry.what), "waiting") for entry in results.pending)
     title = "Further pages" if items else "Not computed yet"
     return Section.of("further", title, (Cards(tuple(items)) if items else None, *waiting))
 

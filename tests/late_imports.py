@@ -1,0 +1,15 @@
+"""Modules that are imported when a test first uses them: every worker collects all tests, but runs a part of them."""
+
+import importlib.util
+import sys
+
+
+def import_late(name):
+    """Return the module, which is loaded with the first of its attributes that is used."""
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.find_spec(name)
+    spec.loader = importlib.util.LazyLoader(spec.loader)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
