@@ -83,6 +83,7 @@ DECIMAL_COMMAS = {
     "semicolons.csv": table(with_commas(), delimiter=";"),
     "quotes.csv": table(with_commas(quote='"')),
     "quoted-tabs.tsv": table(with_commas(quote='"'), delimiter="\t"),
+    "blanks.txt": table(with_commas(), delimiter="  "),
     "walk.sto": opensim(with_commas()),
     "blanks.mot": opensim(with_commas(), delimiter="  "),
     "quotes.mot": opensim(with_commas(quote='"')),
@@ -387,6 +388,33 @@ def test_a_table_that_counts_frames_is_told_that_it_needs_times(tmp_path):
     with pytest.raises(ConfigError, match="no time column") as caught:
         read(tmp_path, "walk.csv", table(header=("frame_idx", *HEADER[1:])))
     assert "counts frames" in caught.value.advice
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("\n \n", "is empty"),
+        ("time (s),angle 1 (rad),angle 2 (rad)\n", "has a header and no rows of numbers"),
+        (table(delimiter="|"), "separates its columns by vertical bars"),
+        (table(header=("time", "angle_1", "angle_2"), delimiter=" "), "separates its columns by blanks"),
+    ],
+)
+def test_a_file_without_a_table_says_what_is_the_matter(text, message, tmp_path):
+    with pytest.raises(ConfigError, match=message):
+        read(tmp_path, "walk.txt", text)
+
+
+def test_a_table_of_two_tracks_says_how_to_export_it(tmp_path):
+    text = "mass_A\t\t\tmass_B\nt\tx\ty\tt\tx\ty\n0.0\t1.0\t2.0\t0.0\t1.5\t2.5\n0.1\t1.1\t2.1\t0.1\t1.6\t2.6\n"
+    with pytest.raises(ConfigError, match="Tracker with several tracks") as caught:
+        read(tmp_path, "walk.txt", text)
+    assert "Export each track by itself" in caught.value.advice
+
+
+def test_angles_in_milliradians_are_read(tmp_path):
+    rows = [[row[0], *(f"{1e3 * float(cell):.9f}" for cell in row[1:])] for row in ROWS]
+    assert holds_the_walk(read(tmp_path, "walk.csv", table(rows, ("time (s)", "angle 1 (mrad)", "angle 2 (mrad)"))))
 
 
 # Encodings, and files that are none

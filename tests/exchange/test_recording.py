@@ -157,7 +157,7 @@ def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_pat
         ("walk.req", "x", "unsupported format"),
         ("walk.xlsx", "x", "unsupported format"),
         ("walk", "x", "no extension"),
-        ("walk.csv", "", "no header"),
+        ("walk.csv", "", "is empty"),
         ("walk.csv", "1,2,3\n4,5,6\n", "no header"),
         (
             "walk.csv",

@@ -52,6 +52,7 @@ EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 """Texts of cells without a value, in lower case."""
 THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Pattern for numbers whose comma may also separate thousands."""
+COMMAS_AND_BLANKS: Final = re.compile(r" *[-+]?\d+,\d+(?: +[-+]?\d+,\d+(?:[eE][-+]?\d+)?)+ *")
 DECLARED_ENCODING: Final = re.compile(rb"""\s*<\?xml[^>]*encoding\s*=\s*["']([\w.-]+)""")
 NO_FILE: Final = "there is no such file"
 LONGEST_PATH: Final = 200  # characters of a path that messages show
@@ -62,6 +63,10 @@ WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.s
 ONE_TABLE: Final = (
     "Write a table with a column of times and all points side by side: time (s),hip.x,hip.y,foot1.x,foot1.y,..."
 )
+TRACKS: Final = (
+    "Export each track by itself (File > Export > Data File, one track), and put the columns side by side under one "
+    "header: time (s),hip.x,hip.y,foot1.x,foot1.y,..."
+)
 EXPORT_MARKERS: Final = "Export the markers as .c3d or .trc."
 PROGRAMS: Final = {
     re.compile(r"(?:Trajectories|Devices|Joints|Segments|Model Outputs)\W*\n"): ("Vicon Nexus", EXPORT_MARKERS),
@@ -71,6 +76,7 @@ PROGRAMS: Final = {
         "Export it with column headers and time, or export the markers as .c3d.",
     ),
     re.compile(r"scorer,"): ("DeepLabCut, which counts frames", ONE_TABLE),
+    re.compile(r"mass[ _]\w+\W+mass[ _]\w+[^\n]*\n"): ("Tracker with several tracks", TRACKS),
     re.compile(r"mass[ _]\w+\W*\n#?t\Wx\Wy"): ("Tracker with a single point", ONE_TABLE),
 }
 """Program and advice by the beginning of a table that must be exported in another way."""
@@ -100,6 +106,7 @@ class Recording:
     kind_units: dict[str, str] = field(default_factory=dict)
     # reason by column why it cannot be used, such as a cell with text
     problems: dict[str, str] = field(default_factory=dict)
+    unseen: dict[str, str] = field(default_factory=dict)  # by column of a marker, what is taken for a gap, and where
 
     @property
     def time_name(self) -> str | None:
@@ -164,12 +171,22 @@ def read_delimited(path: Path) -> Recording:
     for beginning, (program, advice) in PROGRAMS.items():
         if beginning.match(text):
             raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
-    lines = text.splitlines()
+    lines = without_blanks(text.splitlines())
     delimiter, header, unit_row, first = header_of(path, lines)
     names, units = names_and_units(header)
     names = [name or f"column {number}" for number, name in enumerate(names, 1)]
     stated = {name: of_row or unit for name, of_row, unit in zip(names, unit_row, units, strict=True) if of_row or unit}
     return table_of(path, names, (row for row in rows_of(lines, delimiter) if row[0] >= first), stated)
+
+
+def without_blanks(lines: list[str]) -> list[str]:
+    """Return lines with semicolons between columns if blanks separate numbers with decimal commas."""
+    last = next((line for line in reversed(lines) if line.strip()), "")
+    if not COMMAS_AND_BLANKS.fullmatch(last):
+        return lines
+    count = len(last.split())
+    names = [re.split(" {2,}", line.strip()) for line in lines]
+    return [";".join(wide if len(wide) == count else line.split()) for line, wide in zip(lines, names, strict=True)]
 
 
 def text_of(path: Path) -> str:
@@ -216,11 +233,27 @@ def header_of(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[st
             numbers = sum(map(is_number, names))
             if alike and any(names) and numbers < (1 if only_words else len(names)) and any(map(is_number, cells)):
                 return delimiter, names, units, line
+    refuse_without_table(path, lines)
     raise ConfigError(
         f"{path} has no header with the names of its columns.",
         "Its first row must name them, separated by commas, semicolons or tabs: time (s), angle 1 (rad), ... "
         "Numbers with decimal commas need semicolons, tabs or quotes.",
     )
+
+
+def refuse_without_table(path: Path, lines: Sequence[str]) -> None:
+    """Raise ConfigError for a file that is empty, has no rows, or separates its columns in another way."""
+    rows = [line for line in lines if line.strip()]
+    if not rows:
+        raise ConfigError(f"{path} is empty.", "Export it again.")
+    if len(rows) == 1 and any(character.isalpha() for character in rows[0]):
+        raise ConfigError(f"{path} has a header and no rows of numbers.", "Export it again, with its samples.")
+    for separator, name in (("|", "vertical bars"), (":", "colons"), (None, "blanks")):
+        cells = [[cell.strip() for cell in row.split(separator)] for row in rows[-2:]]
+        if all(sum(map(is_number, row)) > 1 for row in cells):
+            raise ConfigError(
+                f"{path} separates its columns by {name}.", "Separate them by commas, semicolons or tabs."
+            )
 
 
 def without_blank_end(cells: list[str], count: int) -> list[str]:

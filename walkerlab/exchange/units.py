@@ -6,7 +6,7 @@ from typing import Final
 
 DEG_RAD: Final = math.pi / 180.0
 ANGLES: Final = {
-    "rad": 1.0, "radian": 1.0, "deg": DEG_RAD, "degree": DEG_RAD, "°": DEG_RAD,
+    "rad": 1.0, "radian": 1.0, "mrad": 1e-3, "milliradian": 1e-3, "deg": DEG_RAD, "degree": DEG_RAD, "°": DEG_RAD,
 }  # fmt: skip
 LENGTHS: Final = {
     "m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 1e-3, "millimeter": 1e-3, "millimetre": 1e-3, "cm": 1e-2,
