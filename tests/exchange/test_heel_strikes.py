@@ -146,16 +146,72 @@ def test_swapped_legs_are_named_and_swapped_back(tmp_path):
     ]
 
 
-def test_legs_that_are_swapped_as_they_pass_cut_the_walk(tmp_path):
-    """From then on the same leg seems to strike twice in a row."""
+def test_legs_that_are_swapped_as_they_pass_are_swapped_back(tmp_path):
+    """From then on the same leg would seem to strike twice in a row."""
     time, angle = sampled(fps=1000.0)
     rows = time > 4.0 * PERIOD_S
     first = np.flatnonzero(rows & (angle[:, 0] - angle[:, 1] > 0.0))[0]
     angle[first:] = angle[first:, ::-1]
     summary = read(tmp_path, time, angle)
-    assert summary["steps"] == 4
+    assert summary["steps"] == 7
     assert all_steps_are_right(summary)
-    assert "The same leg strikes twice in a row (leg 2 at time 2.81439 and 3.51798 s)" in summary["doubts"][0]
+    assert "The legs are swapped at samples 3142 to 5277" in summary["doubts"][0]
+
+
+@pytest.mark.parametrize("at_s", [0.3, 1.0, 1.8, 2.31])
+@pytest.mark.parametrize("fps", [60.0, 100.0, 240.0])
+def test_legs_that_are_swapped_near_each_other_are_swapped_back(at_s, fps, tmp_path):
+    """One of both exchanges may not be visible, because the legs pass each other."""
+    time, angle = sampled(fps=fps, noise=3e-4)
+    first = int(at_s * fps)
+    angle[first : first + 3] = angle[first : first + 3, ::-1]
+    summary = read(tmp_path, time, angle)
+    assert summary["steps"] == 7
+    assert all_steps_are_right(summary, period=4e-3, length=3e-3)
+    assert len(summary["doubts"]) == 1
+    assert f"The legs are swapped at samples {first + 1} to" in summary["doubts"][0]
+
+
+@pytest.mark.parametrize("fps", [50.0, 100.0, 240.0])
+@pytest.mark.parametrize("size", [-0.05, 0.05, 0.1])
+@pytest.mark.parametrize("at_s", [1.5, 4.0 * PERIOD_S])
+def test_a_sensor_that_slips_is_named_and_the_longest_part_is_kept(at_s, size, fps, tmp_path):
+    time, angle = sampled(fps=fps, noise=2e-4)
+    time, angle = time[time > 0.1], angle[time > 0.1]
+    first = int(np.searchsorted(time, at_s))
+    if at_s < 2.0:
+        angle[:first, 0] += size
+    else:
+        angle[first:, 0] += size
+    summary = read(tmp_path, time, angle)
+    assert all_steps_are_right(summary, period=3e-3, length=3e-3)
+    (doubt,) = summary["doubts"]
+    slip = re.search(r"angle 1 jumps by (\S+) rad from sample (\d+) to (\d+)", doubt)
+    assert float(slip[1]) == pytest.approx(-size if at_s < 2.0 else size, abs=0.004)
+    assert int(slip[3]) == first + 1
+
+
+@pytest.mark.parametrize("size", [0.005, 0.02, -0.05])
+@pytest.mark.parametrize("beside", [-3, -1, 0, 2])
+@pytest.mark.parametrize("leg", [0, 1])
+def test_a_glitch_at_a_heel_strike_is_named_and_left_out(leg, beside, size, tmp_path):
+    time, angle = sampled(noise=2e-4)
+    row = int(np.searchsorted(time, 3.0 * PERIOD_S)) + beside
+    angle[row, leg] += size
+    summary = read(tmp_path, time, angle)
+    assert all_steps_are_right(summary, period=2e-3, length=1.5e-3)
+    place = f"sample {row + 1} (time {time[row]:.6g} s)"
+    assert summary["doubts"] == [f"Angle {leg + 1} is off its course at {place}, which is left out."]
+
+
+@pytest.mark.parametrize("rows", [[250], [120, 320], [300, 301, 302]])
+def test_large_outliers_are_named_and_left_out(rows, tmp_path):
+    time, angle = sampled(noise=5e-4)
+    angle[rows, 1] += 0.4
+    summary = read(tmp_path, time, angle)
+    assert all_steps_are_right(summary, period=4e-3, length=3e-3)
+    (doubt,) = summary["doubts"]
+    assert all(f"{time[row]:.6g} " in doubt for row in (rows[0], rows[-1]))
 
 
 def test_angles_from_the_upward_vertical_are_unwrapped_and_named(tmp_path):
@@ -207,6 +263,37 @@ def test_an_offset_of_one_sensor_is_named(tmp_path):
     assert float(offset[1]) == pytest.approx(math.degrees(0.02), abs=0.1)
 
 
+@pytest.mark.parametrize("offset", [0.005, 0.02, -0.03])
+def test_opposite_offsets_are_named_where_lengths_alternate(offset, tmp_path):
+    time, angle = sampled(noise=2e-4)
+    summary = read(tmp_path, time, angle + np.array([offset, -offset]))
+    (doubt,) = summary["doubts"]
+    assert "Lengths of steps alternate" in doubt
+    found = [float(value) for value in re.findall(r"angle \d is (\S+) degrees too large", doubt)]
+    assert found == pytest.approx(np.degrees([offset, -offset]), abs=0.05)
+
+
+@pytest.mark.parametrize("distort", [lambda angle: angle * [0.95, 1.0], lambda angle: np.round(angle, 2)])
+def test_a_gain_and_coarse_digits_are_not_taken_for_a_tilt(distort, tmp_path):
+    time, angle = sampled(noise=2e-4, seed=2)
+    (doubt,) = read(tmp_path, time, distort(angle))["doubts"]
+    assert "a wrong gain, a tilt or coarse digits may be behind it" in doubt
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.2, 0.3])
+def test_steps_found_in_noise_are_refused(noise, tmp_path):
+    time, angle = sampled()
+    noisy = angle + noise * np.random.default_rng(4).standard_normal(angle.shape)
+    with pytest.raises(ConfigError, match="would be noise"):
+        read(tmp_path, time, noisy)
+
+
+def test_steps_far_shorter_than_a_leg_swings_are_refused(tmp_path):
+    time, angle = sampled()
+    with pytest.raises(ConfigError, match=r"steps of 0\.1\d* s are not credible, because a leg of this walker swings"):
+        read(tmp_path, 0.15 * time, angle)
+
+
 def test_angles_from_the_floor_are_named_as_a_tilt(tmp_path):
     time, angle = sampled(fps=60.0, noise=2e-4)
     summary = read(tmp_path, time, angle + SLOPE)
@@ -229,6 +316,17 @@ def test_legs_too_far_apart_are_refused_until_the_unit_is_stated(tmp_path):
     with pytest.raises(ConfigError, match="the legs are 107 degrees apart at time"):
         walkerlab.read_walk(path, slope_deg=0.0)
     assert walkerlab.read_walk(path, units={"angle": "rad"}, slope_deg=0.0).summary["steps"] == 7
+
+
+def test_angles_so_small_that_their_unit_may_be_wrong_raise_a_doubt(tmp_path):
+    """Radians that the header calls degrees, measured from the slope's normal."""
+    time, angle = sampled()
+    header = "time (s),angle 1 (deg),angle 2 (deg)"
+    rows = "\n".join(f"{t:.9f},{a:.12g},{b:.12g}" for t, (a, b) in zip(time, angle + SLOPE, strict=True))
+    path = tmp_path / "walk.csv"
+    path.write_text(f"{header}\n{rows}\n", encoding="utf-8")
+    doubts = walkerlab.read_walk(path, slope_deg=0.0).summary["doubts"]
+    assert any("only 0.37 degrees apart at heel strikes. The unit" in doubt for doubt in doubts)
 
 
 def places_of(angle, belt_m_s=0.0, fps=100.0):
@@ -309,7 +407,11 @@ def test_a_marker_that_was_not_seen_is_a_gap_and_a_foot_at_the_origin_is_not(tmp
     assert np.abs(places[:70, 2]).max() < 1e-9
     assert all_steps_are_right(read_places(tmp_path, places))
     places[100:112, 1] = 0.0
-    with pytest.raises(ConfigError, match=r"FOOT1\.x. lacks 12 of \d+ values, the first at sample 101"):
+    with pytest.raises(ConfigError, match=r"FOOT1\.x. lacks 12 of \d+ values, the first at sample 101") as zeros:
+        read_places(tmp_path, places)
+    assert "(0, 0, 0) at samples 101 to 112 is taken for 'not seen'" in zeros.value.message
+    places[100:112, 1] = -9.999
+    with pytest.raises(ConfigError, match=r"\(-9999, -9999, -9999\) at samples 101 to 112 is taken for 'not seen'"):
         read_places(tmp_path, places)
 
 
@@ -317,8 +419,22 @@ def test_a_jump_of_a_legs_length_is_named(tmp_path):
     places = places_of(sampled()[1])
     places[250, 1, 1] += 0.1
     summary = read_places(tmp_path, places)
-    assert summary["doubts"] == ["The length of HIP>FOOT1 jumps at samples 251 to 252 (time 2.5 to 2.51 s)."]
+    assert summary["doubts"] == ["The length of HIP>FOOT1 jumps at sample 251 (time 2.5 s)."]
     assert all_steps_are_right(summary)
+    places = places_of(sampled()[1])
+    places[250:262, 1, 2] += 0.1
+    summary = read_places(tmp_path, places)
+    assert summary["doubts"] == ["The length of HIP>FOOT1 jumps at samples 251 to 262 (time 2.5 to 2.61 s)."]
+    assert all_steps_are_right(summary, length=2e-4)
+
+
+@pytest.mark.parametrize("first", [30, 100, 180, 250])
+def test_feet_that_are_swapped_apart_sideways_are_swapped_back(first, tmp_path):
+    places = places_of(sampled()[1])
+    places[first : first + 10, [1, 2]] = places[first : first + 10, [2, 1]]
+    summary = read_places(tmp_path, places)
+    assert all_steps_are_right(summary)
+    assert f"The legs are swapped at samples {first + 1} to {first + 10}" in summary["doubts"][0]
 
 
 def test_running_is_named(tmp_path):

@@ -12,7 +12,14 @@ from typing import Final
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.marker_lines import Line, find_plane, length_doubts, refuse_running, unseen_as_gaps
+from walkerlab.exchange.marker_lines import (
+    Line,
+    find_plane,
+    length_doubts,
+    refuse_running,
+    swap_lines_back,
+    unseen_as_gaps,
+)
 from walkerlab.exchange.recording import TIME, UNIT_IN_NAME, Array, Recording
 from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
 
@@ -78,7 +85,8 @@ def as_walk(
             raise missing(recording, name)
     ends = {name: pairs for name, source in sources.items() if (pairs := ends_of(recording, source))}
     for pairs in ends.values():
-        recording = replace(recording, columns=unseen_as_gaps(recording.columns, pairs))
+        columns_with_gaps, unseen = unseen_as_gaps(recording.columns, pairs)
+        recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
     asked = {**dict.fromkeys(NEEDED), **named}.keys()
     part, cut = without_gaps_at_ends(recording, [sources[name] for name in asked])
     left_out |= {"samples": cut} if cut else {}
@@ -107,15 +115,14 @@ def as_walk(
 
 def with_lines(walk: RecordedWalk, lines: Mapping[str, Line], source: str) -> RecordedWalk:
     """Add the angles of lines between markers (by quantity) to a walk; raises ConfigError for running."""
+    lines, swaps = swap_lines_back(lines, walk.quantities[SAMPLE], walk.time_s)
     plane = find_plane(lines, walk.walks)
     refuse_running(lines, plane, source)
     angles = {name: plane.angle(line) for name, line in lines.items()}
     hip = next(iter(lines.values()))[0] @ plane.ahead
     by_source = {walk.sources[name]: line for name, line in lines.items()}
-    doubts = length_doubts(by_source, walk.quantities[SAMPLE], walk.time_s)
-    return replace(
-        walk, quantities={**walk.quantities, **angles, HIP_OF_LINES: hip}, lines=tuple(lines), doubts=tuple(doubts)
-    )
+    doubts = *swaps, *length_doubts(by_source, walk.quantities[SAMPLE], walk.time_s)
+    return replace(walk, quantities={**walk.quantities, **angles, HIP_OF_LINES: hip}, lines=tuple(lines), doubts=doubts)
 
 
 def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
@@ -158,9 +165,8 @@ def refuse_gaps(recording: Recording, source: str, part: slice) -> None:
         if gaps.size:
             raise ConfigError(
                 f"{recording.path}: {column!r} lacks {gaps.size} of {values.size} values, the first at sample "
-                f"{gaps[0] + 1}.",
-                "Fill the gaps, or cut the recording to a part without them. A marker at (0, 0, 0) counts as a gap if "
-                "its leg would have another length.",
+                f"{gaps[0] + 1}{f': {unseen}' if (unseen := recording.unseen.get(column)) else ''}.",
+                "Fill the gaps, or cut the recording to a part without them.",
             )
 
 

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk
-from walkerlab.exchange.marker_lines import spell_samples
+from walkerlab.exchange.marker_lines import NAMED, spell_samples, swap_doubt, swapped_rows
 from walkerlab.exchange.rate_jumps import AHEAD, Array, apart_runs
+from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
 from walkerlab.exchange.touches import ERRORS
 
-FASTEST: Final = 6.0  # fastest credible motion between two samples, as a multiple of fast motions' speed
-FAST_PERCENT: Final = 80  # percentage of the motions between samples that are slower than fast ones
 UPRIGHT_RAD: Final = math.pi / 4  # largest median of a leg's angle from the vertical
 FEWEST_PASSING: Final = 3  # fewest sample intervals of a passing of the legs
 TINY: Final = 1e-30  # rad^2, added to a variance that may be zero
@@ -42,7 +41,7 @@ def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
 
     Raises ConfigError for angles that are not those of two legs near the vertical.
     """
-    return without_outliers(swap_back(keep_one_way(unwrap(walk, source))))
+    return on_course(swap_back(keep_one_way(unwrap(walk, source))))
 
 
 def legs(walk: RecordedWalk) -> Array:
@@ -69,7 +68,7 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
     """
     for name in ("angle 1", "angle 2"):
         raw = walk.quantities[name]
-        if (largest := float(np.percentile(np.abs(raw), FAST_PERCENT))) > 2.0 * math.pi:
+        if (largest := float(np.percentile(np.abs(raw), FAR_PERCENT))) > 2.0 * math.pi:
             raise ConfigError(
                 f"{source}: {name} from the vertical reaches {largest:.3g} rad, more than a turn.",
                 "State the unit of angles, e.g. --units angle=deg, or remove outliers.",
@@ -92,74 +91,47 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
     return walk
 
 
-@dataclass(frozen=True)
-class Reach:
-    """Largest credible motion of a leg between two samples: speed (rad/s), and what noise allows (rad)."""
-
-    speed_rad_s: float
-    noise_rad: float
-
-    def within(self, interval: Array) -> Array:
-        """Return the largest credible motion (rad) in an interval (s)."""
-        return np.maximum(self.speed_rad_s * interval, self.noise_rad)
-
-
-def credible_reach(walk: RecordedWalk) -> Reach:
-    moved = np.abs(np.diff(legs(walk), axis=0))
-    speeds = moved / np.diff(walk.time_s)[:, None]
-    fast = (float(np.percentile(values, FAST_PERCENT)) for values in (speeds, moved))
-    return Reach(*(FASTEST * value for value in fast))
-
-
 def swap_back(walk: RecordedWalk) -> RecordedWalk:
     """Swap the legs back where their angles change places from one sample to the next."""
-    angle, credible = legs(walk), credible_reach(walk).within(np.diff(walk.time_s))
-    straight, exchanged = (np.abs(after - angle[:-1]).sum(axis=1) for after in (angle[1:], angle[1:, ::-1]))
-    changes = (straight - exchanged > credible) & (exchanged < credible)
-    swapped = np.append(0, np.cumsum(changes)) % 2 == 1
+    angle = legs(walk)
+    swapped = swapped_rows(walk.time_s, angle[:, :1] - angle[:, 1:])
     if not swapped.any():
         return walk
-    swapped = swapped if np.mean(swapped) <= 0.5 else ~swapped
     quantities = dict(walk.quantities)
     for first in [name for name in quantities if name.endswith(" 1")]:
         second = f"{first[:-1]}2"
         if second in quantities:
             pair = quantities[first], quantities[second]
             quantities[first], quantities[second] = np.where(swapped, pair[::-1], pair)
-    places = spell_samples(walk.time_s, walk.quantities[SAMPLE], swapped)
-    doubt = f"The legs are swapped at {places}, and are swapped back there."
-    return doubting(replace(walk, quantities=quantities), doubt)
+    return doubting(replace(walk, quantities=quantities), swap_doubt(walk.time_s, walk.quantities[SAMPLE], swapped))
 
 
-def without_outliers(walk: RecordedWalk) -> RecordedWalk:
-    """Leave out samples in which a leg is where it cannot have moved."""
-    reach, left_out = credible_reach(walk), np.zeros(walk.time_s.size, bool)
-    for name in ("angle 1", "angle 2"):
-        outliers = unreachable(walk.time_s, walk.quantities[name], reach)
-        if outliers.any():
-            places = spell_samples(walk.time_s, walk.quantities[SAMPLE], outliers)
-            walk = doubting(walk, f"{name.capitalize()} is off its course at {places}, which is left out.")
-        left_out |= outliers
-    return only_rows(walk, ~left_out)
-
-
-def unreachable(time: Array, angle: Array, reach: Reach) -> NDArray[np.bool_]:
-    """Return which samples (samples,) cannot be reached from the nearest sample that can."""
-    outliers = np.zeros(time.size, bool)
-    jumps = np.abs(np.diff(angle)) > reach.within(np.diff(time))
-    calm = np.flatnonzero(~jumps[1:] & ~jumps[:-1])
-    if not jumps.any() or not calm.size:
-        return outliers
-    start, instants, values = int(calm[0]) + 1, time.tolist(), angle.tolist()
-    for order in (range(start, time.size), range(start, -1, -1)):
-        last = start
-        for row in order:
-            farthest = max(reach.speed_rad_s * abs(instants[row] - instants[last]), reach.noise_rad)
-            if abs(values[row] - values[last]) <= farthest:
-                last = row
-            else:
-                outliers[row] = True
-    return outliers
+def on_course(walk: RecordedWalk) -> RecordedWalk:
+    """Leave out samples at which a leg is off its course, and cut where an angle jumps and stays beside it."""
+    stretches = find_stretches(walk.time_s, legs(walk))
+    off, numbers = np.zeros((walk.time_s.size, 2), bool), walk.quantities[SAMPLE]
+    for stretch in stretches:
+        if not stretch.lasts:
+            off[stretch.first : stretch.end, stretch.leg] = True
+    for leg in np.flatnonzero(off.any(axis=0)).tolist():
+        places = spell_samples(walk.time_s, numbers, off[:, leg])
+        walk = doubting(walk, f"Angle {leg + 1} is off its course at {places}, which is left out.")
+    rows = np.asarray(~off.any(axis=1))
+    if jumps := [stretch for stretch in stretches if stretch.lasts]:
+        cuts = sorted({0, walk.time_s.size, *(jump.first for jump in jumps)})
+        begin, end = max(pairwise(cuts), key=lambda part: part[1] - part[0])
+        spelled = ", ".join(
+            f"angle {jump.leg + 1} jumps by {jump.offset_rad:.3g} rad from sample {numbers[jump.first - 1]:.0f} to "
+            f"{numbers[jump.first]:.0f} (time {walk.time_s[jump.first]:.6g} s)"
+            for jump in jumps[:NAMED]
+        )
+        kept = f"from time {walk.time_s[begin]:.6g} to {walk.time_s[end - 1]:.6g} s"
+        doubt = (
+            f"As if a sensor had slipped, a jump lasts: {spelled}. Only the longest part without one is kept, {kept}."
+        )
+        walk = doubting(walk, doubt)
+        rows[:begin] = rows[end:] = False
+    return only_rows(walk, rows)
 
 
 def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
@@ -196,7 +168,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
 def find_ways(time: Array, angle: Array) -> list[Way]:
     """Return the stretches of a walk in one direction; a single passing of the legs the other way does not count."""
     spread, total = angle[:, 0] - angle[:, 1], angle.sum(axis=1)
-    runs = apart_runs(np.abs(spread) > AHEAD * np.percentile(np.abs(spread), FAST_PERCENT), spread > 0.0)
+    runs = apart_runs(np.abs(spread) > AHEAD * np.percentile(np.abs(spread), FAR_PERCENT), spread > 0.0)
     trends = [
         (last, first, trend(time[last : first + 1], total[last : first + 1]))
         for (_, last), (first, _) in pairwise(runs)

@@ -6,7 +6,7 @@ ahead shows only as the legs pass each other, see `leg_angles`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -24,8 +24,13 @@ JUMP: Final = 8.0  # change of a line's length between samples that is a jump, i
 SMALLEST_JUMP: Final = 0.01  # the same, as a fraction of the length
 NEIGHBOURS: Final = 5  # number of changes whose median a jump differs from
 NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
+PLANE_FITS: Final = 3
 RUNNING: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
 FEWEST_SWINGS: Final = 3
+FEWEST_FOR_SWAPS: Final = 4
+FAST_PERCENT: Final = 80  # percentage of the motions between samples that are slower than fast ones
+EXCHANGE: Final = 0.2  # squared unevenness that an exchange must save, in squares of fast motions
+SCATTER: Final = 40.0  # the same, in medians of the squared unevenness
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +47,81 @@ class WalkPlane:
 
 
 def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
-    """Return in words the samples at `rows` (samples,), by their numbers in the file."""
+    """Return in words the samples at `rows` (samples,), by their numbers in the file, and their times."""
+
+    def spell_times(first: int, last: int) -> str:
+        return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
+
+    return spell_numbers(numbers, rows, spell_times)
+
+
+def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[int, int], str] | None = None) -> str:
+    """Return in words the samples at `rows` (samples,), each stretch with an addition for its first and last row."""
     runs = apart_runs(rows, rows)
     places = [
-        f"sample {numbers[first]:.0f} (time {time[first]:.6g} s)"
-        if first == last
-        else f"samples {numbers[first]:.0f} to {numbers[last]:.0f} (time {time[first]:.6g} to {time[last]:.6g} s)"
+        (f"sample {numbers[first]:.0f}" if first == last else f"samples {numbers[first]:.0f} to {numbers[last]:.0f}")
+        + (addition(first, last) if addition else "")
         for first, last in runs[:NAMED]
     ]
     return ", ".join(places) + (f" and {len(runs) - NAMED} more places" if len(runs) > NAMED else "")
+
+
+def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
+    """Return the samples (samples,) at which two things have changed places: at most half of them.
+
+    Of all exchanges, those are chosen with which both move most evenly from sample to sample; each must save as much as
+    fast motions or scatter cost.
+
+    apart  (samples, axes) difference of both
+    """
+    if len(apart) < FEWEST_FOR_SWAPS or not apart.any():
+        return np.zeros(len(apart), bool)
+    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
+
+    def uneven(before: Array, between: Array, after: Array) -> Array:
+        return np.asarray(np.sum((between - (1.0 - share) * before - share * after) ** 2, axis=1))
+
+    before, between, after = apart[:-2], apart[1:-1], apart[2:]
+    costs = [[uneven(first * before, between, last * after) for last in (1.0, -1.0)] for first in (1.0, -1.0)]
+    fast = float(np.percentile(np.sum(np.diff(apart, axis=0) ** 2, axis=1), FAST_PERCENT))
+    least = max(EXCHANGE * fast, SCATTER * float(np.median(costs[0][0])))
+    # the cheapest way to each gap between samples, without and with an exchange there
+    stays, changes, ways = 0.0, least, list[tuple[bool, bool]]()
+    for (no_no, no_yes), (yes_no, yes_yes) in np.array(costs).transpose(2, 0, 1).tolist():
+        ways.append((changes + yes_no < stays + no_no, changes + yes_yes < stays + no_yes))
+        stays, changes = min(stays + no_no, changes + yes_no), min(stays + no_yes, changes + yes_yes) + least
+    exchanges = [changes < stays]
+    for way in reversed(ways):
+        exchanges.append(way[exchanges[-1]])
+    swapped = np.append(0, np.cumsum(exchanges[::-1])) % 2 == 1
+    swapped = swapped if np.mean(swapped) <= 0.5 else ~swapped
+    mended = np.where(swapped[:, None], -apart, apart)
+    rough = np.pad(uneven(mended[:-2], mended[1:-1], mended[2:]) > least, 1)
+    for first, last in apart_runs(swapped, swapped):
+        # an outlier of one of both is no exchange
+        if rough[max(first - 1, 0) : first + 1].any() or rough[last : last + 2].any():
+            swapped[first : last + 1] = False
+    return np.asarray(swapped)
+
+
+def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
+    """Swap the ends of both legs' lines back where they change places; return the lines, and what was done."""
+    mended, doubts = dict(lines), list[str]()
+    for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
+        if second not in lines:
+            continue
+        (top, bottom), (other_top, other_bottom) = mended[first], mended[second]
+        rows = [swapped_rows(time, top - other_top), swapped_rows(time, bottom - other_bottom)]
+        tops, bottoms = rows[0][:, None], rows[1][:, None]
+        mended[first] = np.where(tops, other_top, top), np.where(bottoms, other_bottom, bottom)
+        mended[second] = np.where(tops, top, other_top), np.where(bottoms, bottom, other_bottom)
+        if (swapped := rows[0] | rows[1]).any():
+            doubts.append(swap_doubt(time, numbers, swapped))
+    return mended, doubts
+
+
+def swap_doubt(time: Array, numbers: Array, swapped: NDArray[np.bool_]) -> str:
+    return f"The legs are swapped at {spell_samples(time, numbers, swapped)}, and are swapped back there."
 
 
 def legs_among(lines: Mapping[str, Line]) -> list[Line]:
@@ -74,7 +145,11 @@ def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     two = len(legs) > 1 and not np.array_equal(against[0], against[1], equal_nan=True)  # one leg may stand for both
     motion = against[0] - (against[1] if two else 0.0)
     motion = (motion - np.mean(motion, axis=0)) * ~vertical
-    ahead = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0][:, 0]
+    for _ in range(PLANE_FITS):
+        ahead, sideways = np.linalg.svd(motion.T @ motion + np.diag(1e-12 * ~vertical))[0].T[:2]
+        # a marker that jumps sideways would turn the plane
+        off = np.abs(motion @ sideways - np.median(motion @ sideways))
+        motion = motion[off <= JUMP * NORMAL * np.median(off) + SMALLEST_JUMP * np.ptp(motion @ ahead)]
     drift = float((legs[0][0][-1] - legs[0][0][0]) @ ahead)
     return WalkPlane(up, ahead if drift > 0.0 else -ahead)
 
@@ -93,10 +168,13 @@ def stated_direction(walks: str, up: Array) -> Array:
     return np.asarray(direction[: up.size])
 
 
-def unseen_as_gaps(columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]) -> dict[str, Array]:
-    """Return columns with gaps where an end of a line lies at the origin and the line's length is not the usual one.
+def unseen_as_gaps(
+    columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """Return columns with gaps for markers that were not seen, and by column what was taken for such a gap.
 
-    Programs write zeros for a marker that they did not see, but a foot may well stand at the origin.
+    Programs write zeros for a marker that they did not see, or another value for all of its coordinates. But a foot may
+    well stand at the origin: such a place is a gap if the length of its line is not the usual one.
 
     pairs  columns of both ends for each coordinate
     """
@@ -104,24 +182,25 @@ def unseen_as_gaps(columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]
     places = [np.stack([columns[name] for name in names], axis=1) for names in ends]
     length = np.linalg.norm(places[1] - places[0], axis=1)
     seen = length[np.isfinite(length)]
+    gaps, unseen = dict(columns), dict[str, str]()
     if not seen.size:
-        return dict(columns)
+        return gaps, unseen
     usual = float(np.median(seen))
     allowed = max(JUMP * NORMAL * float(np.median(np.abs(seen - usual))), SMALLEST_JUMP * usual)
-    gaps = dict(columns)
     for names, place in zip(ends, places, strict=True):
-        zeros = np.all(place == 0.0, axis=1)
-        for first, last in apart_runs(zeros, zeros):
-            if np.any(np.abs(length[first : last + 1] - usual) > allowed):
-                for name in names:
-                    gaps[name] = np.concatenate(
-                        (gaps[name][:first], np.full(last + 1 - first, np.nan), gaps[name][last + 1 :])
-                    )
-    return gaps
+        alike = np.ptp(place, axis=1) == 0.0
+        for first, last in apart_runs(alike, alike):
+            alike[first : last + 1] = np.any(np.abs(length[first : last + 1] - usual) > allowed)
+        if alike.any():
+            value = ", ".join(f"{each:g}" for each in place[np.argmax(alike)])
+            text = f"({value}) at {spell_numbers(1.0 + np.arange(alike.size), alike)} is taken for 'not seen'"
+            unseen |= dict.fromkeys(names, text)
+            gaps |= {name: np.where(alike, np.nan, gaps[name]) for name in names}
+    return gaps, unseen
 
 
 def length_doubts(lines: Mapping[str, Line], numbers: Array, time: Array) -> list[str]:
-    """Name the samples at which the length of a leg jumps, because legs are rigid and knees bend smoothly."""
+    """Name the samples at which the length of a leg is off, because legs are rigid and knees bend smoothly."""
     doubts = []
     for name, (top, bottom) in lines.items():
         length = np.linalg.norm(top - bottom, axis=1)
@@ -129,10 +208,16 @@ def length_doubts(lines: Mapping[str, Line], numbers: Array, time: Array) -> lis
             continue
         change = np.diff(length)
         around = np.lib.stride_tricks.sliding_window_view(np.pad(change, NEIGHBOURS // 2, "edge"), NEIGHBOURS)
-        sudden = np.abs(change - np.median(around, axis=1))
-        jumps = sudden > max(JUMP * NORMAL * float(np.median(sudden)), SMALLEST_JUMP * float(np.median(length)))
-        if jumps.any():
-            doubts.append(f"The length of {name} jumps at {spell_samples(time, numbers, np.append(False, jumps))}.")
+        sudden = change - np.median(around, axis=1)
+        limit = max(JUMP * NORMAL * float(np.median(np.abs(sudden))), SMALLEST_JUMP * float(np.median(length)))
+        jumps, off = np.flatnonzero(np.abs(sudden) > limit).tolist(), np.zeros(length.size, bool)
+        while jumps:
+            first = jumps.pop(0)
+            # up to the jump back, if there is one
+            back = bool(jumps) and sudden[first] * sudden[jumps[0]] < 0.0
+            off[first + 1 : (jumps.pop(0) if back else first + 1) + 1] = True
+        if off.any():
+            doubts.append(f"The length of {name} jumps at {spell_samples(time, numbers, off)}.")
     return doubts
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+NORMAL_QUARTILE: Final = 0.6745  # median of the absolute value of a normal variable with standard deviation 1
 AHEAD: Final = 0.4
 """Smallest angle between the legs at a heel strike, as a fraction of the largest during the walk."""
 WINDOW: Final = 0.1
@@ -69,6 +70,14 @@ def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list
     bounds = np.flatnonzero(np.diff(kind)) + 1
     edges = zip((0, *bounds.tolist()), (*bounds.tolist(), kind.size), strict=True)
     return [(begin, end - 1) for begin, end in edges if kind[begin]]
+
+
+def noise_of(angle: Array) -> float:
+    """Return the standard deviation (rad) of the scatter of angles (samples, 2) from sample to sample."""
+    # noise dominates the third differences of a smooth motion; their variance is 20 times its own
+    return (
+        float(np.median(np.abs(np.diff(angle, 3, axis=0)))) / (NORMAL_QUARTILE * 20.0**0.5) if len(angle) > 3 else 0.0
+    )
 
 
 def typical_interval(instants: Sequence[float], time: Array) -> float:

@@ -35,6 +35,7 @@ PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first 
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
 JUMP_SAMPLES: Final = 10  # fewest samples in that time
 JUMP_DEGREE: Final = 4
+JUMP_ERRORS: Final = 4.5  # standard errors beyond which rates jump elsewhere, of the many instants that are tried
 MOST_JUMPS: Final = 20  # number of heel strikes at which jumps are sought
 SHIFTS: Final = 61
 SIDES: Final = 2
@@ -199,14 +200,16 @@ def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
 
 
 def angles_at_jumps(
-    time: Array, angle: Array, touches: Sequence[Touch]
+    time: Array, angle: Array, touches: Sequence[Touch], period: float, errors: float = JUMP_ERRORS
 ) -> tuple[float, Array, NDArray[np.int64]] | None:
     """Find where rates jump near heel strikes: how much later (s), and the angles (jumps, 2) and legs (jumps,) there.
 
     All strikes are shifted alike, by the time that leaves the smallest residuals. Returns None unless the shift exceeds
-    three of its standard errors and the precision that heel strikes need.
+    some of its standard errors and the precision that heel strikes need.
+
+    period  s, of the steps
+    errors  number of standard errors
     """
-    period = typical_interval([touch.time_s for touch in touches], time)
     half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), WIDEST * period)
     inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
     near = [(touch.time_s, np.abs(time - touch.time_s) <= half) for touch in inside]
@@ -223,7 +226,7 @@ def angles_at_jumps(
     place = min(range(len(shifts)), key=lambda place: squares[shifts[place]])
     best, least = shifts[place], squares[shifts[place]]
     variance = least / sum(fit.freedoms for fit in trials[best])
-    if squares[0.0] - least <= ERRORS**2 * variance or not 0 < place < len(shifts) - 1:
+    if squares[0.0] - least <= errors**2 * variance or not 0 < place < len(shifts) - 1:
         return None
     # the smallest residuals between three trials, by a parabola
     before, after = squares[shifts[place - 1]], squares[shifts[place + 1]]

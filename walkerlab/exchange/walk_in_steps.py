@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
@@ -15,8 +15,9 @@ from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import RecordedWalk
 from walkerlab.exchange.leg_angles import legs
 from walkerlab.exchange.marker_lines import NAMED
-from walkerlab.exchange.rate_jumps import Array
-from walkerlab.exchange.touches import Touch, angles_at_jumps, find_touches
+from walkerlab.exchange.rate_jumps import Array, noise_of, typical_interval
+from walkerlab.exchange.smooth_course import FAR_PERCENT
+from walkerlab.exchange.touches import ERRORS, Height, Touch, angles_at_jumps, find_touches
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     STRAIGHT,
@@ -38,6 +39,15 @@ MOST_SAMPLES: Final = 250  # largest number of samples kept within a step
 LONGEST_GAP: Final = 1 / 8  # longest gap between two samples, as a fraction of the step's duration
 PLAUSIBLE: Final = (1e-6, 1e6)
 """Shortest and longest plausible step, in s or m; values outside are damaged or in another unit."""
+NARROWEST_RAD: Final = 0.02  # smallest angle between the legs at heel strikes that raises no doubt about its unit
+SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
+LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
+FEWEST_ALTERNATING: Final = 2  # fewest heel strikes of each leg that show whether lengths alternate
+ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
+SIDE_ERRORS: Final = 6.0  # standard errors beyond which one leg's rates jump elsewhere, with half of the strikes
+PHASES: Final = 21
+COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
+CONSTANT: Final = 0.25  # largest scatter of a constant error over a step, as a fraction of it
 SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
 
 
@@ -66,6 +76,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     Raises ConfigError for implausible values, a gap within a step, or a recording without a complete step.
     """
     angle = legs(walk)
+    refuse_noise(angle, source)
 
     def total(angles: Array) -> Array:
         return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
@@ -85,9 +96,14 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
             "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
             "and over at least one whole step.",
         )
-    refuse_duration((touches[-1].time_s - touches[0].time_s) / (len(touches) - 1), source)
+    step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
+    refuse_duration(step_s, source)
+    refuse_hurry(step_s, model, source)
     refuse_spread(walk, touches, source)
-    doubts += [*knee_doubts(walk, touches, model), *offset_doubts(walk.time_s, angle, touches, total, touch_sum_rad)]
+    doubts += [
+        *knee_doubts(walk, touches, model),
+        *offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height),
+    ]
     steps = divided(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
     return steps
@@ -130,30 +146,127 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
         )
 
 
+@dataclass(frozen=True)
+class Mismatch:
+    """How two signs of heel strikes differ: legs whose rates jump and feet that are level."""
+
+    shift_s: float  # how much later rates jump, at most; 0 within its standard error
+    sum_rad: float  # mean sum of the angles where rates jump, less than that of level feet
+    lengths_m: list[float]  # mean length of the steps of each leg, if they alternate
+    limps: bool  # whether periods alternate
+    between_rad: float | None  # how much larger angle 1 is than angle 2 over a step; None if that is no constant
+
+
+def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float) -> Mismatch:
+    period = typical_interval([touch.time_s for touch in touches], time)
+    sides = [[touch for touch in touches if touch.leg == leg] for leg in (0, 1)]
+    of_all = angles_at_jumps(time, angle, touches, period)
+    jumps = [of_all, *(angles_at_jumps(time, angle, side, period, SIDE_ERRORS) for side in sides)]
+    shift = max((jump[0] for jump in jumps if jump), key=abs, default=0.0)
+    sums = np.mean(feet_on_slope(model, *of_all[1].T)) - touch_sum_rad if of_all else 0.0
+    spreads = [np.array([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in side]) for side in sides]
+    periods = np.diff([touch.time_s for touch in touches])
+    lengths = [2.0 * model.leg_length * math.sin(0.5 * float(np.mean(each))) for each in spreads if each.size]
+    return Mismatch(
+        shift,
+        float(sums),
+        lengths if alternates(spreads[0], spreads[1]) else [],
+        alternates(periods[::2], periods[1::2]),
+        offset_between(time, angle, touches),
+    )
+
+
+def alternates(first: Array, second: Array) -> bool:
+    """Return whether the means of two samples differ clearly."""
+    if min(first.size, second.size) < FEWEST_ALTERNATING:
+        return False
+    error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
+    means = float(np.mean(first)), float(np.mean(second))
+    return abs(means[0] - means[1]) > max(ERRORS * error, ALTERNATING * sum(means))
+
+
+def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | None:
+    """Return the constant (rad) by which angle 1 exceeds angle 2 in all phases of their steps, or None."""
+    phases = np.linspace(0.0, 1.0, PHASES)
+    courses: list[list[Array]] = [[], []]
+    for begin, end in pairwise(touches):
+        at = begin.time_s + phases * (end.time_s - begin.time_s)
+        courses[end.leg].append(np.array([np.interp(at, time, angle[:, leg]) for leg in (end.leg, 1 - end.leg)]))
+    if not courses[0] or not courses[1]:
+        return None
+    swing, stance = (np.mean(courses[0], axis=0)[k] - np.mean(courses[1], axis=0)[k] for k in (0, 1))
+    differences = np.array([swing, -stance])
+    constant = float(np.mean(differences))
+    return constant if float(np.std(differences)) < CONSTANT * abs(constant) else None
+
+
 def offset_doubts(
-    time: Array, angle: Array, touches: list[Touch], total: Callable[[Array], Array], touch_sum_rad: float
+    time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float, height: Height
 ) -> list[str]:
-    """Name the errors of both angles that explain why rates jump at other instants than the feet are level."""
-    jumps = angles_at_jumps(time, angle, touches)
-    if jumps is None:
+    """Say where rates jump at other instants than the feet are level, or steps alternate, and which error explains it.
+
+    An error of the angles explains it if nothing of it is left without that error.
+    """
+    before = mismatch(time, angle, touches, model, touch_sum_rad)
+    alternate = bool(before.lengths_m) and before.between_rad is not None
+    if not before.shift_s and not alternate:
         return []
-    shift, at_jumps, leg = jumps
-    both = float(np.mean(total(at_jumps))) - touch_sum_rad
-    # An error of one angle makes the steps of one leg longer than those of the other, a tilt does not.
-    spread = at_jumps[:, 0] - at_jumps[:, 1]
-    apart = float(np.mean(spread[leg == 0]) + np.mean(spread[leg == 1])) / 2.0 if np.ptp(leg) else 0.0
-    errors = [math.degrees(0.5 * (both + apart)), math.degrees(0.5 * (both - apart))]
-    if abs(apart) > 0.5 * abs(both):
-        cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(errors, 1))
+    between = before.between_rad or 0.0 if alternate else 0.0
+    errors = 0.5 * (before.sum_rad + np.array([between, -between]))
+    right = find_touches(time, angle - errors, height)
+    after = mismatch(time, angle - errors, right, model, touch_sum_rad) if len(right) > 1 else before
+    degrees = np.degrees(errors)
+    digit = float(np.diff(np.unique(np.round(angle, 9))).min())
+    if after.shift_s or after.lengths_m or after.limps or digit > COARSE * float(np.abs(errors).max()):
+        cause = "no constant error of the angles explains it; a wrong gain, a tilt or coarse digits may be behind it"
+    elif alternate:
+        cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(degrees, 1))
     else:
-        cause = f"a tilt explains it, with both angles {math.degrees(0.5 * both):.2f} degrees too large"
-    moment = f"{1e3 * abs(shift):.0f} ms {'after' if shift > 0.0 else 'before'} the feet are level"
+        cause = f"a tilt explains it, with both angles {degrees[0]:.2f} degrees too large"
+    if not before.shift_s:
+        spelled = " and ".join(f"{length:.3g} m of leg {leg}" for leg, length in enumerate(before.lengths_m, 1))
+        return [f"Lengths of steps alternate, {spelled}; {cause}."]
+    moment = f"{1e3 * abs(before.shift_s):.0f} ms {'after' if before.shift_s > 0.0 else 'before'} the feet are level"
     return [f"Heel strikes are uncertain: the rates of the legs jump {moment}; {cause}."]
 
 
 def is_plausible(size: float) -> bool:
     """Return whether a step can have this duration (s) or length (m)."""
     return PLAUSIBLE[0] <= size <= PLAUSIBLE[1]
+
+
+def refuse_noise(angle: Array, source: str) -> None:
+    """Raise ConfigError if scatter hides the heel strikes."""
+    noise, apart = noise_of(angle), float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
+    if noise > LOUDEST * apart:
+        raise ConfigError(
+            f"{source}: the angles scatter by {noise:.2g} rad from sample to sample, and the legs are {apart:.2g} rad "
+            "apart: heel strikes found there would be noise.",
+            "Smooth the angles, or record them better.",
+        )
+
+
+def unit_doubts(touches: list[Touch]) -> Iterator[str]:
+    """Yield a sentence if the legs are so near each other at heel strikes that their unit may be another."""
+    apart = float(np.median([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in touches]))
+    if apart < NARROWEST_RAD:
+        yield (
+            f"The legs are only {math.degrees(apart):.2g} degrees apart at heel strikes. The unit of the angles may be "
+            "another than the file states."
+        )
+
+
+def refuse_hurry(step_s: float, model: RigidModel, source: str) -> None:
+    """Raise ConfigError for steps that are far shorter than a leg takes to swing forwards."""
+    gravity = math.hypot(model.gravity_along, model.gravity_down)
+    weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])
+    swing_s = math.pi * math.sqrt(model.A[SWING, SWING] / weight) if weight and not model.sprung else 0.0
+    if step_s < SHORTEST_STEP * swing_s:
+        raise ConfigError(
+            f"{source}: steps of {step_s:.3g} s are not credible, because a leg of this walker swings forwards in "
+            f"{swing_s:.3g} s: the heel strikes are noise, or the walker or the unit of time is another.",
+            "Smooth the angles or record them better, state the walker, or the unit of time, e.g. --units time=ms.",
+        )
 
 
 def refuse_duration(step_s: float, source: str) -> None:

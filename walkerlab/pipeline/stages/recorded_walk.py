@@ -13,6 +13,7 @@ from walkerlab.config.reads import RecordedWalkConfig
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import OF_LEG, OF_WALKER, RecordedWalk, as_walk
 from walkerlab.exchange.leg_angles import mend_angles
+from walkerlab.exchange.rate_jumps import noise_of
 from walkerlab.exchange.recording import NO_FILE, TIME, Recording, read_file, read_recording
 from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps
 from walkerlab.outcome import Outcome
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from walkerlab.config.recording import RecordedFile
     from walkerlab.config.schema import Config
 
-NORMAL_QUARTILE = 0.6745  # median of the absolute value of a normal variable with standard deviation 1
 NOISY = 0.02  # noise over amplitude above which the times of single steps are off by several per cent
 
 
@@ -59,10 +59,7 @@ def doubts_about(walk: RecordedWalk) -> Iterator[str]:
     """Yield a sentence for each reason to doubt the steps: odd angles, noise, columns or samples that are not used."""
     yield from walk.doubts
     angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
-    # noise dominates the third differences of a smooth motion; their variance is 20 times its own
-    noise = (
-        float(np.median(np.abs(np.diff(angles, 3, axis=0)))) / (0.6745 * math.sqrt(20.0)) if len(angles) > 3 else 0.0
-    )
+    noise = noise_of(angles)
     amplitude = math.sqrt(max(2.0 * float(np.var(angles, axis=0).max()) - 2.0 * noise**2, 0.0))
     if noise > NOISY * amplitude:
         yield (

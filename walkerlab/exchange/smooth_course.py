@@ -1,0 +1,290 @@
+"""Find samples at which recorded leg angles leave their smooth course, and samples from which they stay beside it.
+
+Within a step each angle is smooth, and at a heel strike only the rates jump. So polynomials through the step before and
+the step after a strike, which meet there, describe the angles of both legs. A stretch of samples is off that course if
+a constant added to it explains much more of the residuals than scatter does, and more than in typical steps. The strike
+is sought anew with every stretch, because a wrong sample near a strike moves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from walkerlab.exchange.rate_jumps import AHEAD, Array, apart_runs, noise_of, typical_interval
+
+HIGHEST_DEGREE: Final = 7  # of the polynomial through a step; it leaves 0.1 mrad of the angles of straight legs
+SAMPLES_PER_DEGREE: Final = 3  # samples of a step for each degree above 1
+FAR_PERCENT: Final = 80  # percentage of the samples at which the legs are nearer to each other than far apart
+NEAR: Final = 0.3  # time before and after a first guess in which a strike is sought, as a fraction of a step
+MARGIN: Final = 0.2  # time around the strikes before and after one that its fit leaves out, as a fraction of a step
+WIDEST: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
+FASTEST: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
+BRIEF: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
+LONGEST: Final = 0.3  # longest stretch off the course, as a fraction of a step; a longer one is a lasting jump
+BORDER: Final = 0.1  # part of a step at the far end of a fit that other fits cover
+LASTING: Final = 0.15  # the same for lasting jumps
+LENGTHS: Final = 16  # number of lengths of a stretch that are tried first
+FIRST_TRIALS: Final = 31  # number of instants tried for a strike
+NEXT_TRIALS: Final = (9, 9)  # numbers of instants tried around the best
+THINNED: Final = 150  # number of samples that suffice to find a strike in a smooth course
+STANDARD_ERRORS: Final = 7.0
+TYPICAL: Final = 6.0  # how much more a stretch must explain than those in typical steps
+TYPICAL_PERCENT: Final = 30
+FEWEST: Final = 12  # fewest samples in the steps around a strike
+NOISY: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
+SUSPECT: Final = 0.5  # part of the limit above which a stretch is sought together with the strike
+SMALLEST: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
+MOST_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
+SMALLEST_NORM: Final = 0.05  # smallest squared part of a stretch that polynomials cannot follow, in samples
+NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Samples of a leg that a constant brings back to a smooth course."""
+
+    leg: int
+    first: int
+    end: int  # first sample behind it
+    offset_rad: float
+    explained: float  # rad^2, squared residuals that the offset explains
+    lasts: bool  # whether the angle stays beside its course
+
+
+@dataclass(frozen=True, eq=False)
+class Strike:
+    """Samples of the steps before and after a heel strike, and the span of time in which it may be."""
+
+    time: Array
+    angle: Array
+    rows: NDArray[np.int64]  # of the samples in the recording
+    span_s: tuple[float, float]
+    step_s: float
+    at_ends: tuple[bool, bool]  # whether the recording begins and ends with them
+
+    def fit(self, at: float, thinning: int = 1) -> tuple[Array, Array]:
+        """Return the orthonormal basis (samples, columns) of polynomials that meet at an instant, and the residuals."""
+        t, y = self.time[::thinning] - at, self.angle[::thinning]
+        columns = [np.ones((t.size, 1))]
+        for side in (t < 0.0, t >= 0.0):
+            degree = min(HIGHEST_DEGREE, 1 + int(np.sum(side)) // SAMPLES_PER_DEGREE)
+            columns.append(side[:, None] * (t / self.step_s)[:, None] ** np.arange(1, degree + 1))
+        basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
+        return basis, y - basis @ (basis.T @ y)
+
+    def instant(self, cost: Callable[[float], float], *counts: int) -> float:
+        """Return the instant (s) of the smallest cost, from numbers of trials that each close in on it."""
+        begin, end = self.span_s
+        for count in counts:
+            trials = np.linspace(begin, end, count).tolist()
+            place = int(np.argmin([cost(at) for at in trials]))
+            begin, end = trials[max(place - 1, 0)], trials[min(place + 1, count - 1)]
+        return 0.5 * (begin + end)
+
+    def smooth_instant(self, *next_trials: int) -> float:
+        """Return the instant of the strike in a smooth course."""
+        thinning = max(1, self.time.size // THINNED)
+        return self.instant(lambda at: float(np.sum(self.fit(at, thinning)[1] ** 2)), FIRST_TRIALS, *next_trials)
+
+    def scatter(self) -> Array:
+        """Return the residuals of the smooth course, as large as if it did not follow the samples."""
+        basis, residuals = self.fit(self.smooth_instant(*NEXT_TRIALS))
+        free = 1.0 - np.sum(basis**2, axis=1)
+        clear = free > SMALLEST_NORM
+        return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
+
+    def best_with_strike(self) -> tuple[Stretch, float]:
+        """Return the stretch that, with the strike where it then is, leaves least; and how much it leaves (rad^2)."""
+
+        def left(at: float) -> float:
+            return float(np.sum(self.fit(at)[1] ** 2)) - self.best_stretch(at).explained
+
+        at = self.instant(left, 2 * FIRST_TRIALS, *NEXT_TRIALS)
+        return self.best_stretch(at), left(at)
+
+    def best_stretch(self, at: float) -> Stretch:
+        """Return the stretch that explains most of the residuals of a strike at an instant."""
+        parts = self.fit(at)
+        sums = [np.concatenate((np.zeros((1, part.shape[1])), np.cumsum(part, axis=0))) for part in parts]
+        longest = max(1, int(np.searchsorted(self.time, self.time[0] + LONGEST * self.step_s)))
+        lengths = np.unique(np.geomspace(1, longest, LENGTHS).astype(int))
+        low, high = self.inside(BORDER)
+        firsts = np.arange(low, high)
+        short = np.stack(np.broadcast_arrays(firsts[:, None], firsts[:, None] + lengths), axis=2).reshape(-1, 2)
+        inner, count = np.arange(*self.inside(LASTING, whole=False)), self.time.size
+        lasting = np.stack((inner, np.full(inner.size, count)), axis=1)
+        spans = np.concatenate((short[short[:, 1] <= high], lasting))
+        first, end, leg = best_span(sums, spans)
+        lasts = bool(np.any((lasting == (first, end)).all(axis=1)))
+        if not lasts:
+            # all spans with their ends near the ends of this one
+            near = np.arange(-1 - (end - first) // 4, 2 + (end - first) // 4)
+            around = np.stack(np.meshgrid(first + near, end + near), axis=2).reshape(-1, 2)
+            fits = (around[:, 0] >= low) & (around[:, 1] <= high) & (around[:, 1] > around[:, 0])
+            first, end, leg = best_span(sums, around[fits])
+        norm, share = parts_of(sums, np.array([(first, end)]))
+        offset = float(share[0, leg] / norm[0])
+        return Stretch(leg, first, end, offset, offset * float(share[0, leg]), lasts)
+
+    def inside(self, part: float, whole: bool = True) -> tuple[int, int]:
+        """Return the samples (first, end) farther from the ends than a part of a step, which other steps cover.
+
+        whole  whether to go up to an end of the recording
+        """
+        away_s = part * self.step_s
+        first, end = np.searchsorted(self.time, (self.time[0] + away_s, self.time[-1] - away_s))
+        return 0 if whole and self.at_ends[0] else int(first), self.time.size if whole and self.at_ends[1] else int(end)
+
+
+def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return for spans (first, end) the squared part that a fit cannot follow, and the sums (spans, 2) of residuals.
+
+    sums  cumulative sums of the fit's orthonormal basis and of its residuals
+    """
+    inside, share = (part[spans[:, 1]] - part[spans[:, 0]] for part in sums)
+    return np.diff(spans, axis=1)[:, 0] - np.sum(inside**2, axis=1), share
+
+
+def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
+    """Return first sample, end and leg of the span that explains most of the residuals."""
+    norm, share = parts_of(sums, spans)
+    explained = np.where(norm > SMALLEST_NORM, 1.0 / np.maximum(norm, SMALLEST_NORM), 0.0)[:, None] * share**2
+    place, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
+    return int(spans[place, 0]), int(spans[place, 1]), int(leg)
+
+
+def find_stretches(time: Array, angle: Array) -> list[Stretch]:
+    """Find the stretches of samples (of the recording) at which a leg is off its smooth course.
+
+    time   (samples,) s, rising
+    angle  (samples, 2) rad, from the vertical
+    """
+    far = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
+    if noise_of(angle) > NOISY * far:
+        return []
+    found = leaps(time, angle, LONGEST * course_of(time, angle).step_s)
+    course = course_of(time, angle, found)
+    strikes = [course.strike(place) for place in range(len(course.spans))]
+    if not strikes or min(strike.time.size for strike in strikes) < FEWEST:
+        return found
+    scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
+    worst = [strike.best_stretch(strike.smooth_instant(*NEXT_TRIALS)).explained for strike in strikes]
+    limit = max((STANDARD_ERRORS * scatter) ** 2, TYPICAL * float(np.percentile(worst, TYPICAL_PERCENT)))
+    # a false strike in one step makes its neighbours look wrong, too
+    for place in np.argsort(worst)[::-1].tolist():
+        if worst[place] > SUSPECT * limit:
+            new = stretches_near(course, place, limit, SMALLEST * far)
+            found, course = found + new, course.without(new)
+    return found
+
+
+def leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
+    """Return the stretches that begin and end with a motion between two samples that no leg can make."""
+    moved = np.diff(angle, axis=0)
+    fastest = FASTEST * float(np.percentile(np.abs(moved), FAR_PERCENT))
+    found = []
+    for leg in (0, 1):
+        jumps = np.flatnonzero(np.abs(moved[:, leg]) > fastest).tolist()
+        while len(jumps) > 1:
+            first, back = jumps[:2]
+            returns = moved[first, leg] * moved[back, leg] < 0.0 and time[back] - time[first] < longest_s
+            if returns:
+                found.append(Stretch(leg, first + 1, back + 1, float(moved[first, leg]), 0.0, lasts=False))
+            jumps = jumps[2 if returns else 1 :]
+    return found
+
+
+def stretches_near(course: Course, place: int, limit: float, smallest: float) -> list[Stretch]:
+    """Return the stretches in the steps around a strike that explain more than a limit (rad^2)."""
+
+    def worst(others: Sequence[Stretch]) -> Stretch | None:
+        """Return the worst stretch besides others; None if it is within the limit."""
+        strike = course.without(others).strike(place)
+        smooth = strike.smooth_instant(*NEXT_TRIALS)
+        if strike.best_stretch(smooth).explained <= SUSPECT * limit:
+            return None
+        stretch, left = strike.best_with_strike()
+        explains = float(np.sum(strike.fit(smooth)[1] ** 2)) - left > limit
+        if not explains or abs(stretch.offset_rad) < smallest:
+            return None
+        rows = strike.rows
+        return replace(stretch, first=int(rows[stretch.first]), end=int(rows[stretch.end - 1]) + 1)
+
+    found: list[Stretch] = []
+    while len(found) < MOST_STRETCHES and (stretch := worst(found)):
+        found.append(stretch)
+    # the first stretches may have stood for what the later ones explain
+    for stretch in found[:-1]:
+        others = [other for other in found if other is not stretch]
+        found = found if worst(others) else others
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Samples of a recording, and for each reach of a leg ahead of the other the span of time (s) that it takes."""
+
+    time: Array
+    angle: Array
+    rows: NDArray[np.int64]  # of the samples in the recording
+    spans: list[tuple[float, float]]
+    step_s: float
+    guesses: dict[int, float] = field(default_factory=dict, init=False)
+
+    def without(self, stretches: Sequence[Stretch]) -> Course:
+        """Return the course without the samples of stretches, and with lasting offsets taken off."""
+        angle, kept = self.angle.copy(), np.ones(self.rows.size, bool)
+        for stretch in stretches:
+            if stretch.lasts:
+                angle[self.rows >= stretch.first, stretch.leg] -= stretch.offset_rad
+            else:
+                kept &= (self.rows < stretch.first) | (self.rows >= stretch.end)
+        return replace(self, time=self.time[kept], angle=angle[kept], rows=self.rows[kept])
+
+    def strike(self, place: int) -> Strike:
+        """Return the steps around the heel strike in a span."""
+        begin, end = self.spans[place]
+        at, margin = self.guess(place), MARGIN * self.step_s
+        farthest = WIDEST * self.step_s
+        first = max(self.guess(place - 1) + margin, at - farthest) if place else float(self.time[0])
+        following = place + 1 < len(self.spans)
+        last = min(self.guess(place + 1) - margin, at + farthest) if following else float(self.time[-1])
+        return self.part(first, last, (max(begin, at - NEAR * self.step_s), min(end, at + NEAR * self.step_s)))
+
+    def guess(self, place: int) -> float:
+        """Return about when rates jump within a span."""
+        if place not in self.guesses:
+            begin, end = self.spans[place]
+            half = 0.5 * self.step_s
+            self.guesses[place] = self.part(begin - half, end + half, (begin, end)).smooth_instant()
+        return self.guesses[place]
+
+    def part(self, first_s: float, last_s: float, span_s: tuple[float, float]) -> Strike:
+        near = (self.time >= first_s) & (self.time <= last_s)
+        at_ends = bool(near[0]), bool(near[-1])
+        return Strike(self.time[near], self.angle[near], self.rows[near], span_s, self.step_s, at_ends)
+
+
+def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:
+    """Return the course of a recording without some stretches: rates jump while one leg is far ahead of the other."""
+    course = Course(time, angle, np.arange(time.size), [], 0.0).without(stretches)
+    time, angle = course.time, course.angle
+    spread = angle[:, 0] - angle[:, 1]
+    far = AHEAD * float(np.percentile(np.abs(spread), FAR_PERCENT))
+    apart = apart_runs(np.abs(spread) > far, spread > 0.0)
+    shortest = BRIEF * float(np.percentile([time[last] - time[first] for first, last in apart] or [0.0], FAR_PERCENT))
+    runs: list[tuple[int, int]] = []
+    for first, last in apart:
+        # outliers make brief runs, and cut a run in two
+        whole = time[last] - time[first] >= shortest or first == 0 or last == time.size - 1
+        goes_on = bool(runs) and spread[first] * spread[runs[-1][0]] > 0.0
+        if whole:
+            runs[len(runs) - goes_on :] = [(runs[-1][0] if goes_on else first, last)]
+    spans = [(float(time[first]), float(time[last])) for first, last in runs]
+    step_s = typical_interval([0.5 * (begin + end) for begin, end in spans], time)
+    return replace(course, spans=spans, step_s=step_s)
