@@ -219,7 +219,7 @@ PICTURES: dict[str, FigurePicture | SweepPicture | Film | ExamplePicture | Scree
         "continuation",
         "kneed",
         {"continuation.over": "slope_deg", "continuation.from": 5, "continuation.to": 8},
-        {"continuation.from": 6.0, "continuation.to": 6.2, "continuation.periods": 2, "continuation.points": 5},
+        {"continuation.from": 6.0, "continuation.to": 6.1, "continuation.periods": 1, "continuation.points": 5},
     ),
     "figure-15.png": FigurePicture("figure-15", "basin", small={"basin.cells": [12, 12]}),
     "figure-16.png": FigurePicture(
@@ -234,9 +234,9 @@ PICTURES: dict[str, FigurePicture | SweepPicture | Film | ExamplePicture | Scree
         },
         small={
             "continuation.from": 4.2,
-            "continuation.to": 4.6,
+            "continuation.to": 4.41,
             "continuation.points": 5,
-            "continuation.second": {"over": "walker.hip_mass_kg", "from": 9, "to": 11},
+            "continuation.second": {"over": "walker.hip_mass_kg", "from": 9.9, "to": 10.1},
         },
     ),
     "figure-17.png": SweepPicture(
