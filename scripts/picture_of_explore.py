@@ -29,7 +29,7 @@ class Address:
         return self.text
 
 
-def main():
+def main(picture=PICTURE):
     page = walkerlab.explore(contact=walkerlab.contact())
     browser = Browser(executable())
     try:
@@ -41,7 +41,7 @@ def main():
         browser.until("along.found?.some(({ model }) => model === 'contact')")
         time.sleep(2.5)
         # a palette is a third of the size
-        Image.open(io.BytesIO(browser.screenshot())).quantize(128).save(PICTURE, optimize=True)
+        Image.open(io.BytesIO(browser.screenshot())).quantize(128).save(picture, optimize=True)
     finally:
         browser.close()
         page.close()

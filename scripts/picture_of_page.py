@@ -19,7 +19,7 @@ import walkerlab  # noqa: E402
 PICTURE = ROOT / "docs" / "images" / "page.png"
 
 
-def main():
+def main(picture=PICTURE):
     browser = Browser(executable())
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "heavier.yaml"
@@ -29,7 +29,7 @@ def main():
         try:
             browser.open(runs / "heavier" / "report.html", 1200, 1150)
             # a palette is a third of the size
-            Image.open(io.BytesIO(browser.screenshot())).quantize(128).save(PICTURE, optimize=True)
+            Image.open(io.BytesIO(browser.screenshot())).quantize(128).save(picture, optimize=True)
         finally:
             browser.close()
 

@@ -10,8 +10,8 @@ are not compared.
 
 An example is a fenced block: `console` has commands after `$` and what they print below them, `pycon` has Python after
 `>>>`, and a `yaml` block that begins with `# NAME.yaml` or `name: NAME` is written to NAME.yaml. `...` stands for
-anything. Examples of a document run in order in one empty folder; those below `<!-- takes minutes -->` run with --slow
-only.
+anything. Examples of a document run in order in one folder, which holds the downloads that the document links; those
+below `<!-- takes minutes -->` run with --slow only.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import doctest
 import io
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -48,6 +49,7 @@ ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "docs/study.md", "docs/theory.md", "docs/pipeline.md", "docs/config.md")
 EXAMPLE = re.compile(r"^(<!-- takes minutes -->\n)?```(console|pycon|yaml)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
+DOWNLOAD = re.compile(r"\]\((downloads/[^)]+)\)")
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 TERMINAL = {"COLUMNS": "100"}
 Run = Callable[[str, int], tuple[str, int]]
@@ -90,15 +92,19 @@ def stages(_results: Results) -> str:
 
 
 def config_keys(_results: Results) -> str:
-    """Every key of a config, as a table that reads well in a terminal too."""
-    rows = [tuple(field.name for field in fields(KeyReference)), *(astuple(row) for row in keys())]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    rows.insert(1, tuple("-" * width for width in widths))
-    lines = (" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+    """Every key of a config; a key that means the same for each type of walker stands there once."""
+    rows: dict[tuple[str, ...], None] = {}
+    for reference in keys():
+        key, *rest = astuple(reference)
+        rows[(re.sub(r"^walker\([a-z-]+\)(?=\.(torso|hip|knee)\.)", "walker", key), *rest)] = None
+    head = [field.name for field in fields(KeyReference)]
     optional = [name for name, field in Config.model_fields.items() if block_of(field) and field.default is None]
     blocks = f"{', '.join(f'`{name}`' for name in optional[:-1])} and `{optional[-1]}`"
-    note = f"The blocks {blocks} are optional. Stages that need a missing block are skipped."
-    return "\n".join([*(f"| {line} |" for line in lines), "", note, ""])
+    note = (
+        "The keys of `walker.torso` and `walker.hip` are the same for every type of walker, those of `walker.knee` for "
+        f"`kneed` and `parts`.\n\nThe blocks {blocks} are optional. Stages that need a missing block are skipped.\n"
+    )
+    return "\n".join([table(head, [[cell(text) for text in row] for row in rows]), note])
 
 
 def gaits(results: Results) -> str:
@@ -288,8 +294,11 @@ def differences(path: Path, folder: Path, slow: bool = False, run: Run | None = 
     run = run or run_in_shell
     names: dict[str, Any] = {}
     exit_code = 0
+    page = path.read_text(encoding="utf-8")
+    for link in set(DOWNLOAD.findall(page)):
+        shutil.copy(path.parent / link, folder)
     with contextlib.chdir(folder):
-        for takes_minutes, kind, text in EXAMPLE.findall(path.read_text(encoding="utf-8")):
+        for takes_minutes, kind, text in EXAMPLE.findall(page):
             if kind == "yaml" and (named := re.match(r"(?:# (\S+)\.yaml|name: (\S+))\n", text)):
                 Path(f"{named[1] or named[2]}.yaml").write_text(text, encoding="utf-8")
             elif kind == "console" and (slow or not takes_minutes):

@@ -271,9 +271,21 @@ def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
     )
 
 
+def test_every_picture_of_the_docs_is_registered_and_on_a_page():
+    drawn = {path.name for path in (ROOT / "docs" / "images").iterdir() if path.suffix in (".png", ".gif")}
+    assert set(MAKER["stale_pictures"].__globals__["PICTURES"]) == drawn
+    pages = "".join(text_of(path) for path in DOCUMENTS)
+    assert [name for name in sorted(drawn) if f"images/{name})" not in pages] == []
+
+
+@pytest.mark.parametrize(
+    "page", ["index", "tutorial", "howto", "identify", "walkers", "explore", "exchange", "recordings"]
+)
+def test_a_page_for_newcomers_has_a_picture(page):
+    assert re.search(r"^!\[[^]]+\]\(images/", text_of(ROOT / "docs" / f"{page}.md"), re.MULTILINE)
+
+
 def test_pictures_have_the_words_that_are_drawn_today(tmp_path):
-    pictures = MAKER["stale_pictures"].__globals__
-    assert set(pictures["PICTURES"]) <= {path.name for path in (ROOT / "docs" / "images").iterdir()}
     assert list(MAKER["stale_pictures"](tmp_path)) == [], "run: python scripts/refresh_docs.py --pictures"
 
 

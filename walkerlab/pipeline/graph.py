@@ -214,7 +214,7 @@ MODEL_HELP = "Model whose gaits to study."
 ESTIMATED = (
     Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds."),
     Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its standard deviation."),
-    Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate too.", list),
+    Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate as well.", list),
     Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
 )
 ERRORS_TO_REACH = Option(

@@ -30,6 +30,7 @@ from walkerlab.pipeline.stages.continuation import (
     first_doubling,
     sample_again,
 )
+from walkerlab.pipeline.stages.family_groups import birth_of
 from walkerlab.scene.families import rigid_map
 from walkerlab.scene.parameter import parameter_of
 
@@ -187,6 +188,17 @@ def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_de
     assert group["mark_after"][0] == -1
     assert group["mark_value"][0] == said["branches"][number]["from"]
     assert np.ptp(group["mark_step_period"][0]) == 0.0
+
+
+def test_a_doubled_branch_that_begins_with_another_step_than_its_parent_has_the_flip_in_its_own_order():
+    gait = SimpleNamespace(periods_s=np.array([0.5, 0.6, 0.7]), angles=np.array([0.1, 0.2, 0.3]))
+    flip = SimpleNamespace(kind="flip", value=6.0, gait=gait)
+    parent = SimpleNamespace(period=3, bifurcations=(flip,))
+    first = SimpleNamespace(periods_s=np.array([0.61, 0.71, 0.51, 0.59, 0.69, 0.49]))
+    doubled = SimpleNamespace(period=6, ends=(SimpleNamespace(value=6.0),), points=(first,), bifurcations=())
+    (mark,) = birth_of(doubled, [parent, doubled])
+    assert mark.periods.tolist() == [0.6, 0.7, 0.5, 0.6, 0.7, 0.5]
+    assert mark.angles.tolist() == [0.2, 0.3, 0.1, 0.2, 0.3, 0.1]
 
 
 def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value(monkeypatch):

@@ -35,6 +35,7 @@ RESULTS = {
     "one step": both_models(**{"contact-sim": contact(1, outcome="fell")}),
     "tuned": tuned(),
     "tuned, far apart": tuned((0.002, 0.02, 0.2, 3.0)),
+    "tuned, within less than a decade": tuned((0.022, 0.031, 0.045, 0.083)),
     "families": families(),
     "families without a bifurcation": families(flips=False),
     "a basin": basin([0, 0, 1, -1]),

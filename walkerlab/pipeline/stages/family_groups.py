@@ -134,11 +134,15 @@ def marks_on(branch: GaitBranch) -> list[Mark]:
 
 
 def birth_of(branch: GaitBranch, branches: Sequence[GaitBranch]) -> list[Mark]:
-    """Return the flip where a branch begins, with the steps of the parent's gait listed twice; empty if none."""
+    """Return the flip where a branch begins, with the steps of the parent's gait listed twice, or an empty list."""
     for parent in branches:
         for flip in parent.bifurcations:
             if flip.kind == "flip" and 2 * parent.period == branch.period and flip.value == branch.ends[0].value:
-                return [Mark(-1, flip.kind, flip.value, np.tile(flip.gait.periods_s, 2), np.tile(flip.gait.angles, 2))]
+                # A branch that was found from a seed may begin with another step of the gait than its parent.
+                steps = [np.tile(values, 2) for values in (flip.gait.periods_s, flip.gait.angles)]
+                first = branch.points[0].periods_s
+                shift = min(range(parent.period), key=lambda k: float(np.abs(np.roll(steps[0], k) - first).max()))
+                return [Mark(-1, flip.kind, flip.value, *(np.roll(values, shift) for values in steps))]
     return []
 
 

@@ -30,7 +30,7 @@ ROWS = 3
 SHRINKS = 0.7
 """Exponent that relates a figure's height to its width; below 1, since text shrinks less than the figure."""
 
-BETWEEN_DECADES: Final = ((15.0, (2.0, 5.0)), (100.0, (3.0,)))
+BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
 """Ratio of an axis's limits, and the multiples of powers of ten that are labelled if the ratio is smaller."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 LONGEST: Final = 1e4

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from walkerlab.labels import axis_label
 from walkerlab.pipeline.store.content import Group
-from walkerlab.views.figures.canvas import add_legend, blank, entry, label_of, panels
+from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
 from walkerlab.views.figures.families import DASHES, MODELS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
 from walkerlab.views.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, sticks_of, surrounding
@@ -102,7 +102,9 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
             order = np.argsort(speed[points])
             at, values = speed[points][order], group[name].astype(float)[points][order]
             panel.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
-        panel.set(ylabel=said, yscale="log" if logarithmic else "linear")
+        panel.set_ylabel(said)
+        if logarithmic:
+            error_axis(panel)
     axes[-1].set_xlabel("speed (m/s)")
     add_legend(figure, [entry(ACTUATIONS[name][0], **looks[name]) for name in driven])
     cost, norm = (group[name].astype(float) for _, name, _ in ACTUATION_PANELS[:2])

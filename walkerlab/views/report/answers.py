@@ -97,7 +97,7 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
         if "state" in gait and [fixed(value, 6) for value in gait["state"]] != state
     }
     sets, names = {summary["equations"]: summary, **different}, summary.get("state_names", gaits.COMPASS_STATE)
-    search = f" Searched: {summary['sought']}; very unstable gaits may be missed." if summary.get("sought") else ""
+    search = f" Method: {summary['sought']}; very unstable gaits may be missed." if summary.get("sought") else ""
     return [head, gaits.gait_table(sets, names), f"{count(summary['gaits_found'], 'gait')} of one step found.{search}"]
 
 

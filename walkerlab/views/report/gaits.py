@@ -34,7 +34,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
         measured("speed", "speed_m_s", partial(fixed, decimals=4)),
         measured("Froude number", "froude", partial(fixed, decimals=4)),
         measured("cost of transport", "cost_of_transport", partial(fixed, decimals=5)),
-        measured("energy from the stance foot", "energy_J", partial(fixed, decimals=3)),
+        measured("mean energy above the stance foot", "energy_J", partial(fixed, decimals=3)),
         measured("energy drift", "energy_drift_J", partial(number, digits=2)),
         measured("minimum normal force", "min_normal_force_N", partial(number, digits=4)),
         Column("largest friction ratio", "max_friction_ratio", partial(fixed, decimals=4)),
