@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -29,9 +30,9 @@ LONGEST: Final = 0.3  # longest stretch off the course, as a fraction of a step;
 BORDER: Final = 0.1  # part of a step at the far end of a fit that other fits cover
 LASTING: Final = 0.15  # the same for lasting jumps
 LENGTHS: Final = 16  # number of lengths of a stretch that are tried first
-FIRST_TRIALS: Final = 31  # number of instants tried for a strike
-NEXT_TRIALS: Final = (9, 9)  # numbers of instants tried around the best
-THINNED: Final = 150  # number of samples that suffice to find a strike in a smooth course
+FIRST_TRIALS: Final = 25  # number of instants tried for a strike
+NEXT_TRIALS: Final = (9,)  # numbers of instants tried around the best
+ROUGH, FINE = 80, 400  # numbers of samples that suffice to find a strike in a smooth course
 STANDARD_ERRORS: Final = 7.0
 TYPICAL: Final = 6.0  # how much more a stretch must explain than those in typical steps
 TYPICAL_PERCENT: Final = 30
@@ -73,7 +74,9 @@ class Strike:
         columns = [np.ones((t.size, 1))]
         for side in (t < 0.0, t >= 0.0):
             degree = min(HIGHEST_DEGREE, 1 + int(np.sum(side)) // SAMPLES_PER_DEGREE)
-            columns.append(side[:, None] * (t / self.step_s)[:, None] ** np.arange(1, degree + 1))
+            own = np.where(side, t / self.step_s, 0.0)
+            # powers by products take a tenth of the time of powers
+            columns.append(np.multiply.accumulate(np.broadcast_to(own[:, None], (own.size, degree)), axis=1))
         basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
         return basis, y - basis @ (basis.T @ y)
 
@@ -81,19 +84,34 @@ class Strike:
         """Return the instant (s) of the smallest cost, from numbers of trials that each close in on it."""
         begin, end = self.span_s
         for count in counts:
-            trials = np.linspace(begin, end, count).tolist()
-            place = int(np.argmin([cost(at) for at in trials]))
-            begin, end = trials[max(place - 1, 0)], trials[min(place + 1, count - 1)]
-        return 0.5 * (begin + end)
+            trials = np.linspace(begin, end, count)
+            costs = [cost(at) for at in trials.tolist()]
+            best = min(max(int(np.argmin(costs)), 1), count - 2)
+            begin, middle, end = trials[best - 1 : best + 2].tolist()
+        # the vertex of the parabola through the best trials
+        left, least, right = costs[best - 1 : best + 2]
+        bend = left - 2.0 * least + right
+        move = 0.5 * (left - right) / bend if bend > 0.0 else 0.0
+        return float(middle + min(1.0, max(-1.0, move)) * (end - middle))
 
-    def smooth_instant(self, *next_trials: int) -> float:
-        """Return the instant of the strike in a smooth course."""
-        thinning = max(1, self.time.size // THINNED)
-        return self.instant(lambda at: float(np.sum(self.fit(at, thinning)[1] ** 2)), FIRST_TRIALS, *next_trials)
+    @cached_property
+    def smooth_instant(self) -> float:
+        """Instant (s) of the strike in a smooth course."""
+        return self.instant(self.cost_of(FINE), FIRST_TRIALS, *NEXT_TRIALS)
+
+    @property
+    def rough_instant(self) -> float:
+        """The same from fewer samples and trials."""
+        return self.instant(self.cost_of(ROUGH), FIRST_TRIALS)
+
+    def cost_of(self, samples: int) -> Callable[[float], float]:
+        """Return the function from instants to squared residuals, with about so many of the samples."""
+        thinning = max(1, self.time.size // samples)
+        return lambda at: float(np.sum(self.fit(at, thinning)[1] ** 2))
 
     def scatter(self) -> Array:
         """Return the residuals of the smooth course, as large as if it did not follow the samples."""
-        basis, residuals = self.fit(self.smooth_instant(*NEXT_TRIALS))
+        basis, residuals = self.fit(self.smooth_instant)
         free = 1.0 - np.sum(basis**2, axis=1)
         clear = free > SMALLEST_NORM
         return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
@@ -173,7 +191,7 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     if not strikes or min(strike.time.size for strike in strikes) < FEWEST:
         return found
     scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
-    worst = [strike.best_stretch(strike.smooth_instant(*NEXT_TRIALS)).explained for strike in strikes]
+    worst = [strike.best_stretch(strike.smooth_instant).explained for strike in strikes]
     limit = max((STANDARD_ERRORS * scatter) ** 2, TYPICAL * float(np.percentile(worst, TYPICAL_PERCENT)))
     # a false strike in one step makes its neighbours look wrong, too
     for place in np.argsort(worst)[::-1].tolist():
@@ -205,7 +223,7 @@ def stretches_near(course: Course, place: int, limit: float, smallest: float) ->
     def worst(others: Sequence[Stretch]) -> Stretch | None:
         """Return the worst stretch besides others; None if it is within the limit."""
         strike = course.without(others).strike(place)
-        smooth = strike.smooth_instant(*NEXT_TRIALS)
+        smooth = strike.smooth_instant
         if strike.best_stretch(smooth).explained <= SUSPECT * limit:
             return None
         stretch, left = strike.best_with_strike()
@@ -261,7 +279,7 @@ class Course:
         if place not in self.guesses:
             begin, end = self.spans[place]
             half = 0.5 * self.step_s
-            self.guesses[place] = self.part(begin - half, end + half, (begin, end)).smooth_instant()
+            self.guesses[place] = self.part(begin - half, end + half, (begin, end)).rough_instant
         return self.guesses[place]
 
     def part(self, first_s: float, last_s: float, span_s: tuple[float, float]) -> Strike:

@@ -101,6 +101,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_hurry(step_s, model, source)
     refuse_spread(walk, touches, source)
     doubts += [
+        *unit_doubts(touches),
         *knee_doubts(walk, touches, model),
         *offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height),
     ]
