@@ -36,6 +36,7 @@ ROUGH, FINE = 80, 400  # numbers of samples that suffice to find a strike in a s
 STANDARD_ERRORS: Final = 7.0
 TYPICAL: Final = 6.0  # how much more a stretch must explain than those in typical steps
 TYPICAL_PERCENT: Final = 30
+WIDEST_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
 FEWEST: Final = 12  # fewest samples in the steps around a strike
 NOISY: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
 SUSPECT: Final = 0.5  # part of the limit above which a stretch is sought together with the strike
@@ -188,7 +189,8 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     found = leaps(time, angle, LONGEST * course_of(time, angle).step_s)
     course = course_of(time, angle, found)
     strikes = [course.strike(place) for place in range(len(course.spans))]
-    if not strikes or min(strike.time.size for strike in strikes) < FEWEST:
+    sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= FEWEST
+    if not sampled or np.max(np.diff(time)) > WIDEST_GAP * course.step_s:
         return found
     scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
     worst = [strike.best_stretch(strike.smooth_instant).explained for strike in strikes]
