@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.reads import RigidConfig
-from walkerlab.pipeline.graph import Graph, Stage
+from walkerlab.pipeline.stage import Graph, Stage
 from walkerlab.pipeline.store.content import Content
 
 HERE = Path(__file__)

@@ -40,9 +40,9 @@ LAYERS = (
     "physics.kernel_cache",
     "physics.energy_channels",
     "config",
+    "extensions",
     "code_digest",
     "labels",
-    "registration",
     "outcome",
     "private_files",
     "errors",
@@ -193,17 +193,27 @@ def test_a_gait_is_found_and_told_without_the_page_or_scipy_linalg(tmp_path):
     ] == []
 
 
-REGISTRIES = {
-    "scene/studies.py", "pipeline/graph.py", "views/figures/registry.py", "views/report/registry.py",
-    "views/report/answers.py",
-}  # fmt: skip
-QUOTED_EVIDENCE = re.compile(r"[\"']walkerlab\.evidence\.")
+QUOTED_MODULE = re.compile(r"walkerlab(?:\.\w+)+(?=:\w+$|$)")
 
 
-def test_evidence_is_named_by_registries_alone():
-    """What stands below the study, the verification and the benchmarks names them only where they register."""
-    core = [path for path in IN_LAYERS if not layer_of(path).startswith("evidence.")]
-    assert {named(path) for path in core if QUOTED_EVIDENCE.search(path.read_text())} == REGISTRIES
+def quoted_modules(path):
+    texts = (node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant))
+    return {match[0] for text in texts if isinstance(text, str) and (match := QUOTED_MODULE.match(text))}
+
+
+@pytest.mark.parametrize("path", IN_LAYERS, ids=named)
+def test_no_module_names_one_of_a_higher_layer_in_quotes(path):
+    own = LAYERS.index(layer_of(path))
+    layers = {name: layer_of_module(name) for name in quoted_modules(path)}
+    assert [name for name, layer in layers.items() if layer and LAYERS.index(layer) < own] == []
+
+
+def test_quoted_names_of_modules_are_found_and_the_packages_own_extensions_are_listed_once():
+    table = PACKAGE / "pipeline" / "stages" / "table.py"
+    assert "walkerlab.pipeline.stages.simulate" in quoted_modules(table)
+    listed = {code.partition(":")[0].removeprefix(".") for code in walkerlab.EXTENSIONS.values()}
+    declaring = {path for path in IN_LAYERS if "walkerlab.extensions.Extension" in imported_modules(path)}
+    assert listed == {".".join(path.relative_to(PACKAGE).with_suffix("").parts) for path in declaring}
 
 
 STAGE_MODULES = {stage.module for stage in PIPELINE.stages}

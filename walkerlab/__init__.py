@@ -8,6 +8,16 @@ from typing import Any
 
 __version__ = "0.3.0.dev0"
 
+EXTENSIONS = {
+    "walks": ".pipeline.stages.table:WALKING",
+    "study": ".evidence.paper.extension:EXTENSION",
+    "benchmarks": ".evidence.benchmarks.extension:EXTENSION",
+    "verification": ".evidence.verification.extension:EXTENSION",
+    "questions": ".pipeline.stages.table:ASKING",
+    "drawings": ".views.report.extension:EXTENSION",
+}
+"""The package's own extensions (see extensions.py), in the order of their stages. Other packages announce theirs."""
+
 __all__ = [
     "Config",
     "ConfigError",

@@ -28,6 +28,7 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 
 __version__: str
+EXTENSIONS: dict[str, str]
 
 __all__ = [
     "Config",

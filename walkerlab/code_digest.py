@@ -12,14 +12,12 @@ from pathlib import Path
 
 PACKAGE = __name__.partition(".")[0]
 
-# Imports are found by searching the text, because the digest must take milliseconds and load no compiler. Quoted full
-# names count too, since registries use them for late imports. Each alternative begins with a letter, which `re` finds
-# three times as fast as a word boundary.
+# Imports are found by searching the text, because the digest must take milliseconds and load no compiler. Each
+# alternative begins with a letter, which `re` finds three times as fast as a word boundary.
 COMMENT = re.compile(r"#[^\n]*")
 IMPORT = re.compile(
     r"from(?<=\bfrom)[ \t]+(?P<origin>\.*[\w.]*)[ \t]+import\b[ \t]*(?P<names>\([^)]*\)|[^\n;]*)"
     r"|import(?<=\bimport)[ \t]+(?P<modules>[\w., \t]+)"
-    r"|[\"'](?P<quoted>[^\W\d]\w*(?:\.\w+)+)[\"']"
 )
 
 # Folders that do not count as data. In a wheel, the built-in configs are inside the package, but a stage's key already
@@ -33,13 +31,13 @@ class Sources:
     def __init__(self) -> None:
         self._modules: dict[str, Module | None] = {}
 
-    def code_digest(self, name: str) -> str:
-        """Return the SHA-256 of a module and of everything it imports from its own package or this one.
+    def code_digest(self, *names: str) -> str:
+        """Return the SHA-256 of modules and of everything they import from their own packages or this one.
 
         Data files of those packages (templates, tables) count too, but not this package's `__init__`, since a new
         version number changes no result. Raises ModuleNotFoundError if there is no such module.
         """
-        closure = self.closure(name)
+        closure = self.closure(*names)
         files = {f"{module.name}:{path.name}": path for module in closure for path in module.data}
         texts = [(module.name, module.text) for module in closure if module.name != PACKAGE]
         return digest_of(texts + [(label, path.read_bytes()) for label, path in sorted(files.items())])
@@ -119,16 +117,13 @@ def find_imports(module: str, is_package: bool, source: bytes) -> list[str]:
 
 
 def imported_names(module: str, is_package: bool, text: str) -> Iterator[str]:
-    """Yield the full names in the import statements of a module's text (without comments), and quoted dotted names."""
+    """Yield the full names in the import statements of a module's text, which has no comments."""
     for match in IMPORT.finditer(text):
-        if match["quoted"]:
-            yield match["quoted"]
-        else:
-            origin = None if match["modules"] else absolute_name(module, is_package, match["origin"])
-            yield from [origin] if origin else []
-            listed = (match["modules"] or match["names"].strip("() \t\n")).split(",")
-            names = [entry.split()[0] for entry in listed if entry.strip()]  # without 'as' aliases
-            yield from (f"{origin}.{name}" if origin else name for name in names)
+        origin = None if match["modules"] else absolute_name(module, is_package, match["origin"])
+        yield from [origin] if origin else []
+        listed = (match["modules"] or match["names"].strip("() \t\n")).split(",")
+        names = [entry.split()[0] for entry in listed if entry.strip()]  # without 'as' aliases
+        yield from (f"{origin}.{name}" if origin else name for name in names)
 
 
 def absolute_name(module: str, is_package: bool, origin: str) -> str:

@@ -9,6 +9,7 @@ from typing import get_args
 
 import pytest
 
+import walkerlab
 from walkerlab.code_digest import Sources
 from walkerlab.config import files
 from walkerlab.config.canonical import slice_of
@@ -17,8 +18,9 @@ from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.reads import CompassCasesConfig, ContactConfig, SceneCasesConfig, dotted_keys, keys_of, only
 from walkerlab.config.schema import QUESTIONS, Config
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, results_of
-from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.identity import Keys, added_code
+from walkerlab.pipeline.stage import Graph, Stage, results_of
 from walkerlab.pipeline.store.key import differences
 
 NAMES = [stage.name for stage in PIPELINE.stages]
@@ -168,9 +170,34 @@ def test_an_edited_stage_of_evidence_renews_its_own_key_alone(made_of, stage):
 @pytest.mark.parametrize("stage", [stage.name for stage in PIPELINE.stages if not stage.draws])
 def test_no_result_is_made_with_the_registry_of_stages_figures_or_sections(made_of, stage):
     registries = {"walkerlab.pipeline.graph", "walkerlab.views.figures.registry", "walkerlab.views.report.registry"}
+    registries |= {f"walkerlab{code.partition(':')[0]}" for code in walkerlab.EXTENSIONS.values()}
     assert not registries & made_of[stage]
 
 
-def test_the_torque_law_of_the_study_is_part_of_what_walks_are_made_of(made_of):
-    assert "walkerlab.evidence.paper.law" in made_of["simulate"]
-    assert "walkerlab.evidence.paper.compare" not in made_of["simulate"]
+LAW = "walkerlab.evidence.paper.law:as_printed"
+COMPASS = ["equations=as-printed", "slope_deg=1"]
+
+
+@pytest.mark.parametrize(
+    ("stage", "config", "sets", "used"),
+    [
+        ("simulate", "paper", [], set()),
+        ("simulate", "paper", COMPASS, {LAW}),
+        ("simulate", "simplest", COMPASS, {LAW}),
+        ("fixedpoint", "paper", [], {LAW}),  # the paper's walker has a gait with each set of equations
+        ("fixedpoint", "simplest", [], set()),
+        ("fixedpoint", "kneed", [], set()),
+        ("contact-sim", "paper", ["contact.terrain=plane"], set()),
+    ],
+)
+def test_the_law_of_the_study_counts_only_for_the_equations_as_printed(made_of, stage, config, sets, used):
+    assert "walkerlab.evidence.paper.law" not in made_of[stage]
+    loaded = load(Path(config), sets).config
+    own = Keys().identity(PIPELINE[stage], loaded, {}).config_slice
+    assert added_code(PIPELINE[stage], loaded, own) == used
+
+
+def test_drawings_depend_on_the_figures_and_sections_of_extensions():
+    config = load().config
+    modules = {code.partition(":")[0] for code in added_code(PIPELINE["plot"], config, {})}
+    assert {"walkerlab.evidence.paper.figures", "walkerlab.evidence.verification.section"} <= modules

@@ -8,8 +8,8 @@ import pytest
 from walkerlab.config.reads import StartConfig
 from walkerlab.errors import ConfigError, LockedError, StorageError
 from walkerlab.pipeline.executor import survey
-from walkerlab.pipeline.graph import Graph, Stage
 from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.stage import Graph, Stage
 from walkerlab.pipeline.store.artifact import read
 
 EXPLICIT = "start=[null, 0.2, 0.3, 0.4]"

@@ -8,7 +8,7 @@ import pytest
 from process_table import workers_below
 
 from walkerlab.pipeline.executor import any_side_by_side
-from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.stage import Graph
 from walkerlab.pipeline.store.artifact import read
 from walkerlab.pipeline.workers import WorkerDiedError
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED

@@ -1,11 +1,17 @@
 """The contact block: values in N, mm, s as in ADAMS dialogs or in SI, and their conversion."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from walkerlab.config.fields import Block, check_against, key, meaning_error
+from walkerlab.extensions import origin_of, words
+
+if TYPE_CHECKING:
+    Friction: TypeAlias = str
+else:
+    Friction = Literal[words("friction")]
 
 MM_PER_M: Final = 1000.0
 
@@ -50,8 +56,11 @@ class Contact(Block):
     full_damping_penetration: float = key(
         0.1, "mm or m", "penetration at which damping reaches its full value", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
     )
-    friction: Literal["coulomb", "none"] = key(
-        "coulomb", "", "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground", _SECTION_4
+    friction: Friction = key(
+        "coulomb",
+        "",
+        "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground",
+        f"{_SECTION_4}{origin_of('friction')}",
     )
     static_friction: float = key(
         0.9, "1", "coefficient at stiction_velocity, where friction is largest", _SECTION_4, ge=0.0, le=100.0

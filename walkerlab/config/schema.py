@@ -3,7 +3,7 @@
 import math
 from importlib.util import find_spec
 from types import SimpleNamespace
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias, get_args
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field_validator
 
@@ -28,8 +28,12 @@ from walkerlab.config.walkers import (
     why_no_push_off,
     why_no_state,
 )
+from walkerlab.extensions import words
 
-Equations = Literal["corrected", "as-printed"]
+if TYPE_CHECKING:
+    Equations: TypeAlias = str
+else:
+    Equations = Literal[words("equations")]
 Output = Literal["states", "energies", "forces"]
 Method = Literal[
     "dop853",

@@ -26,6 +26,7 @@ from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
 from walkerlab.config.tree import Sequence as Listed
 from walkerlab.config.walkers import Kneed, PartsWalker, followers
+from walkerlab.extensions import WORDS, foreign
 
 Location: TypeAlias = tuple[int | str, ...]
 
@@ -230,6 +231,9 @@ def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem
     if what == "float_type" and DECIMAL_COMMA.fullmatch(word):
         meant = word.replace(",", ".")
     right = describe_allowed(field) if what in _REASONS else ""
+    if path[-1] in WORDS and what == "literal_error":
+        names = ", ".join(found.name for found in foreign() if found.extension) or "none"
+        right += f", or a word of an extension: install the one that adds it (installed: {names})"
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
 
 

@@ -9,9 +9,10 @@ from queue import SimpleQueue
 from typing import Any
 
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage, without_block
+from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.results import FolderResults, MemoryResults, Results, Step
+from walkerlab.pipeline.stage import Graph, Stage, without_block
 from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.key import Identity

@@ -8,10 +8,11 @@ from walkerlab.config.files import builtin_names
 from walkerlab.config.layers import parse_setting
 from walkerlab.config.loader import load
 from walkerlab.config.writer import to_extending_yaml
-from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.resolve import ResolvedRun
 from walkerlab.pipeline.runner import USUAL, Options, StageReport, execute
+from walkerlab.pipeline.stage import Graph
 from walkerlab.pipeline.store.files import write_numbered
 
 

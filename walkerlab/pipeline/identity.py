@@ -1,15 +1,17 @@
 """Identities of stored, swept and in-memory results: the config slice, inputs and code that determine a result."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Set
 from importlib import import_module
 from inspect import signature
 from typing import Any
 
-from walkerlab.code_digest import Sources
+from walkerlab.code_digest import Sources, digest_of
 from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.extensions import WORDS, declared, extensions
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.stage import Graph, Stage
 from walkerlab.pipeline.store.key import Identity
 
 
@@ -25,7 +27,7 @@ class Keys:
         """Start without digests, which are computed on first use."""
         self.graph = graph
         self._sources = Sources()
-        self._digests: dict[str, str] = {}
+        self._digests: dict[tuple[str, ...], str] = {}
         self._fixed: dict[str, dict[str, Any]] = {}
 
     def of(self, config: Config, target: str) -> dict[str, str]:
@@ -51,10 +53,34 @@ class Keys:
         files = {} if stage.files is None else {"files": dict(stage.files(config))}
         once = {} if again or not takes_again(stage) else {"again": False}
         own = {**slice_of(config, stage.takes_under(config)), **self._fixed[stage.name], **files, **once}
-        return Identity(stage.name, own, input_keys, self.code_digest(stage.name))
+        return Identity(stage.name, own, input_keys, self.code_digest(stage.name, added_code(stage, config, own)))
 
-    def code_digest(self, target: str) -> str:
-        """Return the digest of a stage's code, computed at the first call."""
-        if target not in self._digests:
-            self._digests[target] = self._sources.code_digest(self.graph[target].module)
-        return self._digests[target]
+    def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:
+        """Return the digest of a stage's code, and of code of extensions that it uses, computed at the first call."""
+        used = (target, *sorted(added))
+        if used not in self._digests:
+            modules = {code.partition(":")[0] for code in added}
+            digest = self._sources.code_digest(self.graph[target].module, *modules)
+            self._digests[used] = digest_of((code, digest.encode()) for code in used) if added else digest
+        return self._digests[used]
+
+
+def added_code(stage: Stage, config: Config, own: Mapping[str, Any]) -> set[str]:
+    """Return the code of extensions, as "module:name", that a stage's result depends on.
+
+    They are the laws named by words in its part of the config, `own`, and for drawings everything that is drawn.
+    """
+    laws = {word: code for key in WORDS for word, code in declared(key).items()}
+    used = {laws[word] for word in (*texts_in(own), *stage.uses(config)) if word in laws}
+    if stage.draws:
+        used |= {code for extension in extensions().values() for code in extension.views()}
+    return used
+
+
+def texts_in(value: Any) -> Iterator[str]:
+    """Yield all texts in nested mappings and lists."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping | list | tuple):
+        for item in value.values() if isinstance(value, Mapping) else value:
+            yield from texts_in(item)

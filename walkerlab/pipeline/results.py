@@ -4,14 +4,15 @@ import mmap
 import os
 import shutil
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.stage import Graph, Stage
 from walkerlab.pipeline.store import artifact, provenance
 from walkerlab.pipeline.store.artifact import Stored, Verdict
 from walkerlab.pipeline.store.checkpoint import Checkpoint
@@ -156,7 +157,7 @@ def mentions(path: Path, key: str) -> bool:
 class LoadedCodeKeys(Keys):
     """Builds identities for this process only; its code does not change, so they need no code digest."""
 
-    def code_digest(self, target: str) -> str:  # noqa: ARG002
+    def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:  # noqa: ARG002
         return ""
 
 

@@ -9,10 +9,11 @@ from typing import Any
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.executor import Executor, omission_of
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.results import FolderResults, Step
 from walkerlab.pipeline.runs import claim, refuse_another_config
+from walkerlab.pipeline.stage import Graph, Stage
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene.omissions import LeftOut
 

@@ -18,8 +18,9 @@ from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.labels import join_words
 from walkerlab.pipeline.executor import survey
-from walkerlab.pipeline.graph import PIPELINE, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.headlines import LAST_OF, headlines
+from walkerlab.pipeline.stage import Graph, Stage
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.key import differences

@@ -12,8 +12,8 @@ from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.physics import kernel_cache
-from walkerlab.pipeline.graph import Stage
 from walkerlab.pipeline.progress import StageReporter
+from walkerlab.pipeline.stage import Stage
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import drawing_into
 from walkerlab.pipeline.workers import tell

@@ -11,8 +11,9 @@ import numpy as np
 
 from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.extensions import declared, load
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
-from walkerlab.physics.ground.friction import FrictionLaw, create_law
+from walkerlab.physics.ground.friction import FRICTION_LAWS, FrictionLaw, create_law
 from walkerlab.physics.ground.normal_force import NormalLaw
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
@@ -166,11 +167,14 @@ def normal_law(contact: Contact) -> NormalLaw:
 def friction_law(contact: Contact) -> FrictionLaw:
     """Return the friction law in SI; frictionless contact is a law of its own, not a zero coefficient.
 
-    Raises ConfigError if a law that a user added is incomplete.
+    Raises ConfigError if a law that an extension added is incomplete.
     """
+    word, added = contact.friction, declared("friction")
     try:
-        return create_law(contact.friction, contact.in_si())
-    except TypeError as error:
+        if word in added:
+            FRICTION_LAWS[word] = load(added[word])
+        return create_law(word, contact.in_si())
+    except (TypeError, ImportError, AttributeError) as error:
         raise ConfigError(f"{error}.", "docs/adding.md lists the parts of a law.") from error
 
 

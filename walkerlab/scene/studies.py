@@ -1,32 +1,35 @@
-"""Registration of the reproduced study: its walker, and its own equations in addition to Lagrange's.
-
-The study is named by a string and imported late, so this module does not depend on it, but code digests include its
-law (see code_digest.py).
-"""
+"""Studies of extensions in scenes: their walkers, and their own equations in addition to Lagrange's."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from walkerlab.registration import registered
+from walkerlab.extensions import declared, extensions, load
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Equations
+    from walkerlab.extensions import Study
     from walkerlab.physics.mechanics.rigid_model import RigidModel
 
-STUDY = "walkerlab.evidence.paper.law"
 LAGRANGE_EQUATIONS: Equations = "corrected"
 
 
+def study_of(config: Any) -> Study | None:
+    """Return the study that has a config's walker, or None if no study has."""
+    studies = (study for extension in extensions().values() for study in extension.studies)
+    return next((study for study in studies if load(study.own_walker)(config)), None)
+
+
 def is_studied(config: Any) -> bool:
-    return bool(registered(STUDY, "is_own_walker")(config))
+    return study_of(config) is not None
 
 
 def with_equations(model: RigidModel, equations: Equations) -> RigidModel:
-    moved: RigidModel = model if equations == LAGRANGE_EQUATIONS else registered(STUDY, "LAWS")[equations](model)
+    moved: RigidModel = model if equations == LAGRANGE_EQUATIONS else load(declared("equations")[equations])(model)
     return moved
 
 
 def equation_sets(config: Any) -> tuple[Equations, ...]:
-    """Return the sets of equations for the gait search: all sets for the study's walker, otherwise the config's."""
-    return (LAGRANGE_EQUATIONS, *registered(STUDY, "LAWS")) if is_studied(config) else (config.equations,)
+    """Return the sets of equations for the gait search: all sets for a study's walker, otherwise the config's."""
+    study = study_of(config)
+    return (config.equations,) if study is None else (LAGRANGE_EQUATIONS, *study.equations)

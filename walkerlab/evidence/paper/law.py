@@ -1,9 +1,8 @@
 """The study's contribution to scenes (see scene/studies.py): its walker, and Appendix A's sign error as a torque.
 
-Every result of the rigid model depends on this file, so the rest of the study is in other files.
+Results with the equations as printed depend on this file, so the rest of the study is in other files.
 """
 
-from collections.abc import Callable, Mapping
 from typing import Any
 
 from walkerlab.config.numbers import same
@@ -22,7 +21,3 @@ def is_own_walker(config: Any) -> bool:
 def as_printed(model: RigidModel) -> RigidModel:
     """Return a compass whose centrifugal torque on the stance leg, C_21 dtheta_1, has the sign printed in (A.5)."""
     return model.changed(unpaired=-2.0 * model.A[STANCE, SWING])
-
-
-LAWS: Mapping[str, Callable[[RigidModel], RigidModel]] = {"as-printed": as_printed}
-"""Function that changes the rigid model, by the config's name for the set of equations."""

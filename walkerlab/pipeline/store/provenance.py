@@ -14,6 +14,7 @@ from pathlib import Path
 import walkerlab
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_yaml
+from walkerlab.extensions import foreign
 from walkerlab.pipeline.store.commit import commit_of_package
 from walkerlab.pipeline.store.files import as_text
 
@@ -78,14 +79,14 @@ def utc_now() -> str:
 
 
 def library_versions() -> dict[str, str]:
-    """Return versions of the installed libraries from their metadata, importing none."""
+    """Return versions of the installed libraries from their metadata, importing none, and of extensions."""
     versions = {}
     for name in LIBRARIES:
         try:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
             continue
-    return versions
+    return versions | {f"extension {found.name}": found.origin for found in foreign() if found.extension}
 
 
 def git_commit() -> str | None:

@@ -14,10 +14,11 @@ from typing import Annotated, Any, Final, Literal
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
+from walkerlab.extensions import refuse_other_versions
 from walkerlab.labels import Label, labels_of
 from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.graph import STRIDES, Graph
 from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.stage import STRIDES, Graph
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged, OtherLayout
 from walkerlab.pipeline.store.columns import rows_group
@@ -65,15 +66,26 @@ def memory_for(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - on
     return MemoryResults(graph)
 
 
-def compute_point(config: Config, key: str, graph: Graph, target: str, again: bool, forced: str = "") -> Chunk:
+def compute_point(
+    config: Config,
+    key: str,
+    graph: Graph,
+    target: str,
+    again: bool,
+    forced: str = "",
+    expected: Mapping[str, str] | None = None,
+) -> Chunk:
     """Compute one point in this process; an error becomes its result.
 
-    key     stage key of the point's result
-    again   whether to repeat its walk to measure the numerical error
-    forced  identifies a sweep that reuses no earlier result; empty for other sweeps
+    key       stage key of the point's result
+    again     whether to repeat its walk to measure the numerical error
+    forced    identifies a sweep that reuses no earlier result; empty for other sweeps
+    expected  versions of the caller's extensions, which must be those of this process; None not to compare them
     """
     memory = memory_for(graph, forced)
     try:
+        if expected is not None:
+            refuse_other_versions(expected)
         config = without_outputs(config, target, graph)
         answer = answer_in_memory(config, target, memory, again=again or STRIDES not in graph[target].options)
     except WalkerlabError as error:

@@ -17,10 +17,12 @@ from walkerlab.config.loader import LoadedConfig
 from walkerlab.config.problems import SHOWN_PROBLEMS
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
-from walkerlab.pipeline.graph import PIPELINE, Graph
+from walkerlab.extensions import versions
+from walkerlab.pipeline.graph import PIPELINE
 from walkerlab.pipeline.identity import Keys
 from walkerlab.pipeline.progress import Progress, Reporter, Silent
 from walkerlab.pipeline.runs import claim, refuse_another_config
+from walkerlab.pipeline.stage import Graph
 from walkerlab.pipeline.stages.numerical_error import SAMPLE, evenly_spread
 from walkerlab.pipeline.store import artifact, provenance
 from walkerlab.pipeline.store.content import Content, Group
@@ -254,7 +256,9 @@ class SweepRun:
         for index in indices:
             config = self.config(index)
             key = self.keys.of(config, stage)[stage]
-            yield WorkUnit(key, 1, partial(compute_point, config, key, graph, stage, index in sample, forced))
+            yield WorkUnit(
+                key, 1, partial(compute_point, config, key, graph, stage, index in sample, forced, versions())
+            )
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
+from walkerlab.extensions import declared, load
 from walkerlab.labels import join_words, with_unit
 from walkerlab.pipeline.executor import Executor
 from walkerlab.pipeline.graph import PIPELINE
@@ -42,7 +43,6 @@ from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.request import Request
 from walkerlab.views.cli.target import Target, write_file
 from walkerlab.views.figures.style import EXPORT_DPI
-from walkerlab.views.report.answers import paper_table
 from walkerlab.views.report.outcomes import MODEL_NAMES
 from walkerlab.views.report.tables import Table, as_csv, record_table
 from walkerlab.views.report.tex import as_tex
@@ -219,7 +219,7 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
         )
     rows = summary[TABLES[name]]
     if kind == "tex":
-        tex_table: Table = paper_table(TABLES[name], rows)
+        tex_table: Table = load(declared("tables")["compare"])(TABLES[name], rows)
         return tex_table
     if isinstance(rows, Mapping):
         rows = [{"quantity": quantity, **row} for quantity, row in rows.items()]

@@ -1,11 +1,12 @@
-"""Commands on stored results and configs: status, show, schema, clean."""
+"""Commands on stored results, configs and extensions: status, show, schema, extensions, clean."""
 
 from dataclasses import replace
 from typing import Annotated
 
 import typer
 
-from walkerlab.pipeline.graph import Graph
+from walkerlab.extensions import registry
+from walkerlab.pipeline.stage import Graph
 from walkerlab.views.cli.failures import exit_on_failure, print_result
 from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
 
@@ -63,6 +64,21 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
         from walkerlab.config.reference import as_json_schema, as_paragraphs
 
         print_result(request, as_json_schema(key), [as_paragraphs(key)])
+
+    @command(app, "as_json", name="extensions")
+    def list_extensions(request: Request) -> None:
+        """List all extensions with their version, what they add, and why some are left out."""
+        rows = [
+            {"name": each.name, "source": each.origin, "code": each.code, "adds": each.adds, "left_out": each.why}
+            for each in registry()
+        ]
+        lines = []
+        for each in registry():
+            adds = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in each.adds.items() if kind != "views")
+            lines.append(
+                f"{each.name} ({each.origin}): {f'left out, {each.why}' if each.why else adds or 'views only'}"
+            )
+        print_result(request, {"extensions": rows}, lines)
 
     @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)
     def clean(

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from walkerlab.errors import StoppedError
-from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.interrupts import raise_on
+from walkerlab.pipeline.stage import Graph
 from walkerlab.views.cli.request import OF_TALK, Request, command
 from walkerlab.views.figures.style import EXPORT_DPI
 

@@ -12,7 +12,8 @@ import typer
 from typer.core import TyperGroup
 
 import walkerlab
-from walkerlab.pipeline.graph import PIPELINE, STRIDES, Graph, Stage
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.stage import STRIDES, Graph, Stage
 from walkerlab.pipeline.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
 from walkerlab.views.cli import runs as whole_runs
@@ -58,7 +59,7 @@ GROUPS = {
         "compare", "diff", "recorded-walk", "identify", "plan", "tune", "engines", "accuracy", "stability",
         "stability-maps", "known-problems",
     ),
-    "Keep house": ("status", "show", "schema", "rerun", "compile", "clean"),
+    "Keep house": ("status", "show", "schema", "extensions", "rerun", "compile", "clean"),
 }  # fmt: skip
 """Commands by purpose, in the order of the help; a command that is in no group is listed with the last one."""
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from walkerlab.extensions import foreign, refuse_equal_names
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.failures import exit_on_failure
 
@@ -23,8 +24,8 @@ from walkerlab.views.cli.failures import exit_on_failure
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
-    from walkerlab.pipeline.graph import Option
     from walkerlab.pipeline.resolve import ResolvedRun
+    from walkerlab.pipeline.stage import Option
     from walkerlab.pipeline.store.runfolder import RunFolder
 
 RUNS = Path("runs")
@@ -218,14 +219,13 @@ class Request:
     @cached_property
     def resolved_run(self) -> "ResolvedRun":
         """Resolve the config and its run folder, and show the config's warnings; ConfigError if it is invalid."""
+        from walkerlab.pipeline.graph import PIPELINE
         from walkerlab.pipeline.resolve import resolve
 
         run = resolve(self.config, self.settings, self.strides, self.runs, self.name)
         loaded = run.loaded
-        if loaded.config.stability.cases:
-            from walkerlab.pipeline.graph import check_cases
-
-            check_cases(loaded.config.stability.cases)
+        for stage in PIPELINE.stages:
+            stage.checks(loaded.config)
         for warning in loaded.warnings:
             self.console.warn(warning)
         self.console.detail(f"config: {loaded.source}; run folder: {run.folder.path}")
@@ -303,6 +303,12 @@ def command(
             instead = next((option.runs for option in sets if option.runs and values[option.flag]), "")
             request = asks(typed, settings, instead, **{field: arguments.pop(field) for field in shared})
             with exit_on_failure(request):
+                if foreign() and typed != "extensions":
+                    commands = [str(each.name) for each in app.registered_commands]
+                    refuse_equal_names(each for each in commands if commands.count(each) > 1)
+                    for each in foreign():
+                        if each.why:
+                            request.console.warn(f"extension {each.name} ({each.origin}) is left out: {each.why}")
                 function(request, **arguments)
 
         _, *own = inspect.signature(function, eval_str=True).parameters.values()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from walkerlab.pipeline.graph import Graph
+from walkerlab.pipeline.stage import Graph
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request, command
 

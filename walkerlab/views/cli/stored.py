@@ -7,9 +7,9 @@ from typing import Any
 
 from walkerlab.errors import ConfigError, StaleError
 from walkerlab.pipeline.executor import short_reason, survey
-from walkerlab.pipeline.graph import Graph
 from walkerlab.pipeline.results import UP_TO_DATE, Step
 from walkerlab.pipeline.runs import RunSummary, config_of, run_named, runs_in
+from walkerlab.pipeline.stage import Graph
 from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
 from walkerlab.pipeline.store.content import Variable
 from walkerlab.pipeline.store.runfolder import RunFolder

@@ -1,7 +1,7 @@
 """The type of an illustration: its name, texts, required results and drawing function."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +53,12 @@ class Illustration:
     number: int | None = None  # number in the paper; None if the paper has no such figure
     words: str = ""  # file in `words/` with title, caption and text alternative; default: the figure's name
     scene: str = ""  # first argument of the templates, if one file serves several figures
+    # title, caption and text alternative (`seen`) of an extension's figure, with {} for values; replaces `words`
+    texts: Mapping[str, str] = field(default_factory=dict)
 
     def say(self, what: str, *values: Any) -> str:
+        if self.texts:
+            return self.texts.get(what, "").format(*values)
         return WORDS(f"{self.words or self.name}.{what}", *([self.scene] if self.scene else []), *values)
 
     @property

@@ -1,6 +1,6 @@
-"""All illustrations in display order, including those that `walkerlab.evidence` registers."""
+"""All illustrations in display order: those with a number of the paper, then others, including those of extensions."""
 
-from walkerlab.registration import registered
+from walkerlab.extensions import extensions, load
 from walkerlab.views.figures import (
     families,
     ground,
@@ -13,12 +13,15 @@ from walkerlab.views.figures import (
 )
 from walkerlab.views.figures.illustration import Illustration
 
-NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, *families.FIGURES, *robustness.FIGURES)
+ADDED: tuple[Illustration, ...] = tuple(
+    figure for extension in extensions().values() if extension.figures for figure in load(extension.figures)
+)
+NUMBERED = (*stick_diagram.FIGURES, *walks.FIGURES, *maps.FIGURES, *families.FIGURES, *robustness.FIGURES, *ADDED)
 FIGURES: tuple[Illustration, ...] = (
-    *sorted((*registered("walkerlab.evidence.paper.figures", "FIGURES"), *NUMBERED), key=lambda figure: figure.name),
+    *sorted((figure for figure in NUMBERED if figure.number is not None), key=lambda figure: figure.name),
     *ground.FIGURES,
     *identification.FIGURES,
     *measurement_plan.FIGURES,
-    *registered("walkerlab.evidence.benchmarks.figures", "FIGURES"),
+    *(figure for figure in ADDED if figure.number is None),
     *maps.STABILITY,
 )

@@ -11,9 +11,9 @@ from typing import Any
 
 from markupsafe import escape
 
+from walkerlab.extensions import declared, later
 from walkerlab.labels import join_words, unit_by_name
 from walkerlab.physics.energy_channels import CHANNELS
-from walkerlab.registration import later
 from walkerlab.views.report import gaits
 from walkerlab.views.report.numbers import count, decimals_left, fixed, length, number, quantity
 from walkerlab.views.report.outcomes import MODEL_NAMES, WALKED_LABEL, describe_error
@@ -296,16 +296,11 @@ def report(summary: Summary) -> list[str | Table]:
     return [f"The page has {count(len(summary['figures']), 'figure')} and {count(len(summary['tables']), 'table')}."]
 
 
-paper_table = later("walkerlab.evidence.paper.sections", "table_of")
-"""Build a table of the paper's values as on the page about the paper."""
-
 ANSWERS: dict[str, Answer] = {
     "fixedpoint": fixedpoint,
     **{stage: partial(walk, model.lower()) for stage, model in MODEL_NAMES.items()},
     "tune": tune,
-    "compare": later("walkerlab.evidence.paper.sections", "answer"),
     "accuracy": accuracy,
-    "stability": later("walkerlab.evidence.verification.section", "answer"),
     "continuation": continuation,
     "basin": starts,
     "robustness": robustness_answer,
@@ -315,6 +310,7 @@ ANSWERS: dict[str, Answer] = {
     "engines": engines,
     "plot": plot,
     "report": report,
+    **{stage: later(code) for stage, code in declared("answers").items()},
 }
 
 

@@ -1,4 +1,4 @@
-"""The sections of the report in order, including those that `walkerlab.evidence` registers.
+"""The sections of the report in order, including those of extensions.
 
 Each entry is a function that builds a `Section` from the results, or returns None if it has nothing to show. It reads
 `Results.summary(stage)` (empty if the stage did not run) and `Results.group(stage, path)` (None in that case).
@@ -10,7 +10,7 @@ from walkerlab.config.drives import drives_of, springs_of
 from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_passive_compass, why_rigid_alone
-from walkerlab.registration import registered
+from walkerlab.extensions import extensions, load
 from walkerlab.views.report.blocks import MAIN, Section
 from walkerlab.views.report.page import Page
 from walkerlab.views.report.results import Results, SectionMaker
@@ -31,12 +31,19 @@ from walkerlab.views.report.sections import (
 )
 from walkerlab.views.report.words import words
 
+
+def added(slot: str) -> tuple[SectionMaker, ...]:
+    """Return the sections that extensions add at a place of the page."""
+    makers = (maker for extension in extensions().values() for maker in extension.sections.get(slot, ()))
+    return tuple(map(load, makers))
+
+
 SECTIONS: tuple[SectionMaker, ...] = (
     verdict.section,
     motion.section,
-    registered("walkerlab.evidence.paper.sections", "paper_section"),
+    *added("task"),
     motion.figures,
-    registered("walkerlab.evidence.paper.sections", "recorded"),
+    *added("walks"),
     gaits.section,
     families.section,
     walks.assumptions,
@@ -48,12 +55,9 @@ SECTIONS: tuple[SectionMaker, ...] = (
     identification.section,
     plan.section,
     models.section,
-    registered("walkerlab.evidence.paper.sections", "numbers"),
-    registered("walkerlab.evidence.paper.sections", "tables"),
-    registered("walkerlab.evidence.paper.sections", "errors"),
-    registered("walkerlab.evidence.verification.section", "section"),
+    *added("evidence"),
     accuracy.section,
-    registered("walkerlab.evidence.benchmarks.engines.section", "section"),
+    *added("benchmarks"),
     adjustment.limit,
     closing.glossary,
     closing.left_out,

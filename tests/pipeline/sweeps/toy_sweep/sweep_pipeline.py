@@ -1,6 +1,6 @@
 """The graph."""
 
-from walkerlab.pipeline.graph import STRIDES, Graph, Stage, results_of
+from walkerlab.pipeline.stage import STRIDES, Graph, Stage, results_of
 
 
 def keys(*names):

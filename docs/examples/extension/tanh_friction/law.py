@@ -1,0 +1,33 @@
+"""The law of friction: mu tanh(v / v_0)."""
+
+import math
+from typing import NamedTuple
+
+from walkerlab.physics.ground.friction import friction_coefficient
+
+
+class Tanh(NamedTuple):
+    """Parameters of the law, SI."""
+
+    largest: float  # [mu] coefficient at any slip
+    velocity: float  # [v_0] m/s
+    rising_until: float  # m/s, slip velocity beyond which friction grows by less than half a per cent
+    sliding_from: float  # m/s, slip velocity beyond which the foot slides
+
+    @classmethod
+    def of(cls, contact):
+        v = contact.stiction_velocity
+        return cls(contact.dynamic_friction, v, 3 * v, 3 * v)
+
+    def with_creep(self, factor):
+        return Tanh(self.largest, *(factor * v for v in self[1:]))
+
+    def in_words(self):
+        return f"friction of {self.largest:g} tanh(v / {self.velocity:g} m/s)"
+
+
+@friction_coefficient.case(Tanh)
+def coefficient(law, slip):
+    """Compute the signed coefficient and its derivative (s/m)."""
+    t = math.tanh(slip / law.velocity)
+    return -law.largest * t, -law.largest * (1 - t * t) / law.velocity

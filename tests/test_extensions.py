@@ -1,0 +1,348 @@
+"""Extensions of other packages: the example of the docs and faulty ones, installed as pip leaves them on the path."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import walkerlab
+from walkerlab.config.loader import load
+from walkerlab.extensions import Extension, refuse_other_versions
+from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.sweeps.chunk import compute_point
+
+ROOT = Path(__file__).parent.parent
+EXAMPLE = ROOT / "docs" / "examples" / "extension"
+PACKAGE = "tanh_friction"
+
+
+def announce(folder, distribution, entries):
+    """Write what tells Python that a distribution of version 1.0 is installed in a folder."""
+    info = folder / f"{distribution.replace('-', '_')}-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.0\n")
+    lines = [f"{name} = {code}\n" for name, code in entries.items()]
+    (info / "entry_points.txt").write_text("".join(["[walkerlab.extensions]\n", *lines]))
+
+
+def install_example(folder):
+    shutil.copytree(EXAMPLE / PACKAGE, folder / PACKAGE, ignore=shutil.ignore_patterns("__pycache__"))
+    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
+    announce(folder, project["name"], project["entry-points"]["walkerlab.extensions"])
+
+
+def add(folder, distribution, text, **entries):
+    """Install a package of one module."""
+    name = distribution.replace("-", "_")
+    folder.mkdir(exist_ok=True)
+    (folder / f"{name}.py").write_text(text)
+    announce(folder, distribution, entries or {distribution: f"{name}:EXTENSION"})
+
+
+class Site:
+    """A folder of installed packages, and the program that finds them."""
+
+    def __init__(self, folder):
+        self.folder, self.packages = folder, folder / "site"
+        self.environment = {**os.environ, "PYTHONPATH": str(self.packages), "XDG_CACHE_HOME": str(folder / "cache")}
+
+    def python(self, code, *arguments, environment=()):
+        return subprocess.run(
+            [sys.executable, "-B", "-c", code, *map(str, arguments)],
+            cwd=self.folder, env={**self.environment, **dict(environment)}, capture_output=True, text=True,
+        )  # fmt: skip
+
+    def __call__(self, *words):
+        return self.python("from walkerlab.views.cli.main import main; main()", *words)
+
+
+@pytest.fixture
+def site(tmp_path):
+    return Site(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory):
+    site = Site(tmp_path_factory.mktemp("example"))
+    install_example(site.packages)
+    return site
+
+
+WALK = (
+    "--set", "contact.friction=tanh", "--set", "contact.terrain=after-mid-swing", "--set", "outputs=[states, forces]",
+    "--set", "solver.contact.method=scipy-lsoda", "--strides", "1", "--name", "tanh",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def walked(example):
+    """The example with a walk on its friction."""
+    done = example("contact-sim", *WALK, "--jobs", "1", "--json")
+    assert done.returncode == 0, done.stderr
+    return example, json.loads(done.stdout)
+
+
+def test_a_law_and_its_figure_take_at_most_forty_lines():
+    texts = [path.read_text() for path in (EXAMPLE / PACKAGE).glob("*.py")]
+    assert sum(bool(line.strip()) for text in texts for line in text.splitlines()) <= 40
+
+
+def test_the_example_can_be_installed_by_pip(tmp_path):
+    pytest.importorskip("hatchling")
+    pytest.importorskip("pip")
+    source = shutil.copytree(EXAMPLE, tmp_path / "source")
+    options = ["--no-deps", "--no-build-isolation", "--no-index", "--quiet", "--disable-pip-version-check"]
+    command = [sys.executable, "-m", "pip", "install", *options, "--target", tmp_path / "site", source]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "tanh-friction (tanh-friction 1.0): friction: tanh\n" in Site(tmp_path)("extensions").stdout
+
+
+def test_a_walk_uses_the_law_of_an_extension_and_records_where_it_came_from(walked):
+    site, summary = walked
+    assert summary["friction"] == "friction of 0.7 tanh(v / 0.1 m/s)"
+    assert "tanh-friction 1.0" in site("show", "tanh", "contact-sim").stdout
+
+
+def test_the_figure_of_an_extension_is_drawn(walked):
+    site, _ = walked
+    done = site("export", "tanh", "friction-over-slip", "--to", "svg", "-o", "drawn.svg")
+    assert done.returncode == 0, done.stderr
+    assert "<svg" in (site.folder / "drawn.svg").read_text()
+
+
+def stale(site):
+    rows = json.loads(site("status", *WALK, "--json").stdout)["stages"]
+    return {row["stage"] for row in rows if row["state"] == "stale"}
+
+
+def test_an_edited_law_renews_its_results_and_an_edited_figure_does_not(walked):
+    site, _ = walked
+    law, figure = (site.packages / PACKAGE / f"{name}.py" for name in ("law", "figure"))
+    before = {path: path.read_text() for path in (law, figure)}
+    try:
+        assert stale(site) == set()
+        figure.write_text(before[figure].replace('"."', '"x"'))
+        assert stale(site) == set()
+        law.write_text(before[law].replace("3 * v, 3 * v", "2 * v, 2 * v"))
+        assert stale(site) == {"contact-sim"}
+    finally:
+        for path, text in before.items():
+            path.write_text(text)
+    assert stale(site) == set()
+
+
+KERNEL = """
+import math
+from types import SimpleNamespace
+from walkerlab.extensions import declared, load
+from walkerlab.physics import kernel_cache
+from walkerlab.physics.ground.friction import friction_coefficient
+from walkerlab.physics.kernels import kernel
+names = []
+kernel_cache.watchers.append(names.append)
+@kernel
+def friction_at(law, slip):
+    return friction_coefficient(law, slip)[0]
+def answer():
+    law = load(declared("friction")["tanh"]).of(SimpleNamespace(dynamic_friction=0.5, stiction_velocity=0.1))
+    assert math.isclose(friction_at(law, 0.1), friction_coefficient(law, 0.1)[0])
+    return names
+"""
+
+
+def test_an_edited_law_renews_its_kernels(site):
+    install_example(site.packages)
+    (site.packages / "kernel_of_friction.py").write_text(KERNEL)
+
+    def compiled():
+        cache = {"WALKERLAB_CACHE": str(site.folder / "kernels")}
+        done = site.python("import kernel_of_friction; print(*kernel_of_friction.answer())", environment=cache)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split()
+
+    assert compiled() == ["friction_at"]
+    assert compiled() == []
+    law = site.packages / PACKAGE / "law.py"
+    law.write_text(law.read_text().replace("t = math.tanh(", "t = 2.0 * math.tanh("))
+    assert compiled() == ["friction_at"]
+
+
+def test_the_schema_says_where_a_word_comes_from(example):
+    assert "tanh: extension tanh-friction (tanh-friction 1.0)" in " ".join(
+        example("schema", "contact.friction").stdout.split()
+    )
+    schema = json.loads(example("schema", "contact.friction", "--json").stdout)
+    assert schema["enum"] == ["coulomb", "none", "tanh"]
+    assert "tanh-friction 1.0" in schema["source"]
+
+
+def test_the_packages_own_extensions_are_listed_with_what_they_add(example):
+    rows = {row["name"]: row for row in json.loads(example("extensions", "--json").stdout)["extensions"]}
+    assert list(rows) == [*walkerlab.EXTENSIONS, "tanh-friction"]
+    assert rows["study"]["source"] == f"walkerlab {walkerlab.__version__}"
+    assert rows["study"]["adds"]["equations"] == ["as-printed"]
+    assert rows["tanh-friction"]["adds"]["friction"] == ["tanh"]
+
+
+def test_a_config_whose_extension_is_missing_is_told_what_is_installed(site):
+    add(site.packages, "other", "from walkerlab.extensions import Extension\nEXTENSION = Extension(1)\n")
+    done = site("contact-sim", "--set", "contact.friction=tanh")
+    assert done.returncode == 3
+    assert (
+        "one of coulomb, none, or a word of an extension: install the one that adds it (installed: other)"
+        in done.stderr
+    )
+
+
+FAULTS = {
+    "ImportError: no such thing": "raise ImportError('no such thing')",
+    "SystemExit: 1": "import sys\nsys.exit(1)",
+    "it is of type int, not Extension": "EXTENSION = 1",
+    "it was written for interface 99": "from walkerlab.extensions import Extension\nEXTENSION = Extension(99)",
+    "unexpected keyword argument": "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, robots='')",
+    "No module named 'nowhere'": (
+        "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, friction={'icy': 'nowhere.law:Law'})"
+    ),
+    "it must name that code in quotes": "from walkerlab.config.schema import Config\nEXTENSION = 1",
+    "'json' is not the name of code": (
+        "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, figures='json')"
+    ),
+    "answers and tables must be those of its own stages": (
+        "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, answers={'simulate': 'json:dumps'})"
+    ),
+}
+
+
+@pytest.mark.parametrize("why", FAULTS)
+def test_a_broken_extension_is_named_and_left_out_and_the_rest_works(site, why):
+    install_example(site.packages)
+    add(site.packages, "broken", FAULTS[why])
+    done = site("schema", "contact.friction")
+    assert done.returncode == 0
+    assert "warning: extension broken (broken 1.0) is left out: " in done.stderr
+    assert why in done.stderr
+    assert "tanh" in done.stdout
+    assert "broken (broken 1.0): left out, " in site("extensions").stdout
+
+
+def extension(**adds):
+    listed = ", ".join(f"{name}={value}" for name, value in adds.items())
+    return f"import json\nfrom walkerlab.extensions import Extension\nEXTENSION = Extension(1, {listed})\n"
+
+
+STAGE = "from walkerlab.pipeline.stage import Stage\nfrom walkerlab.extensions import Extension\n"
+CLASHES = {
+    "walkerlab and second 1.0 both add the friction coulomb": extension(friction="{'coulomb': 'json:dumps'}"),
+    "second 1.0 and tanh-friction 1.0 both add the friction tanh": extension(friction="{'tanh': 'json:dumps'}"),
+    "walkerlab .* and second 1.0 both add the stage simulate": (
+        f"{STAGE}EXTENSION = Extension(1, (Stage('simulate', 'json', '', object),))"
+    ),
+    "walkerlab and second 1.0 both add the stage status": (
+        f"{STAGE}EXTENSION = Extension(1, (Stage('status', 'json', '', object),))"
+    ),
+}
+
+
+@pytest.mark.parametrize("message", CLASHES)
+def test_two_equal_names_are_an_error_of_every_command(site, message):
+    install_example(site.packages)
+    add(site.packages, "second", CLASHES[message])
+    done = site("schema", "gravity_m_s2")
+    assert done.returncode == 3
+    assert re.search(message, done.stderr)
+    assert "Uninstall one of the two" in done.stderr
+    assert "second" in site("extensions").stdout
+
+
+def test_two_extensions_of_one_name_are_an_error(site):
+    add(site.packages, "first", extension(), same="first:EXTENSION")
+    add(site.packages, "second", extension(), same="second:EXTENSION")
+    assert "first 1.0 and second 1.0 both add the extension same." in site("schema", "seed").stderr
+
+
+SCANNED = """
+import sys
+from walkerlab.extensions import registry
+print(*(found.name for found in registry() if found.source), "importlib.metadata" in sys.modules)
+"""
+
+
+def test_folders_are_scanned_again_only_after_they_have_changed(site):
+    long_ago = 1_600_000_000
+    install_example(site.packages)
+    os.utime(site.packages, (long_ago, long_ago))
+    os.utime(site.folder, (long_ago, long_ago))
+    assert site.python(SCANNED).stdout.split() == ["tanh-friction", "True"]
+    os.utime(site.folder, (long_ago, long_ago))
+    assert site.python(SCANNED).stdout.split() == ["tanh-friction", "False"]
+    add(site.packages, "new", extension())
+    assert set(site.python(SCANNED).stdout.split()) == {"tanh-friction", "new", "True"}
+    shutil.rmtree(site.packages / "tanh_friction-1.0.dist-info")
+    assert site.python(SCANNED).stdout.split() == ["new", "True"]
+
+
+def test_scans_that_others_may_have_written_are_not_trusted(site):
+    long_ago = 1_600_000_000
+    install_example(site.packages)
+    os.utime(site.packages, (long_ago, long_ago))
+    site.python(SCANNED)
+    (file,) = (site.folder / "cache").iterdir()
+    assert file.stat().st_mode & 0o077 == 0
+    file.write_text(file.read_text().replace("tanh_friction:EXTENSION", "evil:EXTENSION"))
+    file.chmod(0o666)
+    assert site.python(SCANNED).stdout.split() == ["tanh-friction", "True"]
+
+
+def test_a_worker_with_other_extensions_says_which(example):
+    refuse_other_versions({})
+    config = load().config
+    asked = {"tanh-friction": "tanh-friction 1.0 (code 0123abcd)"}
+    (row,) = compute_point(config, "key", PIPELINE, "fixedpoint", False, "", asked).rows
+    assert row.status == "failed"
+    assert row.reason == "extension tanh-friction: this worker has none, its caller tanh-friction 1.0 (code 0123abcd)."
+    code = "from walkerlab.extensions import *; import walkerlab.extensions as e; print(e.versions())"
+    assert "'tanh-friction': 'tanh-friction 1.0 (code " in example.python(code).stdout
+
+
+COPY = """
+import sys, walkerlab
+for name in ("study", "benchmarks", "verification"):
+    del walkerlab.EXTENSIONS[name]
+from walkerlab.views.cli.main import main
+main()
+"""
+
+
+def test_the_study_runs_from_a_copy_outside_the_package(site):
+    """The evidence uses nothing that other packages cannot use: the same walk is judged the same from outside."""
+    shutil.copytree(
+        Path(walkerlab.__file__).parent / "evidence",
+        site.packages / "copied",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
+    for path in (site.packages / "copied").rglob("*.py"):
+        path.write_text(path.read_text().replace("walkerlab.evidence", "copied"))
+    names = {"study": "paper", "benchmarks": "benchmarks", "verification": "verification"}
+    announce(site.packages, "copied", {name: f"copied.{folder}.extension:EXTENSION" for name, folder in names.items()})
+    options = ("--jobs", "1", "--set", "strides=1", "--json", "--runs", "runs")
+    outside = site.python(COPY, "compare", *options)
+    assert outside.returncode == 0, outside.stderr
+    assert "copied 1.0" in site.python(COPY, "extensions").stdout
+    shutil.rmtree(site.folder / "runs")
+    shutil.rmtree(site.packages)
+    inside = site("compare", *options)
+    judged, expected = (json.loads(done.stdout) for done in (outside, inside))
+    assert judged["verdicts"] == expected["verdicts"]
+    assert judged["paper_numbers"] == expected["paper_numbers"]
+
+
+def test_an_extension_lists_all_code_that_it_names():
+    everything = Extension(1, figures="a:A", sections={"task": ("b:B",)}, friction={"icy": "c:C"})
+    assert [*everything.code()] == ["a:A", "b:B", "c:C"]

@@ -1,0 +1,46 @@
+"""The reproduced study as an extension: its stages, figures, sections, tables and equations."""
+
+from __future__ import annotations
+
+from walkerlab.config import reads
+from walkerlab.extensions import INTERFACE, Extension, Study, later
+from walkerlab.pipeline.stage import DRAWINGS, Option, Stage, results_of, walks_and
+
+STAGES = (
+    Stage(
+        "compare", "walkerlab.evidence.paper.compare",
+        "Compare both models with each other and with every value of the paper.", reads.CompareConfig,
+        walks_and(), requires=("contact",), needed_by=DRAWINGS,
+        options=(
+            Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV."),
+            Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Columns of that file.", needs=("--with",)),
+            Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", needs=("--with",)),
+            Option("--walks", "recording.walks", "left|right|away|towards", "Direction of markers.", needs=("--with",)),
+        ),
+    ),
+    Stage(
+        "tune", "walkerlab.evidence.paper.tune",
+        "Adjust the initial velocities until the contact model walks; report how much was needed, and why.",
+        reads.TuneConfig, results_of("fixedpoint"), requires=("contact",), needed_by=("report",), shown_by=("plot",),
+        does_without=later("walkerlab.evidence.paper.omissions:adjustment_omissions"),
+    ),
+)  # fmt: skip
+EXTENSION = Extension(
+    INTERFACE,
+    STAGES,
+    figures="walkerlab.evidence.paper.figures:FIGURES",
+    sections={
+        "task": ("walkerlab.evidence.paper.sections:paper_section",),
+        "walks": ("walkerlab.evidence.paper.sections:recorded",),
+        "evidence": (
+            "walkerlab.evidence.paper.sections:numbers",
+            "walkerlab.evidence.paper.sections:tables",
+            "walkerlab.evidence.paper.sections:errors",
+        ),
+    },
+    answers={"compare": "walkerlab.evidence.paper.sections:answer"},
+    tables={"compare": "walkerlab.evidence.paper.sections:table_of"},
+    studies=(
+        Study("walkerlab.evidence.paper.law:is_own_walker", {"as-printed": "walkerlab.evidence.paper.law:as_printed"}),
+    ),
+)

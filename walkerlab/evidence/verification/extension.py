@@ -1,0 +1,54 @@
+"""The verification as an extension: extreme cases and problems with known answers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from walkerlab.config import reads
+from walkerlab.extensions import INTERFACE, Extension, later
+from walkerlab.pipeline.stage import DRAWINGS, Stage, gait_for_start_or_pads
+from walkerlab.scene.studies import is_studied
+
+if TYPE_CHECKING:
+    from walkerlab.config.reads import SceneConfig
+    from walkerlab.config.schema import Config
+
+
+def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
+    """Require stage `known-problems` and, unless the walker is a study's, what `gait_for_start_or_pads` requires."""
+    return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
+
+
+def check_cases(config: Config) -> None:
+    """Raise ConfigError if a case of the config is unusable."""
+    if config.stability.cases:
+        # imported here, because most configs have no cases
+        from walkerlab.evidence.verification.catalogue import all_cases
+
+        all_cases(config.stability.cases)
+
+
+STAGES = (
+    Stage(
+        "known-problems", "walkerlab.evidence.verification.known_problems",
+        "Check the contact code on problems whose answers are known, once for all scenes.", object,
+    ),
+    Stage(
+        "stability", "walkerlab.evidence.verification.stability",
+        "Verify extreme cases and problems with known answers.",
+        reads.CompassCasesConfig, known_problems_and_start, takes_of_scene=reads.SceneCasesConfig,
+        takes_of_paper=reads.WalksConfig, needed_by=("report",), checks=check_cases,
+        does_without=later("walkerlab.evidence.verification.omissions:verification_omissions"),
+    ),
+    Stage(
+        "stability-maps", "walkerlab.evidence.verification.stability_maps",
+        "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
+        reads.MapsConfig, only_by="stability --full", shown_by=DRAWINGS, takes_of_paper=reads.WalksConfig,
+    ),
+)  # fmt: skip
+EXTENSION = Extension(
+    INTERFACE,
+    STAGES,
+    sections={"evidence": ("walkerlab.evidence.verification.section:section",)},
+    answers={"stability": "walkerlab.evidence.verification.section:answer"},
+)

@@ -1,0 +1,280 @@
+"""Extensions: packages that add stages, figures, sections of the page, answers, laws and studies.
+
+The package's own extensions are listed in `walkerlab.EXTENSIONS`; other packages announce theirs by entry points of the
+group `walkerlab.extensions`. An extension names its code in quotes, "module:name", which is imported on first use. All
+other modules ask this one for what extensions add, so none of them names a module of a higher layer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+import walkerlab
+from walkerlab.code_digest import Sources
+from walkerlab.errors import ConfigError
+from walkerlab.private_files import may_be_foreign
+
+OWN: Final = walkerlab.__name__
+GROUP: Final = "walkerlab.extensions"
+INTERFACE: Final = 1
+"""Version of the interface, that is, of the fields of `Extension` and `Study`."""
+WORDS: Final[Mapping[str, tuple[str, ...]]] = {"equations": ("corrected",), "friction": ("coulomb", "none")}
+"""The package's own words of config keys to which extensions add words, by the last part of the key."""
+SETTLED_NS: Final = 2_000_000_000  # a folder that changed more recently may change again without a new time
+MAX_FOLDERS: Final = 500
+
+
+@dataclass(frozen=True)
+class Study:
+    """A published study, with its walker and its equations of motion if they differ from Lagrange's."""
+
+    own_walker: str  # function from a config to whether it has the study's walker
+    equations: Mapping[str, str] = field(default_factory=dict)  # functions that change a rigid model, by word
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What a package adds. Code is named as "module:name" and imported on first use."""
+
+    interface: int  # the `INTERFACE` that it was written for
+    stages: Sequence[Any] = ()  # of type `pipeline.stage.Stage`
+    figures: str = ""  # a tuple of `views.figures.illustration.Illustration`
+    sections: Mapping[str, Sequence[str]] = field(default_factory=dict)  # makers of sections, by `SLOTS` of the page
+    answers: Mapping[str, str] = field(default_factory=dict)  # what a stage's command prints, by stage
+    tables: Mapping[str, str] = field(default_factory=dict)  # tables of a stage's summary for export, by stage
+    friction: Mapping[str, str] = field(default_factory=dict)  # classes of friction laws, by word
+    studies: Sequence[Study] = ()
+
+    def words(self, key: str) -> Mapping[str, str]:
+        """Return the code that the extension adds under words of a config key, by word."""
+        if key == "equations":
+            return {word: code for study in self.studies for word, code in study.equations.items()}
+        return dict(getattr(self, key))
+
+    def code(self) -> Iterator[str]:
+        """Yield all code that the extension names."""
+        yield from self.views()
+        yield from (code for key in WORDS for code in self.words(key).values())
+        yield from (study.own_walker for study in self.studies)
+        yield from (f"{stage.module}:run" for stage in self.stages)
+
+    def views(self) -> Iterator[str]:
+        """Yield the code that drawings of results depend on."""
+        yield from filter(None, (self.figures, *self.answers.values(), *self.tables.values()))
+        for makers in self.sections.values():
+            yield from makers
+
+
+@dataclass(frozen=True)
+class Found:
+    """An extension with its origin."""
+
+    name: str
+    code: str  # module:name
+    source: str  # distribution and version; empty for the package's own
+    extension: Extension | None = None  # None if it is left out
+    why: str = ""  # reason why it is left out
+
+    @property
+    def origin(self) -> str:
+        return self.source or f"{OWN} {walkerlab.__version__}"
+
+    @property
+    def adds(self) -> dict[str, list[str]]:
+        """Names and code of what it adds, by kind; empty kinds are missing."""
+        extension = self.extension or Extension(INTERFACE)
+        added = {
+            "stages": [stage.name for stage in extension.stages],
+            **{key: [*extension.words(key)] for key in WORDS},
+        }
+        added["views"] = [*extension.views()]
+        return {kind: names for kind, names in added.items() if names}
+
+
+def load(code: str) -> Any:
+    """Import what "module:name" names."""
+    module, _, name = code.partition(":")
+    return getattr(import_module(module), name)
+
+
+def later(code: str) -> Callable[..., Any]:
+    """Return a stand-in for a function, "module:name", that imports it when it is called."""
+    return lambda *arguments: load(code)(*arguments)
+
+
+opening: list[str] = []
+"""Name of the extension that is being imported."""
+
+
+@cache
+def registry() -> tuple[Found, ...]:
+    """Return all extensions, the package's own first; broken ones are marked as left out."""
+    if opening:
+        raise ImportError(f"{opening[0]} imports code that uses extensions; it must name that code in quotes")
+    own = [Found(name, f"{OWN}{code}", "") for name, code in walkerlab.EXTENSIONS.items()]
+    return tuple(map(open_extension, (*own, *(Found(*entry) for entry in announced()))))
+
+
+def open_extension(found: Found) -> Found:
+    opening.append(found.code)
+    try:
+        extension = load(found.code)
+        if found.source:
+            check(extension)
+    except (Exception, SystemExit) as error:
+        if not found.source:
+            raise
+        return replace(found, why=f"{type(error).__name__}: {error}")
+    finally:
+        opening.pop()
+    return replace(found, extension=extension)
+
+
+def check(extension: Any) -> None:
+    """Raise an error if an extension does not fit the interface or names a module that does not exist."""
+    if not isinstance(extension, Extension):
+        raise TypeError(f"it is of type {type(extension).__name__}, not Extension")
+    if extension.interface != INTERFACE:
+        raise ValueError(f"it was written for interface {extension.interface}, and this version has {INTERFACE}")
+    if not {stage.name for stage in extension.stages}.issuperset((*extension.answers, *extension.tables)):
+        raise ValueError("its answers and tables must be those of its own stages")
+    for code in extension.code():
+        module, _, name = code.partition(":")
+        if not name or find_spec(module) is None:
+            raise ValueError(f"{code!r} is not the name of code, module:name, or the module does not exist")
+
+
+def extensions() -> dict[str, Extension]:
+    """Return the extensions that can be used, by name."""
+    return {found.name: found.extension for found in registry() if found.extension is not None}
+
+
+def declared(kind: str) -> dict[str, str]:
+    """Return the code that all extensions declare in a field that is a mapping, or under words of a config key."""
+    return {word: code for extension in extensions().values() for word, code in extension.words(kind).items()}
+
+
+def words(key: str) -> tuple[str, ...]:
+    """Return all words that a config key allows: the package's own, then those of extensions."""
+    return tuple(dict.fromkeys((*WORDS[key], *declared(key))))
+
+
+def foreign() -> tuple[Found, ...]:
+    """Return the extensions of other packages, including those that are left out."""
+    return tuple(found for found in registry() if found.source)
+
+
+def origin_of(key: str) -> str:
+    """Describe which words of a config key come from other packages, to follow the key's source; empty if none do."""
+    origins = ((found, word) for found in foreign() if found.extension for word in found.extension.words(key))
+    return "".join(f"; {word}: extension {found.name} ({found.source})" for found, word in origins)
+
+
+def refuse_equal_names(commands: Iterable[str] = ()) -> None:
+    """Raise ConfigError if two extensions, or an extension and the package, use one name.
+
+    commands  names of the program's commands that are no stages
+    """
+    owners = {("stage", name): OWN for name in commands}
+    owners |= {(key, word): OWN for key, own in WORDS.items() for word in own}
+    for found in registry():
+        extension = found.extension or Extension(INTERFACE)
+        names = [("extension", found.name), *(("stage", stage.name) for stage in extension.stages)]
+        names += [(key, word) for key in WORDS for word in extension.words(key)]
+        for name in names:
+            if name in owners:
+                both = f"{owners[name]} and {found.origin}"
+                advice = "Uninstall one of the two, or ask its author for another name."
+                raise ConfigError(f"{both} both add the {' '.join(name)}.", advice)
+            owners[name] = found.origin
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Return origin and code digest of each usable extension of another package, by name."""
+    sources, result = Sources(), {}
+    for found in foreign():
+        if found.extension is not None:
+            modules = {code.partition(":")[0] for code in (found.code, *found.extension.code())}
+            result[found.name] = f"{found.origin} (code {sources.code_digest(*modules)[:8]})"
+    return result
+
+
+def refuse_other_versions(expected: Mapping[str, str]) -> None:
+    """Raise ConfigError in a worker whose extensions differ from those of the process that started it."""
+    here = versions()
+    for name in sorted(here.keys() | expected.keys()):
+        if here.get(name) != expected.get(name):
+            raise ConfigError(
+                f"extension {name}: this worker has {here.get(name, 'none')}, its caller {expected.get(name, 'none')}.",
+                "Install the same extensions in both environments; `walkerlab extensions` lists them.",
+            )
+
+
+def announced() -> Iterator[tuple[str, str, str]]:
+    """Yield name, code and source of the extensions that other packages announce on `sys.path`.
+
+    Importing importlib.metadata and reading all distributions takes longer than many commands, so the entries of a
+    folder are read again only after it has changed.
+    """
+    cache_file = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab-extensions.json"
+    stored, changed = read_scans(cache_file), False
+    seen: set[tuple[str, str]] = set()
+    for folder in dict.fromkeys(map(os.path.abspath, sys.path)):
+        try:
+            stamp = os.stat(folder).st_mtime_ns  # noqa: PTH116
+        except OSError:
+            continue
+        if stored.get(folder, [0])[0] != stamp:
+            stored[folder], changed = [stamp, scan(folder)], True
+        for distribution, version, name, code in stored[folder][1]:
+            if (distribution, name) not in seen:
+                seen.add((distribution, name))
+                yield name, code, f"{distribution} {version}"
+    if changed:
+        write_scans(cache_file, stored)
+
+
+def scan(folder: str) -> list[list[str]]:
+    """List the entry points of the distributions in a folder: distribution, version, name and code."""
+    # imported here because it takes 40 ms
+    from importlib.metadata import distributions
+
+    return sorted(
+        [distribution.name, distribution.version, entry.name, entry.value]
+        for distribution in distributions(path=[folder])
+        for entry in distribution.entry_points
+        if entry.group == GROUP
+    )
+
+
+def read_scans(file: Path) -> dict[str, Any]:
+    """Read earlier scans by folder; empty if there are none, or if another user may have written them."""
+    with contextlib.suppress(OSError, ValueError):
+        if not may_be_foreign(file):
+            stored: dict[str, Any] = json.loads(file.read_text())
+            return stored
+    return {}
+
+
+def write_scans(file: Path, scans: Mapping[str, Any]) -> None:
+    """Store the latest scans, of folders that have settled; if that fails, the next process scans again."""
+    now = time.time_ns()
+    settled = {folder: entry for folder, entry in scans.items() if now - entry[0] > SETTLED_NS}
+    temporary = file.with_name(f"{file.name}.{os.getpid()}")
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(0o700, parents=True, exist_ok=True)
+        temporary.touch(0o600)
+        temporary.write_text(json.dumps(dict([*settled.items()][-MAX_FOLDERS:])))
+        temporary.replace(file)

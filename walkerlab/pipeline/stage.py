@@ -1,0 +1,211 @@
+"""Stages and the graph that they form.
+
+Extensions declare their stages with this file, and the command line builds its help from them, so the file imports no
+stage, no config schema and no NumPy.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from walkerlab.config import reads
+from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
+from walkerlab.errors import ConfigError
+from walkerlab.extensions import load
+from walkerlab.scene.studies import is_studied
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+Inputs = Callable[["Config"], tuple[str, ...]]
+WALKED = ("fixedpoint", "simulate", "contact-sim")
+DRAWINGS = ("plot", "report")
+Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
+
+
+def without_block(name: str) -> str:
+    """Return the message that the config lacks a block."""
+    return f"the config has no {name} block"
+
+
+def nothing(_config: object) -> tuple[Any, ...]:
+    """Return an empty tuple, for stages without inputs or omitted parts."""
+    return ()
+
+
+def results_of(*names: str) -> Inputs:
+    """Return a function that returns these stage names for every config."""
+    return lambda _config: names
+
+
+def gait_unless_start_is_given(config: StartConfig) -> tuple[str, ...]:
+    """Require the fixed point unless the config gives a start state, which also works on slopes without a gait."""
+    return ("fixedpoint",) if config.start == "fixed-point" else ()
+
+
+def gait_for_start_or_pads(config: SceneConfig) -> tuple[str, ...]:
+    """Require the fixed point if the start state or the pitch of pads comes from it."""
+    ground = config.contact
+    pitch_of_gait = ground is not None and ground.terrain == "checkerboard" and ground.pad_pitch == "rigid"
+    return ("fixedpoint",) if pitch_of_gait else gait_unless_start_is_given(config)
+
+
+def walks_and(*names: str) -> Inputs:
+    """Return a function that returns the walking stages, `recorded-walk` if there is a recording, and `names`."""
+    return lambda config: (*WALKED, *(() if config.recording is None else ("recorded-walk",)), *names)
+
+
+@dataclass(frozen=True)
+class Option:
+    """Option of a stage's command; sets a key of the config."""
+
+    flag: str  # as typed, such as --steps
+    key: str  # dotted config key
+    # placeholder in the help, which also sets the syntax: "KEY" is a config key; a form with "=" may be repeated and
+    # takes a name with two numbers ("...=A:B"), with optional numbers ("[=A:B]") or with a value ("...=...,...")
+    metavar: str
+    help: str
+    type: type = str  # type of the option's value; list for an option that may be repeated
+    needs: tuple[str, ...] = ()  # flags that must be given with it
+    runs: str = ""  # stage that the command then runs instead of its own; such an option sets no key
+
+
+STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", int)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the pipeline."""
+
+    name: str  # name of the stage, its command and its artifact
+    module: str  # module of its `run` function; imported only when the stage runs
+    purpose: str  # one line for the user
+    # type of the config slice that `run` takes and its result depends on; None for the whole config
+    takes: type | None
+    inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
+    if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
+    options: tuple[Option, ...] = ()  # options of the stage's command in addition to those of all stages
+    requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
+    # "times": measures run times, so it runs alone; "draws": also writes files, from the results that exist
+    work: Literal["computes", "times", "draws"] = "computes"
+    # the only command that runs the stage (its own or `STAGE --full`); empty if any command that needs it runs it
+    only_by: str = ""
+    finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
+    early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
+    does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
+    takes_of_scene: type | None = None  # replaces `takes` for a walker that belongs to no study
+    takes_of_paper: type | None = None  # type of the slice of the built-in paper config that the stage's own cases use
+    # returns the versions of other programs that the stage's result depends on, by name
+    programs: Callable[[], Mapping[str, str]] | None = None
+    # returns the digests of files that the stage's result depends on, by config key
+    files: Callable[[Config], Mapping[str, str]] | None = None
+    # returns the words whose laws (see extensions.py) it uses in addition to those in its part of the config
+    uses: Inputs = nothing
+    checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
+    needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
+    shown_by: tuple[str, ...] = ()  # those that show it if it is current
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Return the dotted config keys that the stage's result depends on."""
+        if self.takes is not None:
+            return tuple(reads.dotted_keys(self.takes))
+        from walkerlab.config.schema import Config  # imported here: the command line's help does not need it
+
+        return tuple(Config.model_fields)
+
+    def takes_under(self, config: RigidConfig) -> type | None:
+        """Return the type of the config slice that the stage's result depends on."""
+        return self.takes if self.takes_of_scene is None or is_studied(config) else self.takes_of_scene
+
+    def results(self, config: Config) -> tuple[str, ...]:
+        """Return the stages whose results this stage uses: required ones, then optional ones."""
+        return (*self.inputs(config), *self.if_current)
+
+    def why_unsuited(self, config: Config) -> str | None:
+        """Return the reason why the stage cannot run under a config; None if it can."""
+        missing = (block for block in self.requires if getattr(config, block) is None)
+        return next(map(without_block, missing), None)
+
+    def refuse_unsuited(self, target: str, config: Config) -> None:
+        """Raise ConfigError if this stage, which `target` needs, cannot run under a config."""
+        if "recording" in self.requires and config.recording is None:
+            raise ConfigError(
+                f"{target} needs a recorded walk, and {without_block('recording')}.",
+                "Name its file: walkerlab compare --with FILE.",
+            )
+        # Imported here: the command line's help needs neither.
+        from walkerlab.config.walkers import contact_required_error, contact_to_add
+
+        if self.why_unsuited(config) is not None:
+            block = f"`{contact_to_add(config.walker)}`"
+            instead = f"Add one to the config, such as the paper's, scaled by this walker's mass: {block}."
+            advice = f"{instead} `walkerlab schema contact` explains its keys."
+            raise contact_required_error(target, config.walker, advice)
+
+    def refuse_question(self, config: Config) -> None:
+        """Raise ConfigError if the `refuse` function of an on-demand stage's module rejects the config."""
+        refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
+        if refuse is not None:
+            refuse(reads.only(config, self.takes_under(config)))
+
+    @property
+    def draws(self) -> bool:
+        """Whether the stage writes files in addition to its artifact."""
+        return self.work == "draws"
+
+    @property
+    def command(self) -> str:
+        return self.only_by or self.name
+
+    @property
+    def on_demand(self) -> bool:
+        """Whether only the stage's own command runs it."""
+        return self.only_by == self.name
+
+
+class Graph:
+    """Stages of a pipeline, each after the stages that it needs.
+
+    at  import path, module:NAME, by which other processes find it; sweeps need it
+    """
+
+    def __init__(self, *stages: Stage, at: str = "") -> None:
+        """Store the stages; raises ValueError if two have the same name."""
+        self.stages, self.at = stages, at
+        self._by_name = {stage.name: stage for stage in stages}
+        if len(self._by_name) != len(stages):
+            raise ValueError("two stages have the same name")
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
+        """Pickle the import path alone: stages hold functions that cannot be pickled."""
+        if not self.at:
+            raise TypeError("a graph needs `at`, its import path, to be sent to other processes")
+        return load, (self.at,)
+
+    def __getitem__(self, name: str) -> Stage:
+        return self._by_name[name]
+
+    def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
+        """Return the target and all stages that it needs under a config, in running order."""
+        needed = {target}
+        for stage in reversed(self.stages):
+            if stage.name in needed:
+                needed.update(stage.inputs(config))
+        return tuple(stage for stage in self.stages if stage.name in needed)
+
+    def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
+        """Return the stages as `needed_for` does; raises ConfigError if one lacks a config block or draws files."""
+        stages = self.needed_for(target, config)
+        for stage in stages:
+            if stage.draws:
+                raise ConfigError(f"{stage.name} only draws files into a run folder; it has no result in memory.")
+            stage.refuse_unsuited(target, config)
+        return stages
+
+    def campaigns_of(self, target: str) -> tuple[Stage, ...]:
+        """Return the stages that `target --full` runs in addition."""
+        return tuple(stage for stage in self.stages if stage.only_by == f"{target} --full")
