@@ -2,7 +2,6 @@
 
 import base64
 import json
-import math
 import os
 import re
 import runpy
@@ -12,7 +11,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 import pytest
@@ -120,13 +119,11 @@ def test_the_stage_of_the_docs_runs():
 
 
 def test_the_friction_of_the_docs_is_a_whole_law_with_the_derivative_that_it_says(monkeypatch):
-    code = next(code for code in code_to_add() if "friction_coefficient" in code)
     monkeypatch.setattr(friction_coefficient, "_bodies", dict(friction_coefficient._bodies))
-    names = {"math": math, "NamedTuple": NamedTuple, "Any": Any, "friction_coefficient": friction_coefficient}
-    exec(f"from __future__ import annotations\n{code}", names)
-    assert missing_members(names["Smooth"]) == []
-    law, h = names["Smooth"].of(Contact(units="si")), 1e-6
-    assert law == (0.7, 0.1)
+    example = runpy.run_path(str(ROOT / "docs" / "examples" / "extension" / "tanh_friction" / "law.py"))["Tanh"]
+    assert missing_members(example) == []
+    law, h = example.of(Contact(units="si")), 1e-6
+    assert law == pytest.approx((0.7, 0.1, 0.3, 0.3))
     low, high = (friction_coefficient(law, 0.05 + side * h)[0] for side in (-1, 1))
     assert friction_coefficient(law, 0.05)[1] == pytest.approx((high - low) / (2 * h), rel=1e-8)
     assert low < 0.0

@@ -93,6 +93,14 @@ def test_a_law_and_its_figure_take_at_most_forty_lines():
     assert sum(bool(line.strip()) for text in texts for line in text.splitlines()) <= 40
 
 
+def test_the_docs_show_the_whole_example():
+    page = (ROOT / "docs" / "adding.md").read_text()
+    for path in (EXAMPLE / PACKAGE).glob("*.py"):
+        assert f"```python\n{path.read_text()}```" in page
+    lines = (EXAMPLE / "pyproject.toml").read_text().splitlines()
+    assert f"```toml\n{chr(10).join(lines[-2:])}\n```" in page
+
+
 def test_the_example_can_be_installed_by_pip(tmp_path):
     pytest.importorskip("hatchling")
     pytest.importorskip("pip")
@@ -214,6 +222,9 @@ FAULTS = {
     "'json' is not the name of code": (
         "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, figures='json')"
     ),
+    "its sections must be at task, walks, evidence, benchmarks": (
+        "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, sections={'top': ()})"
+    ),
     "answers and tables must be those of its own stages": (
         "from walkerlab.extensions import Extension\nEXTENSION = Extension(1, answers={'simulate': 'json:dumps'})"
     ),
@@ -301,14 +312,14 @@ def test_scans_that_others_may_have_written_are_not_trusted(site):
 
 
 def test_a_worker_with_other_extensions_says_which(example):
-    refuse_other_versions({})
+    refuse_other_versions("")
     config = load().config
-    asked = {"tanh-friction": "tanh-friction 1.0 (code 0123abcd)"}
+    asked = "tanh-friction: tanh-friction 1.0 (code 0123abcd)"
     (row,) = compute_point(config, "key", PIPELINE, "fixedpoint", False, "", asked).rows
     assert row.status == "failed"
-    assert row.reason == "extension tanh-friction: this worker has none, its caller tanh-friction 1.0 (code 0123abcd)."
+    assert row.reason == f"this worker has the extensions [], and its caller [{asked}]."
     code = "from walkerlab.extensions import *; import walkerlab.extensions as e; print(e.versions())"
-    assert "'tanh-friction': 'tanh-friction 1.0 (code " in example.python(code).stdout
+    assert "tanh-friction: tanh-friction 1.0 (code " in example.python(code).stdout
 
 
 COPY = """

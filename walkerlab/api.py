@@ -27,7 +27,7 @@ from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import align_start, validate_tree
 from walkerlab.config.walkers import CompassWalker, Kneed, Walker
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
-from walkerlab.extensions import foreign, refuse_equal_names
+from walkerlab.extensions import check_names
 from walkerlab.pipeline.executor import answer_in_memory
 from walkerlab.pipeline.extending_config import run_and_write
 from walkerlab.pipeline.graph import PIPELINE
@@ -48,10 +48,7 @@ if TYPE_CHECKING:
 
     from walkerlab.views.figures.illustration import Illustration
 
-refuse_equal_names()
-for extension in foreign():
-    if extension.why:
-        warnings.warn(f"extension {extension.name} ({extension.origin}) is left out: {extension.why}", stacklevel=2)
+check_names(warnings.warn)
 RUNS = "runs"
 MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
     "walker": (

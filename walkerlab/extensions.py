@@ -31,6 +31,8 @@ INTERFACE: Final = 1
 """Version of the interface, that is, of the fields of `Extension` and `Study`."""
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {"equations": ("corrected",), "friction": ("coulomb", "none")}
 """The package's own words of config keys to which extensions add words, by the last part of the key."""
+SLOTS: Final = ("task", "walks", "evidence", "benchmarks")
+"""Places of the page where extensions add sections: after the task, the walks, the models, and the accuracy."""
 SETTLED_NS: Final = 2_000_000_000  # a folder that changed more recently may change again without a new time
 MAX_FOLDERS: Final = 500
 
@@ -45,7 +47,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Extension:
-    """What a package adds. Code is named as "module:name" and imported on first use."""
+    """A package's additions. Code is named as "module:name" and imported on first use."""
 
     interface: int  # the `INTERFACE` that it was written for
     stages: Sequence[Any] = ()  # of type `pipeline.stage.Stage`
@@ -92,14 +94,10 @@ class Found:
 
     @property
     def adds(self) -> dict[str, list[str]]:
-        """Names and code of what it adds, by kind; empty kinds are missing."""
+        """Names of the stages and of the words of config keys that it adds, and its code for figures and page."""
         extension = self.extension or Extension(INTERFACE)
-        added = {
-            "stages": [stage.name for stage in extension.stages],
-            **{key: [*extension.words(key)] for key in WORDS},
-        }
-        added["views"] = [*extension.views()]
-        return {kind: names for kind, names in added.items() if names}
+        words = {key: [*extension.words(key)] for key in WORDS}
+        return {"stages": [stage.name for stage in extension.stages], **words, "views": [*extension.views()]}
 
 
 def load(code: str) -> Any:
@@ -149,6 +147,8 @@ def check(extension: Any) -> None:
         raise ValueError(f"it was written for interface {extension.interface}, and this version has {INTERFACE}")
     if not {stage.name for stage in extension.stages}.issuperset((*extension.answers, *extension.tables)):
         raise ValueError("its answers and tables must be those of its own stages")
+    if not set(SLOTS).issuperset(extension.sections):
+        raise ValueError(f"its sections must be at {', '.join(SLOTS)}")
     for code in extension.code():
         module, _, name = code.partition(":")
         if not name or find_spec(module) is None:
@@ -167,7 +167,7 @@ def declared(kind: str) -> dict[str, str]:
 
 def words(key: str) -> tuple[str, ...]:
     """Return all words that a config key allows: the package's own, then those of extensions."""
-    return tuple(dict.fromkeys((*WORDS[key], *declared(key))))
+    return (*WORDS[key], *declared(key))
 
 
 def foreign() -> tuple[Found, ...]:
@@ -181,8 +181,8 @@ def origin_of(key: str) -> str:
     return "".join(f"; {word}: extension {found.name} ({found.source})" for found, word in origins)
 
 
-def refuse_equal_names(commands: Iterable[str] = ()) -> None:
-    """Raise ConfigError if two extensions, or an extension and the package, use one name.
+def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> None:
+    """Raise ConfigError if two extensions, or an extension and the package, use one name; warn of broken extensions.
 
     commands  names of the program's commands that are no stages
     """
@@ -198,32 +198,30 @@ def refuse_equal_names(commands: Iterable[str] = ()) -> None:
                 advice = "Uninstall one of the two, or ask its author for another name."
                 raise ConfigError(f"{both} both add the {' '.join(name)}.", advice)
             owners[name] = found.origin
+        if found.why:
+            warn(f"extension {found.name} ({found.origin}) is left out: {found.why}")
 
 
 @cache
-def versions() -> dict[str, str]:
-    """Return origin and code digest of each usable extension of another package, by name."""
-    sources, result = Sources(), {}
+def versions() -> str:
+    """Describe the usable extensions of other packages: names, versions and code digests; empty without any."""
+    sources, described = Sources(), []
     for found in foreign():
         if found.extension is not None:
             modules = {code.partition(":")[0] for code in (found.code, *found.extension.code())}
-            result[found.name] = f"{found.origin} (code {sources.code_digest(*modules)[:8]})"
-    return result
+            described.append(f"{found.name}: {found.origin} (code {sources.code_digest(*modules)[:8]})")
+    return ", ".join(described)
 
 
-def refuse_other_versions(expected: Mapping[str, str]) -> None:
-    """Raise ConfigError in a worker whose extensions differ from those of the process that started it."""
-    here = versions()
-    for name in sorted(here.keys() | expected.keys()):
-        if here.get(name) != expected.get(name):
-            raise ConfigError(
-                f"extension {name}: this worker has {here.get(name, 'none')}, its caller {expected.get(name, 'none')}.",
-                "Install the same extensions in both environments; `walkerlab extensions` lists them.",
-            )
+def refuse_other_versions(expected: str) -> None:
+    """Raise ConfigError in a worker if the `versions` of its caller differ from its own."""
+    if expected != versions():
+        have = f"this worker has the extensions [{versions()}], and its caller [{expected}]."
+        raise ConfigError(have, "Install the same in both environments; `walkerlab extensions` lists them.")
 
 
 def announced() -> Iterator[tuple[str, str, str]]:
-    """Yield name, code and source of the extensions that other packages announce on `sys.path`.
+    """Yield name, code and source of the extensions that other packages announce on the path of imports.
 
     Importing importlib.metadata and reading all distributions takes longer than many commands, so the entries of a
     folder are read again only after it has changed.
@@ -232,10 +230,9 @@ def announced() -> Iterator[tuple[str, str, str]]:
     stored, changed = read_scans(cache_file), False
     seen: set[tuple[str, str]] = set()
     for folder in dict.fromkeys(map(os.path.abspath, sys.path)):
-        try:
-            stamp = os.stat(folder).st_mtime_ns  # noqa: PTH116
-        except OSError:
+        if not os.path.isdir(folder):  # noqa: PTH112
             continue
+        stamp = os.stat(folder).st_mtime_ns  # noqa: PTH116
         if stored.get(folder, [0])[0] != stamp:
             stored[folder], changed = [stamp, scan(folder)], True
         for distribution, version, name, code in stored[folder][1]:
@@ -248,15 +245,17 @@ def announced() -> Iterator[tuple[str, str, str]]:
 
 def scan(folder: str) -> list[list[str]]:
     """List the entry points of the distributions in a folder: distribution, version, name and code."""
+    if not any(entry.endswith((".dist-info", ".egg-info")) for entry in os.listdir(folder)):  # noqa: PTH208
+        return []
     # imported here because it takes 40 ms
     from importlib.metadata import distributions
 
-    return sorted(
-        [distribution.name, distribution.version, entry.name, entry.value]
-        for distribution in distributions(path=[folder])
-        for entry in distribution.entry_points
-        if entry.group == GROUP
-    )
+    entries = []
+    for distribution in distributions(path=[folder]):
+        with contextlib.suppress(Exception):  # other people's damaged files
+            found = distribution.entry_points.select(group=GROUP)
+            entries += [[distribution.name, distribution.version, each.name, each.value] for each in found]
+    return sorted(entries)
 
 
 def read_scans(file: Path) -> dict[str, Any]:

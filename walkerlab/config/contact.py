@@ -1,17 +1,12 @@
 """The contact block: values in N, mm, s as in ADAMS dialogs or in SI, and their conversion."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, TypeAlias
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.extensions import origin_of, words
-
-if TYPE_CHECKING:
-    Friction: TypeAlias = str
-else:
-    Friction = Literal[words("friction")]
 
 MM_PER_M: Final = 1000.0
 
@@ -24,6 +19,7 @@ BOUNDS_SI: Final = {
 _ADAMS = "ADAMS/View default, not given in the paper"
 _FIG_4B = "section 4 and Fig. 4b, unit not given"
 _SECTION_4 = "section 4"
+_FRICTION = _SECTION_4 + origin_of("friction")
 
 
 def from_mm(numbers: Mapping[str, Any], exponent: float) -> dict[str, Any]:
@@ -56,11 +52,8 @@ class Contact(Block):
     full_damping_penetration: float = key(
         0.1, "mm or m", "penetration at which damping reaches its full value", _ADAMS, bounds="1e-12 to 10 m", gt=0.0
     )
-    friction: Friction = key(
-        "coulomb",
-        "",
-        "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground",
-        f"{_SECTION_4}{origin_of('friction')}",
+    friction: Literal[words("friction")] = key(  # type: ignore[valid-type]
+        "coulomb", "", "coulomb: creeping Coulomb friction as in ADAMS; none: frictionless ground", _FRICTION
     )
     static_friction: float = key(
         0.9, "1", "coefficient at stiction_velocity, where friction is largest", _SECTION_4, ge=0.0, le=100.0
@@ -140,7 +133,7 @@ class Contact(Block):
 
     @property
     def has_friction(self) -> bool:
-        return self.friction != "none"
+        return bool(self.friction != "none")
 
     def unit_of(self, either: str) -> str:
         """Return the unit in use from a pair of units such as `mm or m`."""

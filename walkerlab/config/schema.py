@@ -3,7 +3,7 @@
 import math
 from importlib.util import find_spec
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field_validator
 
@@ -30,10 +30,7 @@ from walkerlab.config.walkers import (
 )
 from walkerlab.extensions import words
 
-if TYPE_CHECKING:
-    Equations: TypeAlias = str
-else:
-    Equations = Literal[words("equations")]
+Equations = str
 Output = Literal["states", "energies", "forces"]
 Method = Literal[
     "dop853",
@@ -245,7 +242,7 @@ class Config(Block):
         lt=RIGHT_ANGLE,
     )
     push_off: PushOff = PushOff()
-    equations: Equations = key(
+    equations: Literal[words("equations")] = key(  # type: ignore[valid-type]
         "corrected",
         "",
         "corrected, or as-printed: Appendix A as the paper prints it",

@@ -1,6 +1,7 @@
 """Identities of stored, swept and in-memory results: the config slice, inputs and code that determine a result."""
 
-from collections.abc import Iterator, Mapping, Set
+import json
+from collections.abc import Mapping, Set
 from importlib import import_module
 from inspect import signature
 from typing import Any
@@ -70,17 +71,8 @@ def added_code(stage: Stage, config: Config, own: Mapping[str, Any]) -> set[str]
 
     They are the laws named by words in its part of the config, `own`, and for drawings everything that is drawn.
     """
-    laws = {word: code for key in WORDS for word, code in declared(key).items()}
-    used = {laws[word] for word in (*texts_in(own), *stage.uses(config)) if word in laws}
+    text = json.dumps([own, stage.uses(config)])
+    used = {code for key in WORDS for word, code in declared(key).items() if json.dumps(word) in text}
     if stage.draws:
         used |= {code for extension in extensions().values() for code in extension.views()}
     return used
-
-
-def texts_in(value: Any) -> Iterator[str]:
-    """Yield all texts in nested mappings and lists."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping | list | tuple):
-        for item in value.values() if isinstance(value, Mapping) else value:
-            yield from texts_in(item)

@@ -67,20 +67,14 @@ def memory_for(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - on
 
 
 def compute_point(
-    config: Config,
-    key: str,
-    graph: Graph,
-    target: str,
-    again: bool,
-    forced: str = "",
-    expected: Mapping[str, str] | None = None,
+    config: Config, key: str, graph: Graph, target: str, again: bool, forced: str = "", expected: str | None = None
 ) -> Chunk:
     """Compute one point in this process; an error becomes its result.
 
     key       stage key of the point's result
     again     whether to repeat its walk to measure the numerical error
     forced    identifies a sweep that reuses no earlier result; empty for other sweeps
-    expected  versions of the caller's extensions, which must be those of this process; None not to compare them
+    expected  the caller's `versions` of extensions, which must be those of this process; None not to compare them
     """
     memory = memory_for(graph, forced)
     try:

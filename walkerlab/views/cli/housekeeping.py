@@ -68,16 +68,18 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     @command(app, "as_json", name="extensions")
     def list_extensions(request: Request) -> None:
         """List all extensions with their version, what they add, and why some are left out."""
-        rows = [
-            {"name": each.name, "source": each.origin, "code": each.code, "adds": each.adds, "left_out": each.why}
-            for each in registry()
-        ]
-        lines = []
+        rows, lines = [], []
         for each in registry():
-            adds = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in each.adds.items() if kind != "views")
-            lines.append(
-                f"{each.name} ({each.origin}): {f'left out, {each.why}' if each.why else adds or 'views only'}"
-            )
+            said = {
+                "name": each.name,
+                "source": each.origin,
+                "code": each.code,
+                "adds": each.adds,
+                "left_out": each.why,
+            }
+            rows.append(said)
+            added = [f"{kind}: {', '.join(names)}" for kind, names in each.adds.items() if names and kind != "views"]
+            lines.append(f"{each.name} ({each.origin}): {f'left out, {each.why}' if each.why else '; '.join(added)}")
         print_result(request, {"extensions": rows}, lines)
 
     @command(app, *OF_A_RUN, "dry_run", "no_wait", *OF_TALK)

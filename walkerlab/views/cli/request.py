@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from walkerlab.extensions import foreign, refuse_equal_names
+from walkerlab.extensions import check_names, foreign
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.failures import exit_on_failure
 
@@ -305,10 +305,7 @@ def command(
             with exit_on_failure(request):
                 if foreign() and typed != "extensions":
                     commands = [str(each.name) for each in app.registered_commands]
-                    refuse_equal_names(each for each in commands if commands.count(each) > 1)
-                    for each in foreign():
-                        if each.why:
-                            request.console.warn(f"extension {each.name} ({each.origin}) is left out: {each.why}")
+                    check_names(request.console.warn, (each for each in commands if commands.count(each) > 1))
                 function(request, **arguments)
 
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
