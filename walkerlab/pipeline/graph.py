@@ -1,4 +1,4 @@
-"""The pipeline: the stages of all extensions, drawings last (see extensions.py)."""
+"""The pipeline: the stages of all extensions, drawings last and the report at the end (see extensions.py)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from walkerlab.extensions import extensions
-from walkerlab.pipeline.stage import Graph, Stage
+from walkerlab.pipeline.stage import DRAWINGS, Graph, Stage
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -31,6 +31,8 @@ def complete(drawing: Stage) -> Stage:
 
 PIPELINE = Graph(
     *(stage for stage in STAGES if not stage.draws),
-    *(complete(stage) for stage in STAGES if stage.draws),
+    # the report shows what all others have drawn
+    *(complete(stage) for stage in STAGES if stage.draws and stage.name not in DRAWINGS),
+    *(complete(stage) for stage in STAGES if stage.name in DRAWINGS),
     at="walkerlab.pipeline.graph:PIPELINE",
 )
