@@ -299,6 +299,14 @@ def test_folders_are_scanned_again_only_after_they_have_changed(site):
     assert site.python(SCANNED).stdout.split() == ["new", "True"]
 
 
+def test_without_a_place_for_scans_each_process_scans(site):
+    install_example(site.packages)
+    for _ in range(2):
+        done = site.python(SCANNED, environment={"XDG_CACHE_HOME": "nowhere"})
+        assert done.stdout.split() == ["tanh-friction", "True"]
+    assert [path.name for path in site.folder.iterdir()] == ["site"]
+
+
 def test_scans_that_others_may_have_written_are_not_trusted(site):
     long_ago = 1_600_000_000
     install_example(site.packages)

@@ -226,7 +226,9 @@ def announced() -> Iterator[tuple[str, str, str]]:
     Importing importlib.metadata and reading all distributions takes longer than many commands, so the entries of a
     folder are read again only after it has changed.
     """
-    cache_file = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab-extensions.json"
+    # `os.path`, which raises no error where a user has no home
+    cache = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or "~/.cache")  # noqa: PTH111
+    cache_file = Path(cache) / "walkerlab-extensions.json"
     stored, changed = read_scans(cache_file), False
     seen: set[tuple[str, str]] = set()
     for folder in dict.fromkeys(map(os.path.abspath, sys.path)):
@@ -239,7 +241,7 @@ def announced() -> Iterator[tuple[str, str, str]]:
             if (distribution, name) not in seen:
                 seen.add((distribution, name))
                 yield name, code, f"{distribution} {version}"
-    if changed:
+    if changed and cache_file.is_absolute():
         write_scans(cache_file, stored)
 
 
