@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from walkerlab.config.reader import MAX_CHARACTERS, MAX_DEPTH, read, value_of
-from walkerlab.config.tree import Mapping, plain
+from walkerlab.config.tree import BlockNode, plain
 from walkerlab.errors import ConfigError
 
 
@@ -84,9 +84,9 @@ def test_a_quoted_scalar_is_a_text() -> None:
 
 def test_every_key_and_value_knows_its_line_and_column() -> None:
     root = read("# c\na:\n  b: [1, no]\n", "f.yaml")
-    assert isinstance(root, Mapping)
+    assert isinstance(root, BlockNode)
     inner = root.entries["a"]
-    assert isinstance(inner, Mapping)
+    assert isinstance(inner, BlockNode)
     assert str(root.keys["a"]) == "f.yaml:2:1"
     assert str(inner.keys["b"]) == "f.yaml:3:3"
     assert str(inner.entries["b"].position) == "f.yaml:3:6"

@@ -10,7 +10,7 @@ from typing import Final
 
 from walkerlab.config.problems import KEYS_ARE_LISTED, beyond_scope, nearest, printable, problem_error
 from walkerlab.config.reader import MAX_CHARACTERS, read
-from walkerlab.config.tree import Mapping, Position, Scalar, Sequence
+from walkerlab.config.tree import BlockNode, ListNode, Position, Scalar
 
 _INSTALLED: Final = Path(__file__).parent / "builtin"
 BUILTIN_FOLDER: Final = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "configs"
@@ -68,7 +68,7 @@ def file_at(path: Path) -> ConfigFile:
     return ConfigFile(path, printable(str(path), SHOWN_PATH))
 
 
-def read_layers(file: ConfigFile) -> list[Mapping]:
+def read_layers(file: ConfigFile) -> list[BlockNode]:
     """Read a config file and all files that it extends, directly or indirectly; the file itself comes last.
 
     Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, or if a stored config
@@ -89,7 +89,7 @@ def files_read(file: ConfigFile) -> list[Path]:
     return paths
 
 
-def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
+def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]:
     """Yield (file, block of keys) of a config, then of each file it extends; raises the errors of `read_layers`."""
     seen: list[str] = []
     reference: Position | None = None  # position of the file's name in the config that extends it
@@ -100,7 +100,7 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
         if len(seen) == MAX_EXTENDS:
             raise problem_error(reference, f"extends: more than {MAX_EXTENDS} files deep")
         seen.append(str(file.path.resolve()))
-        if not isinstance(root, Mapping):
+        if not isinstance(root, BlockNode):
             empty = root is None or (isinstance(root, Scalar) and root.value is None)
             fault = "is empty" if empty else f"holds a {'single value' if isinstance(root, Scalar) else 'list'}"
             start = root.position if root else Position(file.label, 1, 1)
@@ -118,7 +118,7 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, Mapping]]:
         file = builtin_config(extends.value) if is_builtin else file_at(file.path.parent / extends.value)
 
 
-def _refuse_named_files(root: Mapping) -> None:
+def _refuse_named_files(root: BlockNode) -> None:
     """Raise ConfigError if a stored config names another file; stored configs are complete, and may be untrusted."""
     cases = cases_file(root, Path())
     places = [root.entries["extends"].position] if "extends" in root.entries else []
@@ -127,26 +127,26 @@ def _refuse_named_files(root: Mapping) -> None:
         raise problem_error(places[0], "a stored config refers to a file", STORED_IS_COMPLETE)
 
 
-def cases_file(layer: Mapping, folder: Path) -> tuple[ConfigFile, Position] | None:
+def cases_file(layer: BlockNode, folder: Path) -> tuple[ConfigFile, Position] | None:
     """Return the file under stability.cases (relative to `folder`) and where the config names it; None for a list."""
     block = layer.entries.get("stability")
-    file_name = block.entries.get("cases") if isinstance(block, Mapping) else None
+    file_name = block.entries.get("cases") if isinstance(block, BlockNode) else None
     if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):
         return None
     return file_at(folder / file_name.value), file_name.position
 
 
-def with_cases(layer: Mapping, folder: Path) -> Mapping:
+def with_cases(layer: BlockNode, folder: Path) -> BlockNode:
     """Replace a file name under stability.cases (relative to `folder`) by the list of cases in that file.
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
     located, block = cases_file(layer, folder), layer.entries.get("stability")
-    if located is None or not isinstance(block, Mapping):
+    if located is None or not isinstance(block, BlockNode):
         return layer
     file, position = located
     cases = read(_text_of(file, position, "a file that holds a list of cases"), file.label)
-    if not isinstance(cases, Sequence):
+    if not isinstance(cases, ListNode):
         raise problem_error(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
     result, inner = layer.without(), block.without()
     inner.put("cases", cases, block.keys["cases"])

@@ -6,7 +6,7 @@ from typing import Final
 
 from walkerlab.config.problems import printable, problem_error
 from walkerlab.config.reader import MAX_DEPTH, read
-from walkerlab.config.tree import Mapping, Node, Position, Scalar
+from walkerlab.config.tree import BlockNode, Node, Position, Scalar
 
 SLOPE_KEYS: Final = ("slope_rad", "slope_deg")
 
@@ -20,7 +20,7 @@ class ConfigSetting:
     position: Position  # position of the key
 
 
-def merge_layers(layers: Sequence[Mapping]) -> Mapping:
+def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
     """Merge layers into one block; later layers override earlier ones, and only the last one sets the name.
 
     Raises ConfigError if a layer has more than one slope key.
@@ -36,11 +36,11 @@ def merge_layers(layers: Sequence[Mapping]) -> Mapping:
     return merged
 
 
-def _merged(lower: Mapping, upper: Mapping) -> Mapping:
+def _merged(lower: BlockNode, upper: BlockNode) -> BlockNode:
     result = lower.without()
     for name, node in upper.entries.items():
         below = lower.entries.get(name)
-        if isinstance(below, Mapping) and isinstance(node, Mapping):
+        if isinstance(below, BlockNode) and isinstance(node, BlockNode):
             node = _merged(below, node)
         result.put(name, node, upper.keys[name])
     return result
@@ -75,10 +75,10 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
     return ConfigSetting((key,), Scalar(position, value, str(value)), position)
 
 
-def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
+def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockNode:
     """Apply settings in order; lists and blocks are replaced, not merged. ConfigError if a key's parent is no block."""
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
-    copies: dict[int, Mapping] = {}
+    copies: dict[int, BlockNode] = {}
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:
             tree = tree.without(*SLOPE_KEYS)
@@ -86,7 +86,7 @@ def apply_settings(tree: Mapping, settings: Sequence[ConfigSetting]) -> Mapping:
     return tree
 
 
-def _placed(block: Mapping, setting: ConfigSetting, depth: int, copies: dict[int, Mapping]) -> Mapping:
+def _placed(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[int, BlockNode]) -> BlockNode:
     """Place a setting in a copy of a block; `copies` holds, by id, the copies that earlier settings made."""
     result = copies.get(id(block)) or block.without()
     copies[id(result)] = result
@@ -96,8 +96,8 @@ def _placed(block: Mapping, setting: ConfigSetting, depth: int, copies: dict[int
         return result
     inner = block.entries.get(name)
     if inner is None or (isinstance(inner, Scalar) and inner.value is None):
-        inner = Mapping(setting.position)
-    if not isinstance(inner, Mapping):
+        inner = BlockNode(setting.position)
+    if not isinstance(inner, BlockNode):
         above, full_key = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
         raise problem_error(
             setting.position, f"{printable(full_key)}: {printable(above)} is a value, not a block of keys"

@@ -21,7 +21,7 @@ from walkerlab.config.numbers import short_number
 from walkerlab.config.overlay import check_cases
 from walkerlab.config.problems import Problem
 from walkerlab.config.schema import QUESTIONS, Config
-from walkerlab.config.tree import Mapping, Position, Scalar
+from walkerlab.config.tree import BlockNode, Position, Scalar
 from walkerlab.config.validation import Location, align_start, key_at, node_at, validate_tree
 from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
@@ -46,7 +46,7 @@ class LoadedConfig:
     changes: tuple[str, ...]
     warnings: tuple[str, ...]  # adjustments and suspicious values, as sentences
     source: str  # name of the config's file in messages
-    tree: Mapping  # untyped tree of the config, with positions
+    tree: BlockNode  # untyped tree of the config, with positions
 
     def placed(self, error: ConfigError) -> ConfigError:
         """Prepend the position of the key at fault to an error's message, if the key is in the config's text."""
@@ -112,10 +112,10 @@ def safe_name(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9._-]+", "-", plain).strip("-.")[:64].rstrip(".") or "run"
 
 
-def suspicious_values(config: Config, tree: Mapping) -> Iterator[str]:
+def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
     """Yield warnings about likely mistakes: leg mass not moved with the leg, wrong units, pad pitch without pads."""
     walker, block = config.walker, tree.entries.get("walker")
-    places = block.keys if isinstance(block, Mapping) else {}
+    places = block.keys if isinstance(block, BlockNode) else {}
     length = short_number(walker.leg_length_m)
     if isinstance(walker, CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
         leg, mass, stays = places["leg_length_m"], places["foot_to_mass_m"].source, walker.foot_to_mass_m

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from walkerlab.config.tree import Mapping, Node, Position, Scalar
+from walkerlab.config.tree import BlockNode, Node, Position, Scalar
 from walkerlab.errors import ConfigError
 
 SHOWN_LENGTH = 60
@@ -78,7 +78,7 @@ def printable(text: str, length: int = SHOWN_LENGTH) -> str:
 
 def format_node(node: Node) -> str:
     """Format a value as in the config; strings are quoted."""
-    if isinstance(node, Mapping):
+    if isinstance(node, BlockNode):
         return "a block" if node.entries else "an empty block"
     if not isinstance(node, Scalar):
         return f"[{', '.join(format_node(item) for item in node.items[:6])}{', …' if len(node.items) > 6 else ''}]"

@@ -12,7 +12,7 @@ from itertools import takewhile
 from typing import Any, Final, NoReturn
 
 from walkerlab.config.problems import Problem, printable, problem_error, problems_error
-from walkerlab.config.tree import Mapping, Node, Position, Scalar, Sequence
+from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar
 
 MAX_CHARACTERS: Final = 64 * 1024
 MAX_DEPTH: Final = 12
@@ -115,8 +115,8 @@ class _Composer:
         if depth == MAX_DEPTH:
             self._refuse(event, f"nested deeper than {MAX_DEPTH} levels")
         if name == "SequenceStartEvent":
-            return Sequence(position, [self._node(item, depth + 1) for item in self._until("SequenceEndEvent")])
-        block = Mapping(position)
+            return ListNode(position, [self._node(item, depth + 1) for item in self._until("SequenceEndEvent")])
+        block = BlockNode(position)
         for word in self._until("MappingEndEvent"):
             if type(word).__name__ in ("MappingStartEvent", "SequenceStartEvent"):
                 self._refuse(word, "a key must be a word, not a list or a block")

@@ -36,13 +36,13 @@ class Scalar:
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
+class ListNode:
     position: Position
     items: list[Node] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
-class Mapping:
+class BlockNode:
     """Block of keys: `entries` has the value of each key, `keys` the position of the key itself."""
 
     position: Position
@@ -53,18 +53,18 @@ class Mapping:
         self.entries[name] = node
         self.keys[name] = position
 
-    def without(self, *names: str) -> Mapping:
+    def without(self, *names: str) -> BlockNode:
         entries = {name: node for name, node in self.entries.items() if name not in names}
-        return Mapping(self.position, entries, {name: self.keys[name] for name in entries})
+        return BlockNode(self.position, entries, {name: self.keys[name] for name in entries})
 
 
-Node: TypeAlias = Scalar | Sequence | Mapping
+Node: TypeAlias = Scalar | ListNode | BlockNode
 Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
 
 
 def plain(node: Node) -> Data:
     if isinstance(node, Scalar):
         return node.value
-    if isinstance(node, Sequence):
+    if isinstance(node, ListNode):
         return [plain(item) for item in node.items]
     return {name: plain(entry) for name, entry in node.entries.items()}

@@ -23,8 +23,7 @@ from walkerlab.config.problems import (
     problems_error,
 )
 from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
-from walkerlab.config.tree import Mapping, Node, Position, Scalar, plain
-from walkerlab.config.tree import Sequence as Listed
+from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, plain
 from walkerlab.config.walkers import Kneed, PartsWalker, followers
 from walkerlab.extensions import WORDS, foreign
 
@@ -68,7 +67,7 @@ JUDGED_BY: Final = {
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
-def validate_tree(tree: Mapping) -> Config:
+def validate_tree(tree: BlockNode) -> Config:
     """Convert a tree to a typed config. Raises ConfigError with every problem found."""
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
@@ -97,7 +96,7 @@ class FollowingValue(NamedTuple):
     because: str
 
 
-def align_start(config: Config, tree: Mapping) -> tuple[Config, tuple[str, ...]]:
+def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...]]:
     """Compute the values of the start that follow from others, and describe small changes of stated values.
 
     Raises ConfigError with a position for a missing value that does not follow, or a stated value that is far off.
@@ -154,7 +153,7 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     return following
 
 
-def check_bodies(config: Config, tree: Mapping) -> None:
+def check_bodies(config: Config, tree: BlockNode) -> None:
     """Raise ConfigError with positions for parts on unknown bodies or feet on the wrong leg."""
     walker = config.walker
     if not isinstance(walker, PartsWalker):
@@ -192,12 +191,12 @@ def _place(problem: Problem) -> tuple[str, int, int]:
     return (where.source, where.line, where.column) if where else ("", 0, 0)
 
 
-def _problems(error: ValidationError, tree: Mapping, model: type[Block]) -> list[Problem]:
+def _problems(error: ValidationError, tree: BlockNode, model: type[Block]) -> list[Problem]:
     details = error.errors(include_url=False)[:MAX_PROBLEMS]
     return [_problem(detail, tree, model) for detail in details if detail["type"] != _FOLLOWS_FROM_ANOTHER]
 
 
-def _problem(detail: ErrorDetails, tree: Mapping, model: type[Block]) -> Problem:
+def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Problem:
     location, what = detail["loc"], detail["type"]
     kinds = kinds_of(model.model_fields[str(location[0])]) if location[0] in model.model_fields else {}
     if what == "union_tag_invalid":
@@ -243,7 +242,7 @@ def _is_later(place: Position, earlier: Position) -> bool:
 
 
 def _along(
-    model: type[Block], location: Location, tree: Mapping
+    model: type[Block], location: Location, tree: BlockNode
 ) -> tuple[list[str], FieldInfo | None, type[Block] | None]:
     """Return the key and field at a location, and the type of block that the key holds in this tree.
 
@@ -260,18 +259,18 @@ def _along(
         path.append(str(part))
         field = block.model_fields[str(part)]
         node, _ = node_at(tree, tuple(path))
-        chosen = node.entries.get("type") if isinstance(node, Mapping) else None
+        chosen = node.entries.get("type") if isinstance(node, BlockNode) else None
         kind = str(chosen.value) if isinstance(chosen, Scalar) else ""
         block = kinds_of(field).get(kind) or block_of(field)
     return path, field, block
 
 
-def _unknown_key(location: Location, tree: Mapping) -> Problem:
+def _unknown_key(location: Location, tree: BlockNode) -> Problem:
     above, field, inner = _along(Config, location[:-1], tree)
     name, block = str(location[-1]), inner or Config
     kinds = {} if field is None else kinds_of(field)
     parent, _ = node_at(tree, location[:-1])
-    assert isinstance(parent, Mapping), "the parent holds the key"
+    assert isinstance(parent, BlockNode), "the parent holds the key"
     if any(name in kind.model_fields for kind in kinds.values()):
         return _keys_of_another_kind(".".join(above), parent, parent.keys[name].source, block, kinds)
     if location == ("extends",):
@@ -290,7 +289,7 @@ def _unknown_key(location: Location, tree: Mapping) -> Problem:
 
 
 def _keys_of_another_kind(
-    above: str, entries: Mapping, source: str, block: type[Block], kinds: dict[str, type[Block]]
+    above: str, entries: BlockNode, source: str, block: type[Block], kinds: dict[str, type[Block]]
 ) -> Problem:
     """Report all keys from one source that belong to another type of the block."""
     foreign_keys = {key for kind_block in kinds.values() for key in kind_block.model_fields} - {*block.model_fields}
@@ -319,7 +318,7 @@ def _elsewhere(name: str, exactly: bool) -> str:
     return paths.get(match, "")
 
 
-def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
+def node_at(tree: BlockNode, location: Location) -> tuple[Node | None, Position]:
     """Return the value at a location and its position; for a missing key, None and the position of its block.
 
     Parts of the location that are not in the tree, such as the kind of value that pydantic tried, are skipped.
@@ -327,16 +326,16 @@ def node_at(tree: Mapping, location: Location) -> tuple[Node | None, Position]:
     node: Node = tree
     position = tree.position
     for part in location:
-        if isinstance(node, Mapping) and isinstance(part, str):
+        if isinstance(node, BlockNode) and isinstance(part, str):
             if part not in node.entries:
                 return None, position
             position, node = node.keys[part], node.entries[part]
-        elif isinstance(node, Listed) and isinstance(part, int) and part < len(node.items):
+        elif isinstance(node, ListNode) and isinstance(part, int) and part < len(node.items):
             node = node.items[part]
             position = node.position
     return node, node.position
 
 
-def key_at(tree: Mapping, location: Location) -> Position:
+def key_at(tree: BlockNode, location: Location) -> Position:
     block, position = node_at(tree, location[:-1])
-    return block.keys.get(str(location[-1]), position) if isinstance(block, Mapping) else position
+    return block.keys.get(str(location[-1]), position) if isinstance(block, BlockNode) else position

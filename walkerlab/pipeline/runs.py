@@ -12,7 +12,7 @@ from walkerlab.config.files import SHOWN_PATH
 from walkerlab.config.problems import printable, suggestion
 from walkerlab.config.reader import read as read_text
 from walkerlab.config.schema import Config
-from walkerlab.config.tree import Mapping as Tree
+from walkerlab.config.tree import BlockNode
 from walkerlab.config.validation import validate_tree
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
@@ -82,7 +82,7 @@ def config_of(folder: RunFolder) -> Config | None:
     """Return the config of a run; None if it is unknown or this version's schema rejects it."""
     try:
         tree = read_text(config_text(folder) or "", "stored config")
-        return validate_tree(tree) if isinstance(tree, Tree) else None
+        return validate_tree(tree) if isinstance(tree, BlockNode) else None
     except ConfigError:
         return None
 

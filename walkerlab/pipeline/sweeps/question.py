@@ -15,8 +15,7 @@ from walkerlab.config.layers import ConfigSetting
 from walkerlab.config.problems import nearest, problem_error
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, SlopeInDegrees
-from walkerlab.config.tree import Position, Scalar, plain
-from walkerlab.config.tree import Sequence as Listed
+from walkerlab.config.tree import ListNode, Position, Scalar, plain
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.headlines import QUANTITIES, has_quantity
 
@@ -149,7 +148,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
         raise bad(source, "is not of the form KEY=VALUES", FORMS)
     if values.lstrip().startswith("["):
         node = read(values, source, len(key) + 2)
-        assert isinstance(node, Listed)
+        assert isinstance(node, ListNode)
         return key, [plain(item) for item in node.items], f"--over {key}"
     return key, values.strip(), source
 
