@@ -1,4 +1,4 @@
-"""What both models agree on: codes of how a walk ended or, if negative, how it continues, and limits of a pose."""
+"""Codes of how a walk ended or, if negative, how it continues, and limits of a pose, for kernels of both models."""
 
 from walkerlab.outcome import Outcome
 
