@@ -681,15 +681,18 @@ def export_model(
     slope_deg: float | None = None,
     contact: Contact | None = None,
     law: str = "contact",
+    slope: str = "gravity",
     **keys: Any,
 ) -> tuple[Path, ...]:
     """Write a walker, started on its gait, as a model for ADAMS (.adm, .cmd) or MuJoCo (.xml); return all its files.
 
-    path       file of the model; commands (.acf) for an .adm model, or a driven walker's script, are written next to it
+    path       file of the model; commands (.acf) for an .adm model, or the script of a driven or kneed walker, are
+               written next to it
     walker     built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
     contact    ground of the contact model, built by `contact`; by default the paper's, on pads
     law        contact force in ADAMS: `contact` for ADAMS's, `functions` for exactly walkerlab's
+    slope      what is tilted in MuJoCo: `gravity`, or `geometry` for the ground and the walker on it
     keys       other config keys, such as start, strides, push_off
 
     Raises ConfigError for an unknown format or a walker that the format cannot express, NoAnswer if no gait is found.
@@ -714,7 +717,8 @@ def export_model(
             raise NoAnswer(gait.no_answer)
         inputs["fixedpoint"] = gait.content
     start = rigid_start(config, inputs)
-    texts = export.export_model(config, *start, kind, export.law_named(law), git_commit(), path.stem).files
+    adams_law, tilted = export.law_named(law), export.slope_named(slope)
+    texts = export.export_model(config, *start, kind, adams_law, git_commit(), path.stem, tilted).files
     for name, text in texts.items():
         write_through(path.with_name(name), text.encode())
     return tuple(path.with_name(name) for name in texts)
