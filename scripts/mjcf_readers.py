@@ -3,8 +3,8 @@
 
 Usage: python scripts/mjcf_readers.py MODEL.xml [STEP_S]
 
-Tries every reader that is installed here. The walk starts from the keyframe and has ten steps. Each reader gets the lines
-that the documentation says to type. STEP_S is the time step in Drake and Newton.
+Tries every reader that is installed here. The walk starts from the keyframe and has ten steps. Each reader gets
+the lines that the documentation says to type. STEP_S is the time step in Drake and Newton.
 """
 
 import contextlib

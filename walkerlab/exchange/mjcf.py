@@ -330,15 +330,16 @@ def pad_text(export: Exported, number: int, pad: Pad) -> str:
 
 
 def custom_texts(export: Exported) -> Iterator[str]:
-    """Yield what the script reads: drives, rules of the knees, and the last step of walkerlab's walk."""
+    """Yield what the script reads: drives, rules of the knees, and periods and lengths of walkerlab's steps."""
     push_off, hip, walk = export.config.push_off, export.hip, export.walk
     yield f'<numeric name="push_off" data="{push_off.impulse_N_s!r} {push_off.duration_s!r}"/>'
     yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
     if export.knee_links:
         at_touch = int(export.scene.ours.whole.release_at_touch)
         yield f'<numeric name="knees" data="{FLEXED!r} {at_touch}"/>'
-    period, length = (float(values[-1]) if walk.steps else 0.0 for values in (walk.periods_s, walk.lengths_m))
-    yield f'<numeric name="last_step_in_walkerlab" data="{period!r} {length!r}"/>'
+    steps = (walk.periods_s, walk.lengths_m) if walk.steps else ((0.0,), (0.0,))
+    values = " ".join(repr(float(value)) for values in steps for value in values)
+    yield f'<numeric name="steps_in_walkerlab" data="{values}"/>'
 
 
 def lock_texts(export: Exported) -> Iterator[str]:

@@ -12,6 +12,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+FRAME_S = 1.0 / 60.0
+
 
 class Walk:
     """Walk from the keyframe `gait`: a control callback for push-offs, hip torque, touchdowns and knees.
@@ -141,27 +143,31 @@ class Walk:
 
 
 def main(path: str, steps: int, view: bool) -> None:
-    """Walk for `steps` touchdowns, but at most for two simulated seconds each, and compare with walkerlab's walk."""
+    """Walk for `steps` touchdowns, or until the hip is on the ground, and compare with walkerlab's walk."""
     walk, viewer = Walk(mujoco.MjModel.from_xml_path(path)), None
     if view:
         from mujoco.viewer import launch_passive
 
         viewer = launch_passive(walk.model, walk.data)
-    begun, seen = time.monotonic(), 0
-    while len(walk.touches_s) < steps and walk.data.time < 2.0 * steps:
+    begun, shown_s, seen = time.monotonic(), 0.0, 0
+    while len(walk.touches_s) < steps and walk.data.time < 2.0 * steps and walk.data.qpos[1] > 0.0:
         mujoco.mj_step(walk.model, walk.data)
         if len(walk.touches_s) > seen:
             seen = len(walk.touches_s)
             print(f"step {seen}: touch at {walk.touches_s[-1]:.4f} s, {walk.touches_m[-1]:.4f} m")
-        if viewer is not None and walk.data.time > time.monotonic() - begun:
+        if viewer is not None and walk.data.time >= shown_s:
             viewer.sync()
+            shown_s += FRAME_S
+            time.sleep(max(0.0, shown_s - (time.monotonic() - begun)))
     if seen < steps:
         print(f"it walked {seen} of {steps} steps")
-    elif steps > 1:
-        period = walk.touches_s[-1] - walk.touches_s[-2]
-        length = walk.touches_m[-1] - walk.touches_m[-2]
-        its_period, its_length = walk.model.numeric("last_step_in_walkerlab").data
-        print(f"last step: {period:.4f} s, {length:.4f} m; in walkerlab {its_period:.4f} s, {its_length:.4f} m")
+        return
+    period = np.diff(walk.touches_s, prepend=0.0)[-1]
+    length = np.diff(walk.touches_m, prepend=0.0)[-1]
+    its_periods, its_lengths = walk.model.numeric("steps_in_walkerlab").data.reshape(2, -1)
+    known = min(steps, len(its_periods))
+    theirs = f"step {known} in walkerlab: {its_periods[known - 1]:.4f} s, {its_lengths[known - 1]:.4f} m"
+    print(f"step {steps}: {period:.4f} s, {length:.4f} m; {theirs}")
 
 
 if __name__ == "__main__":
