@@ -135,7 +135,7 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
     """
     if export.knee_links:
         raise ConfigError(
-            "Knees that lock cannot be exported to ADAMS yet.",
+            "Knees that lock cannot be exported to ADAMS.",
             "Export to MuJoCo, or choose straight legs, such as paper, round-feet or torso.",
         )
     planar = export.model
