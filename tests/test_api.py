@@ -397,3 +397,30 @@ def test_a_table_without_pandas_is_refused_with_advice(monkeypatch):
     with pytest.raises(ConfigError, match="a DataFrame needs pandas") as caught:
         walkerlab.find_gait().to_dataframe()
     assert caught.value.advice == "pip install pandas"
+
+
+@pytest.fixture
+def mujoco():
+    module = pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install 'walkerlab[engines]'")
+    yield module
+    module.set_mjcb_control(None)
+
+
+def test_a_mujoco_model_walks_from_a_run_a_config_or_a_name(mujoco, tmp_path):
+    walkerlab.run("fixedpoint", "kneed", runs=tmp_path)
+    run = walkerlab.open_run("kneed", tmp_path)
+    for config in (run, run.config, "kneed"):
+        model, data = walkerlab.mujoco_model(config)
+        assert data.qpos == pytest.approx(model.key("gait").qpos, abs=0.0)
+        mujoco.mj_step(model, data, 36_000)
+        # its swing knee has locked, at .3486 s
+        assert data.eq_active.all()
+
+
+def test_a_mujoco_model_takes_blocks_and_the_way_to_tilt(mujoco):
+    heavy = walkerlab.compass(hip_mass_kg=20)
+    model, _ = walkerlab.mujoco_model("paper", slope="geometry", walker=heavy)
+    assert model.body_subtreemass[model.joint("height").bodyid[0]] == pytest.approx(30.0)
+    assert model.opt.gravity == pytest.approx([0.0, 0.0, -9.81])
+    with pytest.raises(ConfigError, match="unknown way to express a slope"):
+        walkerlab.mujoco_model("paper", slope="steep")

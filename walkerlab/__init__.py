@@ -35,6 +35,7 @@ __all__ = [
     "find_gait",
     "identify",
     "kneed",
+    "mujoco_model",
     "open_run",
     "plan_measurements",
     "read_walk",

@@ -681,23 +681,24 @@ def export_model(
     slope_deg: float | None = None,
     contact: Contact | None = None,
     law: str = "contact",
+    slope: str = "gravity",
     **keys: Any,
 ) -> tuple[Path, ...]:
     """Write a walker, started on its gait, as a model for ADAMS (.adm, .cmd) or MuJoCo (.xml); return all its files.
 
-    path       file of the model; commands (.acf) for an .adm model, or a driven walker's script, are written next to it
+    path       file of the model; commands (.acf) for an .adm model, or the script of a driven or kneed walker, are
+               written next to it
     walker     built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
     contact    ground of the contact model, built by `contact`; by default the paper's, on pads
     law        contact force in ADAMS: `contact` for ADAMS's, `functions` for exactly walkerlab's
+    slope      what is tilted in MuJoCo: `gravity`, or `geometry` for the ground and the walker on it
     keys       other config keys, such as start, strides, push_off
 
     Raises ConfigError for an unknown format or a walker that the format cannot express, NoAnswer if no gait is found.
     """
     from walkerlab.exchange import export
-    from walkerlab.pipeline.stages.walk import rigid_start
     from walkerlab.pipeline.store.files import write_through
-    from walkerlab.pipeline.store.provenance import git_commit
 
     path = Path(path)
     kind = export.ENDINGS.get(path.suffix.removeprefix("."))
@@ -707,17 +708,60 @@ def export_model(
         )
     ground = contact or Contact(terrain="checkerboard")
     config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": ground}, keys)
+    texts = _export_texts(config, kind, law, slope, path.stem)
+    for name, text in texts.items():
+        write_through(path.with_name(name), text.encode())
+    return tuple(path.with_name(name) for name in texts)
+
+
+def mujoco_model(config: str | Path | Config | Run = DEFAULT, slope: str = "gravity", **blocks: Any) -> tuple[Any, Any]:
+    """Return a walker as a MuJoCo model and its data at the start of the gait; plain `mujoco.mj_step` makes it walk.
+
+    Drives and knees are a control callback, which MuJoCo calls in each step. Callbacks are global: this model walks
+    until the next call, and `mujoco.set_mjcb_control(None)` must come before another model is compiled.
+
+    config  a Config, a config file or built-in name, or a run
+    slope   what is tilted: `gravity`, or `geometry` for the ground and the walker on it
+    blocks  other keys of the config, such as walker, contact, push_off
+
+    Raises ConfigError if MuJoCo is not installed or cannot express the walker, NoAnswer if no gait is found.
+
+    >>> model, data = mujoco_model("kneed")
+    >>> import mujoco
+    >>> mujoco.mj_step(model, data, 10_000)
+    >>> print(f"{data.time:.2f} s, {data.qpos[0]:.2f} m")
+    0.10 s, -0.15 m
+    >>> mujoco.set_mjcb_control(None)
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ConfigError("a MuJoCo model needs MuJoCo, which is not installed.", "pip install mujoco") from error
+    from walkerlab.exchange.mujoco_script import Walk
+
+    start = config.config if isinstance(config, Run) else config
+    scene = with_blocks(start, **{name: _plain(value) for name, value in blocks.items()})
+    text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None).values()))
+    mujoco.set_mjcb_control(None)
+    walk = Walk(mujoco.MjModel.from_xml_string(text))
+    return walk.model, walk.data
+
+
+def _export_texts(config: Config, kind: Any, law: str, slope: str, stem: str | None) -> dict[str, str]:
+    """Return the files of a model, by name, after finding its gait."""
+    from walkerlab.exchange import export
+    from walkerlab.pipeline.stages.walk import rigid_start
+    from walkerlab.pipeline.store.provenance import git_commit
+
     inputs = {}
     if config.start == "fixed-point":
         gait = in_memory("fixedpoint", config)
         if gait.no_answer is not None:
             raise NoAnswer(gait.no_answer)
         inputs["fixedpoint"] = gait.content
+    adams_law, tilted = export.law_named(law), export.slope_named(slope)
     start = rigid_start(config, inputs)
-    texts = export.export_model(config, *start, kind, export.law_named(law), git_commit(), path.stem).files
-    for name, text in texts.items():
-        write_through(path.with_name(name), text.encode())
-    return tuple(path.with_name(name) for name in texts)
+    return export.export_model(config, *start, kind, adams_law, git_commit(), stem, tilted).files
 
 
 def _stage_block(stage: str, keys: dict[str, Any], **values: Any) -> dict[str, Any]:

@@ -39,8 +39,11 @@ def test_the_walker_walks_in_plain_mujoco_and_as_an_environment(folder, monkeypa
     pytest.importorskip("mujoco")
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(folder)
-    stepping, writing = python_blocks()
+    notebook, stepping, writing = python_blocks()
     names = {}
+    exec(notebook, names)
+    assert names["data"].qpos[0] > 0.2
+    names["mujoco"].set_mjcb_control(None)
     exec(stepping, names)
     assert names["data"].qpos[0] > 3.0
     assert names["data"].qpos[1] > 0.9

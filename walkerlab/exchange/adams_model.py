@@ -133,6 +133,11 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
 
     Raises ConfigError for a contact law, ground or coupling that cannot be expressed.
     """
+    if export.knee_links:
+        raise ConfigError(
+            "Knees that lock cannot be exported to ADAMS.",
+            "Export to MuJoCo, or choose straight legs, such as paper, round-feet or torso.",
+        )
     planar = export.model
     gravity = MM * planar.gravity_along, -MM * planar.gravity_down
     model = AdamsModel(export.model_name, gravity, markers={ORIGIN: Marker(GROUND)})

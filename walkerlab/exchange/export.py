@@ -12,6 +12,7 @@ from walkerlab.exchange.adams import command_text, dataset_text
 from walkerlab.exchange.adams_model import adams_model
 from walkerlab.exchange.adams_view import view_text
 from walkerlab.exchange.exported import Exported, prepare_export
+from walkerlab.exchange.mjcf import Slope
 from walkerlab.physics.solvers.system import State
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 Kind = Literal["adm", "cmd", "mjcf"]
 Law = Literal["contact", "functions"]
 CONTACT_LAWS: Final[tuple[Law, ...]] = get_args(Law)
+SLOPES: Final[tuple[Slope, ...]] = get_args(Slope)
 ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "mjcf": "mjcf"}
 """Format by file extension."""
 
@@ -40,6 +42,7 @@ def export_model(
     law: Law = "contact",
     commit: str | None = None,
     stem: str | None = None,
+    slope: Slope = "gravity",
 ) -> ExportedFiles:
     """Export a walker to another program, with the start that `contact-sim` derives from a rigid state.
 
@@ -49,6 +52,7 @@ def export_model(
     law                  contact law in ADAMS: its own contact between shapes, or walkerlab's law as functions
     commit               commit of walkerlab, for the header of the file
     stem                 stem of the file names; by default the config's name
+    slope                in MuJoCo: whether gravity is tilted, or the ground and the walker on it
 
     Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
     pads depends on a contact gait and none is found.
@@ -56,10 +60,13 @@ def export_model(
     export = prepare_export(config, rigid_step_length_m, rigid_state)
     stem = stem or export.model_name
     left_out = tuple(parts_left_out(export, kind, law, f"{stem}.py"))
-    head = list(export.describe(left_out, commit))
+    tilted = "gravity" if slope == "gravity" else "ground"
+    head = list(export.describe(left_out, commit, tilted))
     if kind == "mjcf":
-        script = {f"{stem}.py": mjcf.script_text()} if mjcf.needs_script(export) else {}
-        return ExportedFiles({f"{stem}.xml": mjcf.walker_text(export, head)} | script, left_out)
+        script = {f"{stem}.py": mjcf.script_text()} if mjcf.parts_of_script(export) else {}
+        return ExportedFiles({f"{stem}.xml": mjcf.walker_text(export, head, slope)} | script, left_out)
+    if slope == "geometry":
+        raise ConfigError("--slope geometry: models for ADAMS have tilted gravity.", "Leave it out for ADAMS.")
     model = adams_model(export, law)
     if kind == "cmd":
         pinned_until_s = export.touches_s[0] if export.pinned and export.touches_s else None
@@ -77,6 +84,14 @@ def law_named(text: str) -> Law:
     raise ConfigError(f"--law {text}: unknown contact law.", f"Choose from {', '.join(CONTACT_LAWS)}.")
 
 
+def slope_named(text: str) -> Slope:
+    """Return the way of this name to express a slope; raises ConfigError for an unknown name."""
+    for slope in SLOPES:
+        if text == slope:
+            return slope
+    raise ConfigError(f"--slope {text}: unknown way to express a slope.", f"Choose from {', '.join(SLOPES)}.")
+
+
 def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Iterator[str]:
     """Describe the parts of the walk that an exported model lacks or replaces."""
     config, by_functions = export.config, kind != "mjcf" and law == "functions"
@@ -86,8 +101,8 @@ def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Itera
         millimetres = 1e3 * export.model.balls[0].radius_m
         yield f"point feet, replaced by balls of {millimetres:g} mm on ground lower by the same amount"
     if kind == "mjcf":
-        if mjcf.needs_script(export):
-            yield f"push-offs and hip torque, which the script {script} applies instead"
+        if parts := mjcf.parts_of_script(export):
+            yield f"{', '.join(parts)}, which the script {script} applies instead"
     else:
         when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"
         if config.push_off.impulse_N_s:

@@ -81,6 +81,11 @@ class Exported:
         upper = self.scene.assembly.legs[1 - STANCE_FOOT][0]
         return [link.name for link in self.model.links].index(upper)
 
+    @property
+    def knee_links(self) -> tuple[int, ...]:
+        """Index of each leg's shank; empty for straight legs."""
+        return tuple(place - 2 for place in self.scene.knee_places)
+
     @cached_property
     def couplings(self) -> list[dict[int, float]]:
         """Weights, by link, of the hinge angles of bodies that follow other bodies; each weighted sum is zero."""
@@ -132,10 +137,10 @@ class Exported:
     def model_name(self) -> str:
         return identifier(self.config.name)
 
-    def describe(self, left_out: Iterable[str], commit: str | None) -> Iterator[str]:
-        """Yield the header of an exported file: its origin, the walk in walkerlab, and omissions."""
+    def describe(self, left_out: Iterable[str], commit: str | None, tilted: str) -> Iterator[str]:
+        """Yield the header of an exported file: its origin, what is tilted, the walk in walkerlab, and omissions."""
         yield f"Written by walkerlab {walkerlab.__version__}" + (f", commit {commit}" if commit else "") + "."
-        yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted gravity."
+        yield f"Config: {self.config.name}. Slope: {self.scene.ours.slope:.10g} rad, as tilted {tilted}."
         yield f"walkerlab's contact model from this start: {self.walk.outcome.label}, {self.walk.steps} steps."
         if self.walk.steps:
             yield f"Its last step: {self.walk.periods_s[-1]:.7g} s, {self.walk.lengths_m[-1]:.7g} m."
@@ -159,11 +164,6 @@ def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: Stat
     contact_scene = scene_on_pads(config, rigid_step_length_m, rigid_state)
     steps = 2 * config.strides
     scene = scene_for_engines(contact_scene, rigid_state)
-    if contact_scene.assembly.knees:
-        raise ConfigError(
-            "Knees that lock cannot be exported: ADAMS and MJCF have no statement that locks and releases a hinge.",
-            "Choose a walker with straight legs, such as paper, round-feet or torso.",
-        )
     heights = foothold_heights(config.ground, steps + 1)
     walk = contact_scene.walk(scene.start, steps, tolerances_of(config, steps), None, heights)
     return Exported(config, scene, steps, walk, heights, contact_scene.pinned)

@@ -1,9 +1,12 @@
 """MJCF export: a planar walker in MuJoCo's language, with MuJoCo's soft contact tuned to the ADAMS contact law.
 
 MuJoCo scales a contact by w, the sum of `body_invweight0` (1/kg) of its two bodies. With constant impedance d,
-stiffness K and damping B (solref -K, -B), a foot rests at a penetration of (1 - d) w N / K under a load N, and creeps
-at (1 - d) w T / (impratio B) under a tangential load T. So a solref of (-w k, -w c) makes any foot a spring k and a
-damper c, whose forces are divided by 1 - d.
+stiffness K and damping B (solref -K, -B), a foot rests at a penetration of (1 - d) w N / K under a load N. So a solref
+of (-w k, -w c) makes any foot a spring k and a damper c, whose forces are divided by 1 - d. In friction, the damper is
+r b, where -w b is the damping of `solreffriction` and r is `impratio`.
+
+Two side effects shrink with d and 1 / r. The foot gains a mass of d / ((1 - d) w), and r times as much against
+sliding. A sliding foot is pushed off the ground with friction times b times its slip velocity.
 
 w is 1/mass for a free ball. For a link of a walker it is a mean over three directions in the model's zero position, and
 differs between equal legs. With the flag `diagexact` (MuJoCo 3.10), MuJoCo uses a contact's own inverse mass instead.
@@ -16,47 +19,68 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 
-from walkerlab.config.drives import Hip
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineContact, contact_target
 from walkerlab.exchange.exported import Exported, Pad
 from walkerlab.exchange.planar import UPRIGHT, Ball, PlanarModel
+from walkerlab.physics.ground.knees import FLEXED
+from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.solvers.system import Floats
 
 MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
-IMPEDANCE = 0.1  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
+IMPEDANCE = 1e-3  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
+IMPRATIO = 10.0  # large, so that sliding feet are not pushed off the ground
 JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
-STEP_S, PAD_M = 1e-4, 0.05
+STEP_S, DAMPED_STEP, PAD_M = 2.5e-5, 0.33, 0.05
+"""Time step, and its maximum as a multiple of the time constant with which a damper stops a foot or a shank."""
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
-"""Settings that make couplings as stiff as MuJoCo's constraints can be with time steps of STEP_S."""
+"""Settings that make couplings and locks as stiff as MuJoCo's constraints can be with time steps of STEP_S."""
 CLOSE = 'iterations="100" tolerance="1e-12"'
+
+
+Slope = Literal["gravity", "geometry"]
 
 
 @dataclass(frozen=True)
 class Foot:
-    """Ball of a foot: name, collision group, position across the walk (m), and whether its leg is drawn."""
+    """Ball of a foot: name, collision group, position across the walk (m), and its leg's links with their lower ends.
+
+    limbs  link and lower end (m) of each part of the leg to draw, in the link's frame
+    """
 
     name: str
     group: int = 1
     across_m: float = 0.0
-    drawn: bool = False
+    limbs: Mapping[int, Position] = field(default_factory=dict)
 
 
 FEET = (Foot("foot 0"), Foot("foot 1"))
 
 
+class Hinge(NamedTuple):
+    """Name and other attributes of a hinge."""
+
+    name: str
+    attributes: str
+
+
+UNNAMED: Mapping[int, Hinge] = {}
+
+
 def contact_settings(target: EngineContact) -> dict[str, float]:
     """Compute settings of MuJoCo's contact for the target, by the formulas at the top of this module.
 
-    Exports and engines use the same settings for every foot; `foot_text` turns them into a solref.
+    Exports and engines use the same settings for every foot; `foot_text` and `pair_text` turn them into a solref.
     Raises ConfigError for a target without damping.
     """
     if target.damping_ratio == 0.0:
@@ -65,25 +89,33 @@ def contact_settings(target: EngineContact) -> dict[str, float]:
             "Set contact.damping above 0.",
         )
     stiffness = (1.0 - IMPEDANCE) * target.mass * target.gravity / target.penetration
-    damping = 2.0 * target.damping_ratio * math.sqrt((1.0 - IMPEDANCE) * target.gravity / target.penetration)
-    creep = (1.0 - IMPEDANCE) * target.creep_load * target.gravity / damping
+    friction_damping = (1.0 - IMPEDANCE) * target.creep_load * target.mass * target.gravity / target.creep_velocity
     return {
         "stiffness_N_m": stiffness,
-        "damping_N_s_m": target.mass * damping,
+        "damping_N_s_m": 2.0 * target.damping_ratio * math.sqrt(target.mass * stiffness),
+        "friction_damping_N_s_m": friction_damping / IMPRATIO,
         "solimp_d": IMPEDANCE,
-        "impratio": creep / target.creep_velocity,
+        "impratio": IMPRATIO,
         "friction": target.friction,
     }
 
 
-def inverse_weights(model: PlanarModel) -> list[float]:
-    """Compute the `body_invweight0` (1/kg) that MuJoCo gives to the translation of each link.
+@dataclass(frozen=True)
+class InverseWeights:
+    """Inverse masses and inertias by which MuJoCo scales constraints.
 
-    It is trace(J M^-1 J^T) / 3 at the link's centre of mass in the model's zero position, or 1/mass for a single link
-    that cannot turn.
+    bodies  `body_invweight0` (1/kg) of the translation of each link: trace(J M^-1 J^T) / 3 at its centre of mass in the
+            model's zero position, or 1/mass for a single link that cannot turn
+    joints  `dof_invweight0` (1/(kg m^2)) of the hinge of each link: the diagonal of M^-1 in the zero position
     """
+
+    bodies: list[float]
+    joints: list[float]
+
+
+def inverse_weights(model: PlanarModel) -> InverseWeights:
     if model.freedoms == UPRIGHT and len(model.links) == 1:
-        return [1.0 / model.links[0].mass_kg]
+        return InverseWeights([1.0 / model.links[0].mass_kg], [0.0])
     base_rates = np.array([[float(freedom == axis) for freedom in model.freedoms] for axis in JOINT_AXES])
     hinges: list[Floats] = []
     centres: list[Floats] = []
@@ -102,7 +134,8 @@ def inverse_weights(model: PlanarModel) -> list[float]:
         hinges.append(hinge)
         centres.append(centre)
     inverse = np.linalg.inv(mass_matrix)
-    return [float(np.trace(centre[:2] @ inverse @ centre[:2].T)) / 3.0 for centre in centres]
+    bodies = [float(np.trace(centre[:2] @ inverse @ centre[:2].T)) / 3.0 for centre in centres]
+    return InverseWeights(bodies, np.diag(inverse)[len(model.freedoms) - 1 :].tolist())
 
 
 def rates_at(point: Position, start: Position, rates: Floats) -> Floats:
@@ -121,57 +154,73 @@ def body_text(
     link_number: int,
     contact: Mapping[str, float] | None,
     feet: tuple[Foot, ...] = FEET,
-    hip: tuple[int, Hip] | None = None,
+    hinges: Mapping[int, Hinge] = UNNAMED,
 ) -> str:
     """Write a link with its hinge, its feet and its child links.
 
     contact  settings of the foot contacts; None for a walker without feet
-    hip      link that hangs from the hip, and the hip's spring and damper
+    hinges   hinges with a name, by the link that hangs from them
     """
     link = model.links[link_number]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
-    inside = "".join(joint_texts(model, link_number, hip))
+    inside = "".join(joint_texts(model, link_number, hinges.get(link_number)))
     i = max(link.inertia_kg_m2, MIN_INERTIA)
     inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
     for ball, foot in zip(model.balls, feet, strict=False):
         if contact is not None and ball.link == link_number:
-            inside += foot_text(model, ball, foot, contact) + (leg_text(link.point_m, ball, foot) if foot.drawn else "")
+            inside += foot_text(model, ball, foot, contact)
+        if link_number in foot.limbs:
+            inside += limb_text(link.point_m, foot.limbs[link_number], foot, ball)
     for child, hung in enumerate(model.links):
         if hung.parent == link_number:
-            inside += body_text(model, child, contact, feet, hip)
+            inside += body_text(model, child, contact, feet, hinges)
     return f'<body name="{link.name}" pos="{px - x!r} 0 {pz - z!r}">{inside}</body>'
 
 
-def joint_texts(model: PlanarModel, link_number: int, hip: tuple[int, Hip] | None) -> Iterator[str]:
+def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> Iterator[str]:
     """Yield the joints of a link: one for each freedom of the base, or the hinge between a link and its parent."""
     link = model.links[link_number]
     x, z = link.point_m
     for freedom in model.freedoms if link.parent < 0 else ("turn",):
         kind, axis = JOINT_AXES[freedom]
-        name, acts = freedom if link.parent < 0 else f"hinge of {link.name}", ""
-        if hip is not None and hip[0] == link_number:
-            spring, damper = hip[1].spring_N_m_per_rad, hip[1].damping_N_m_s_per_rad
-            name, acts = HIP, f' stiffness="{spring!r}" damping="{damper!r}"'
-        yield f'<joint name="{name}" type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}"{acts}/>'
+        name = freedom if link.parent < 0 else f"hinge of {link.name}"
+        name, acts = hinge or (name, "")
+        yield f'<joint name="{name}" type="{kind}" axis="{axis}" pos="{x!r} 0 {z!r}" {acts}/>'
 
 
 def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
-    """Write a foot, whose solref follows from the contact settings and the inverse weight of the foot's link."""
-    (x, z), d = ball.centre_m, contact["solimp_d"]
-    inverse_weight = inverse_weights(model)[ball.link]
-    stiffness = inverse_weight * contact["stiffness_N_m"]
-    damping = inverse_weight * contact["damping_N_s_m"]
+    """Write a foot, tuned for ground that is added to the file; `pair_text` tunes the contacts with its own ground."""
+    (x, z), mu = ball.centre_m, contact["friction"]
     return (
         f'<geom name="{foot.name}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} {foot.across_m!r} {z!r}" '
-        f'contype="{foot.group}" conaffinity="0" condim="3" friction="{contact["friction"]!r} 0 0" priority="1" '
-        f'solref="{-stiffness!r} {-damping!r}" solimp="{d!r} {d!r} 1 0.5 1"/>'
+        f'contype="{foot.group}" conaffinity="0" condim="3" friction="{mu!r} 0 0" priority="1" '
+        f"{normal_text(model, ball, contact)}/>"
     )
 
 
-def walker_text(export: Exported, head: Iterable[str]) -> str:
-    """Write a model with pads and a keyframe `gait`, from which a walker without drives walks under plain `mj_step`.
+def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: Mapping[str, float]) -> str:
+    """Write the contact between a foot and a named ground, of which only a pair can tune the friction's damping."""
+    mu, creep = contact["friction"], inverse_weights(model).bodies[ball.link] * contact["friction_damping_N_s_m"]
+    return (
+        f'<pair name="{foot.name} on {ground}" geom1="{foot.name}" geom2="{ground}" condim="3" '
+        f'friction="{mu!r} {mu!r} 0 0 0" '
+        f'solreffriction="0 {-creep!r}" {normal_text(model, ball, contact)}/>'
+    )
 
-    head  lines of the header comment
+
+def normal_text(model: PlanarModel, ball: Ball, contact: Mapping[str, float]) -> str:
+    """Write spring and damper of a foot, which follow from the contact settings and the weight of the foot's link."""
+    inverse_weight, d = inverse_weights(model).bodies[ball.link], contact["solimp_d"]
+    stiffness = inverse_weight * contact["stiffness_N_m"]
+    damping = inverse_weight * contact["damping_N_s_m"]
+    return f'solref="{-stiffness!r} {-damping!r}" solimp="{d!r} {d!r} 1 0.5 1"'
+
+
+def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity") -> str:
+    """Write a model with pads and a keyframe `gait`, from which a passive compass walks under plain `mj_step`.
+
+    head   lines of the header comment
+    slope  whether gravity is tilted, or the ground with everything on it
 
     Raises ConfigError for a walker or ground that MJCF cannot express.
     """
@@ -185,19 +234,36 @@ def walker_text(export: Exported, head: Iterable[str]) -> str:
     contact = contact_settings(target)
     links = tuple(replace(link, name=name) for link, name in zip(export.model.links, export.names, strict=True))
     model = replace(export.model, links=links)
-    feet = tuple(Foot(f"foot_{foot + 1}", 1 << foot, export.lane_across_m(foot), drawn=True) for foot in range(2))
+    feet = tuple(
+        Foot(f"foot_{foot + 1}", 1 << foot, export.lane_across_m(foot), limbs(export, foot)) for foot in range(2)
+    )
     q, v = (" ".join(repr(float(value)) for value in values) for values in export.start)
     distance = -4.0 * export.config.walker.leg_length_m
+    scene = "".join(
+        (
+            *(pad_text(export, number, pad) for number, pad in enumerate(export.pads)),
+            body_text(model, 0, contact, feet, named_hinges(export)),
+        )
+    )
+    if slope == "geometry":
+        half, down = 0.5 * export.scene.ours.slope, math.hypot(model.gravity_along, model.gravity_down)
+        model = replace(model, gravity_along=0.0, gravity_down=down)
+        scene = f'<body name="slope" quat="{math.cos(half)!r} 0 {math.sin(half)!r} 0">{scene}</body>'
+    pairs = "".join(
+        pair_text(model, model.balls[pad.foot], feet[pad.foot], f"pad_{number + 1}", contact)
+        for number, pad in enumerate(export.pads)
+    )
+    equalities = "".join((*coupling_texts(export), *lock_texts(export)))
     elements = [
         f'<mujoco model="{export.model_name}">',
         '<compiler angle="radian" autolimits="true" balanceinertia="true"/>',
-        option_text(model, contact, f'timestep="{STEP_S!r}" '),
+        option_text(model, contact, f'timestep="{time_step_s(export, contact)!r}" '),
         f"<custom>{''.join(custom_texts(export))}</custom>",
         f'<worldbody><camera name="side" mode="trackcom" pos="0 {distance!r} 0" xyaxes="1 0 0 0 0 1"/>',
-        *(pad_text(export, number, pad) for number, pad in enumerate(export.pads)),
-        body_text(model, 0, contact, feet, (export.hip_link, export.hip)),
+        scene,
         "</worldbody>",
-        f"<equality>{''.join(coupling_texts(export))}</equality>" if export.couplings else "",
+        f"<contact>{pairs}</contact>",
+        f"<equality>{equalities}</equality>" if equalities else "",
         f'<keyframe><key name="gait" qpos="{q}" qvel="{v}"/></keyframe>',
         "</mujoco>",
     ]
@@ -207,10 +273,50 @@ def walker_text(export: Exported, head: Iterable[str]) -> str:
     return f"<!--\n{comment}\n-->\n{ElementTree.tostring(tree, encoding='unicode')}\n"
 
 
-def leg_text(hinge: Position, ball: Ball, foot: Foot) -> str:
-    """Draw a leg as a capsule from its hinge to its foot; it collides with nothing."""
-    (x, z), (a, c), y = hinge, ball.centre_m, foot.across_m
-    ends, width = f"{x!r} {y!r} {z!r} {a!r} {y!r} {c!r}", 0.015 * math.hypot(x - a, z - c)
+def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
+    """Return a time step, rounded to one digit, that resolves the damping of the lightest foot and the knees' stops."""
+    weights, stop = inverse_weights(export.model), export.scene.ours.stop
+    rates = [contact["damping_N_s_m"] * weights.bodies[ball.link] for ball in export.model.balls]
+    if isinstance(stop, NormalLaw):
+        shanks = [weights.joints[link] for link in export.knee_links]
+        rates += [max(stop.damping * weight, math.sqrt(stop.stiffness * weight)) for weight in shanks]
+    return min(STEP_S, float(f"{DAMPED_STEP / max(rates):.0e}"))
+
+
+def named_hinges(export: Exported) -> dict[int, Hinge]:
+    """Name the hip and the knees, with the hip's spring and damper and the stops of compliant knees."""
+    hip, weights, stop = export.hip, inverse_weights(export.model).joints, export.scene.ours.stop
+    acts = f'stiffness="{hip.spring_N_m_per_rad!r}" damping="{hip.damping_N_m_s_per_rad!r}"'
+    hinges = {export.hip_link: Hinge(HIP, acts)}
+    for leg, link in enumerate(export.knee_links):
+        acts, d = "", IMPEDANCE
+        if isinstance(stop, NormalLaw):
+            stiffness, damping = ((1.0 - d) * weights[link] * x for x in (stop.stiffness, stop.damping))
+            acts = f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
+        hinges[link] = Hinge(f"knee_{leg + 1}", acts)
+    return hinges
+
+
+def limbs(export: Exported, foot: int) -> dict[int, Position]:
+    """Return the lower end (m) of each link of a leg, from its foot up to the hip."""
+    ball = export.model.balls[foot]
+    link, end, ends = ball.link, ball.centre_m, {ball.link: ball.centre_m}
+    while link not in (0, export.hip_link):
+        end, link = export.model.links[link].parent_point_m, export.model.links[link].parent
+        ends[link] = end
+    return ends
+
+
+def limb_text(hinge: Position, end: Position, foot: Foot, ball: Ball) -> str:
+    """Draw a part of a leg as a capsule from its hinge to its lower end; it collides with nothing.
+
+    Above the foot it ends early, so that it does not reach below the ball in programs that let it collide.
+    """
+    (x, z), (a, c), y = hinge, end, foot.across_m
+    width = 0.015 * math.hypot(x - a, z - c)
+    short = 2.0 * max(0.0, width - ball.radius_m) / math.hypot(x - a, z - c) if end == ball.centre_m else 0.0
+    a, c = a + short * (x - a), c + short * (z - c)
+    ends = f"{x!r} {y!r} {z!r} {a!r} {y!r} {c!r}"
     return f'<geom type="capsule" fromto="{ends}" size="{width!r}" contype="0" conaffinity="0" rgba=".4 .5 .7 1"/>'
 
 
@@ -224,10 +330,24 @@ def pad_text(export: Exported, number: int, pad: Pad) -> str:
 
 
 def custom_texts(export: Exported) -> Iterator[str]:
-    """Yield the drive parameters that the script reads for push-offs and hip torque."""
-    push_off, hip = export.config.push_off, export.hip
+    """Yield what the script reads: drives, rules of the knees, and periods and lengths of walkerlab's steps."""
+    push_off, hip, walk = export.config.push_off, export.hip, export.walk
     yield f'<numeric name="push_off" data="{push_off.impulse_N_s!r} {push_off.duration_s!r}"/>'
     yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
+    if export.knee_links:
+        at_touch = int(export.scene.ours.whole.release_at_touch)
+        yield f'<numeric name="knees" data="{FLEXED!r} {at_touch}"/>'
+    steps = (walk.periods_s, walk.lengths_m) if walk.steps else ((0.0,), (0.0,))
+    values = " ".join(repr(float(value)) for values in steps for value in values)
+    yield f'<numeric name="steps_in_walkerlab" data="{values}"/>'
+
+
+def lock_texts(export: Exported) -> Iterator[str]:
+    """Yield the locks of the knees; at the start only that of the stance leg is active."""
+    for leg in range(len(export.knee_links)):
+        active = "true" if leg == STANCE_FOOT else "false"
+        knee = f'joint1="knee_{leg + 1}" polycoef="0 0 0 0 0"'
+        yield f'<joint name="lock_{leg + 1}" {knee} active="{active}" {COUPLING_SETTINGS}/>'
 
 
 def coupling_texts(export: Exported) -> Iterator[str]:
@@ -260,9 +380,11 @@ def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
     )
 
 
-def needs_script(export: Exported) -> bool:
-    """Return whether the walker has drives, which only the script applies."""
-    return export.config.push_off.impulse_N_s != 0.0 or export.hip.torque_N_m != 0.0
+def parts_of_script(export: Exported) -> list[str]:
+    """Name the walker's drives and knees, on which only the script acts."""
+    parts = {"push-offs": export.config.push_off.impulse_N_s, "hip torque": export.hip.torque_N_m}
+    parts |= {"locks of the knees": len(export.knee_links)}
+    return [name for name, value in parts.items() if value != 0]
 
 
 def script_text() -> str:

@@ -1,4 +1,4 @@
-"""Simulate in MuJoCo a walker that walkerlab exported, with push-offs and hip torque, and print its touchdowns.
+"""Simulate in MuJoCo a walker that walkerlab exported, with its drives and knees, and print its touchdowns.
 
 Usage: python NAME.py [MODEL.xml] [steps] [--view]. By default it walks ten steps of NAME.xml, which stands next to it.
 It needs the package mujoco.
@@ -12,63 +12,162 @@ from typing import Any
 import mujoco
 import numpy as np
 
+FRAME_S = 1.0 / 60.0
+
 
 class Walk:
-    """Walk from the keyframe `gait`."""
+    """Walk from the keyframe `gait`: a control callback for push-offs, hip torque, touchdowns and knees.
+
+    It judges by the state at each time step. A knee locks when it has been bent and comes straight, by a plastic impact
+    or, if it has a stop, when the stop turns it back. The trailing knee is released after the next touchdown.
+
+    stance  foot that stands, 0 or 1
+    """
 
     def __init__(self, model: Any) -> None:
         self.model, self.data = model, mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, self.data, model.key("gait").id)
-        mujoco.mj_forward(model, self.data)
         self.impulse, self.duration = model.numeric("push_off").data
         (self.torque,) = model.numeric("hip_torque").data
         self.hip = model.joint("hip")
+        self.impratio = model.opt.impratio
+        base = model.joint("height")
+        self.weight = model.body_subtreemass[base.bodyid[0]] * np.linalg.norm(model.opt.gravity)
+        self.height = base.dofadr[0]
         self.feet = [model.geom(f"foot_{foot}").id for foot in (1, 2)]
-        self.stance = 1
+        joints = {model.joint(joint).name: joint for joint in range(model.njnt)}
+        self.knees = [joints[name] for name in ("knee_1", "knee_2") if name in joints]
+        if self.knees:
+            self.flexed, self.at_touch = model.numeric("knees").data
+            self.locks = [model.equality(f"lock_{leg}").id for leg in (1, 2)]
+            self.stops = model.jnt_limited[self.knees].copy()
+        mujoco.mj_resetDataKeyframe(model, self.data, model.key("gait").id)
+        mujoco.mj_forward(model, self.data)
+        # directions along the slope and normal to it
+        self.along, self.up = self.data.geom("pad_1").xmat.reshape(3, 3)[:, [0, 2]].T
+        self.begin()
+        mujoco.set_mjcb_control(self.control)
+
+    def begin(self) -> None:
+        """Stand on the second leg, with its knee locked and the other one free."""
+        self.time_s, self.stance = -1.0, 1
         self.touches_s: list[float] = []
         self.touches_m: list[float] = []
+        # what the release of the trailing knee waits for: the leading foot's sinking in, then the push-off
+        self.sinks = self.pushes = False
+        self.bent = [False, False]
+        for leg in range(len(self.knees)):
+            self.model.jnt_limited[self.knees[leg]] = 0
 
-    def step(self) -> None:
-        """Apply push-off and hip torque, advance one time step, and swap feet if the swing foot touches down ahead."""
+    def control(self, _model: Any, data: Any) -> None:
+        """Apply push-off and hip torque; once in a time step, look for a touchdown and turn the knees."""
+        if data is not self.data:
+            return
+        if data.time < self.time_s:
+            self.begin()
+        if data.time > self.time_s:
+            self.time_s = data.time
+            if data.ncon > 0:
+                self.look_for_touch()
+                self.scale_friction()
+            if self.knees:
+                self.turn_knees()
+        if self.impulse or self.torque:
+            self.drive(1 - self.stance)
+
+    def look_for_touch(self) -> None:
+        """Swap feet if the swing foot is on the ground ahead of the stance foot, its knee locked."""
         data, swing = self.data, 1 - self.stance
-        data.qfrc_applied[:] = 0.0
-        data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
-        if self.touches_s:
-            self.push(self.feet[swing], (data.time - self.touches_s[-1]) / self.duration)
-        mujoco.mj_step(self.model, data)
-        along = data.geom_xpos[self.feet, 0]
-        if along[swing] > along[self.stance] and self.feet[swing] in data.contact.geom[: data.ncon]:
+        if (self.knees and not data.eq_active[self.locks[swing]]) or self.feet[swing] not in data.contact.geom:
+            return
+        along = data.geom_xpos[self.feet] @ self.along
+        if along[swing] > along[self.stance]:
             self.stance = swing
             self.touches_s.append(data.time)
             self.touches_m.append(float(along[swing]))
+            self.sinks = self.pushes = True
+
+    def scale_friction(self) -> None:
+        """Let the friction's damper grow with the load on the feet, as in ADAMS: a strike is many times the weight."""
+        load = self.data.qfrc_constraint[self.height]
+        self.model.opt.impratio = self.impratio * max(1.0, load / self.weight)
+
+    def drive(self, swing: int) -> None:
+        """Apply the hip torque, and push the trailing foot during a pulse."""
+        self.data.qfrc_applied[:] = 0.0
+        self.data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
+        share = (self.data.time - self.touches_s[-1]) / self.duration if self.touches_s else 0.0
+        if self.impulse and 0.0 < share < 1.0:
+            self.push(self.feet[swing], share)
 
     def push(self, foot: int, share: float) -> None:
         """Push a foot towards the hip; `share` is the elapsed fraction of the pulse."""
-        if not 0.0 < share < 1.0:
-            return
-        point = self.data.geom_xpos[foot] - [0.0, 0.0, self.model.geom_size[foot, 0]]
+        point = self.data.geom_xpos[foot] - self.model.geom_size[foot, 0] * self.up
         line = self.data.xanchor[self.hip.id] - point
         line[1] = 0.0
         force = 30.0 * (share * (1.0 - share)) ** 2 * self.impulse / self.duration * line / np.linalg.norm(line)
         body = self.model.geom_bodyid[foot]
         mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, body, self.data.qfrc_applied)
 
+    def turn_knees(self) -> None:
+        """Release the trailing knee when nothing holds it any longer; lock a knee that comes straight from behind."""
+        model, data, trailing = self.model, self.data, 1 - self.stance
+        if self.pushes:
+            motion = np.zeros(6)
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, self.feet[self.stance], motion, 0)
+            self.sinks = self.sinks and not self.at_touch and motion[3:] @ self.up < 0.0
+            if not self.sinks and (self.impulse == 0.0 or data.time >= self.touches_s[-1] + self.duration):
+                self.pushes = self.bent[trailing] = False
+                data.eq_active[self.locks[trailing]] = 0
+        for leg, knee in enumerate(self.knees):
+            if data.eq_active[self.locks[leg]]:
+                continue
+            bend, rate = data.qpos[model.jnt_qposadr[knee]], data.qvel[model.jnt_dofadr[knee]]
+            if bend < -self.flexed:
+                self.bent[leg] = True
+                model.jnt_limited[knee] = self.stops[leg]
+            elif self.bent[leg] and bend >= 0.0 and not (self.stops[leg] and rate > 0.0):
+                self.lock(leg)
+
+    def lock(self, leg: int) -> None:
+        """Stop a knee by a plastic impact that leaves the other constraints in force, and hold it from now on."""
+        model, data, knee = self.model, self.data, self.knees[leg]
+        model.jnt_limited[knee] = 0
+        # a knee that locks by its stop keeps the stop's compression
+        model.eq_data[self.locks[leg], 0] = data.qpos[model.jnt_qposadr[knee]] if self.stops[leg] else 0.0
+        data.eq_active[self.locks[leg]] = 1
+        held = data.efc_J.reshape(-1, model.nv)[data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]
+        rows = np.vstack((held, np.eye(model.nv)[model.jnt_dofadr[knee]]))
+        columns = np.zeros_like(rows)
+        mujoco.mj_solveM(model, data, columns, rows)
+        data.qvel -= columns.T @ np.linalg.solve(rows @ columns.T, rows @ data.qvel)
+
 
 def main(path: str, steps: int, view: bool) -> None:
-    """Walk for `steps` touchdowns, but at most for ten simulated seconds."""
+    """Walk for `steps` touchdowns, or until the hip is on the ground, and compare with walkerlab's walk."""
     walk, viewer = Walk(mujoco.MjModel.from_xml_path(path)), None
     if view:
         from mujoco.viewer import launch_passive
 
         viewer = launch_passive(walk.model, walk.data)
-    begun, seen = time.monotonic(), 0
-    while len(walk.touches_s) < steps and walk.data.time < 10.0:
-        walk.step()
+    begun, shown_s, seen = time.monotonic(), 0.0, 0
+    while len(walk.touches_s) < steps and walk.data.time < 2.0 * steps and walk.data.qpos[1] > 0.0:
+        mujoco.mj_step(walk.model, walk.data)
         if len(walk.touches_s) > seen:
             seen = len(walk.touches_s)
             print(f"step {seen}: touch at {walk.touches_s[-1]:.4f} s, {walk.touches_m[-1]:.4f} m")
-        if viewer is not None and walk.data.time > time.monotonic() - begun:
+        if viewer is not None and walk.data.time >= shown_s:
             viewer.sync()
+            shown_s += FRAME_S
+            time.sleep(max(0.0, shown_s - (time.monotonic() - begun)))
+    if seen < steps:
+        print(f"it walked {seen} of {steps} steps")
+        return
+    period = np.diff(walk.touches_s, prepend=0.0)[-1]
+    length = np.diff(walk.touches_m, prepend=0.0)[-1]
+    its_periods, its_lengths = walk.model.numeric("steps_in_walkerlab").data.reshape(2, -1)
+    known = min(steps, len(its_periods))
+    theirs = f"step {known} in walkerlab: {its_periods[known - 1]:.4f} s, {its_lengths[known - 1]:.4f} m"
+    print(f"step {steps}: {period:.4f} s, {length:.4f} m; {theirs}")
 
 
 if __name__ == "__main__":

@@ -74,8 +74,7 @@ def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
             assert bench.creep(target.penetration) < 1e-3 * target.creep_velocity
             continue
         assert bench.creep(target.penetration) == pytest.approx(target.creep_velocity, rel=1e-3), contact
-        if engine.name != "mujoco":
-            assert bench.friction(target.penetration) == pytest.approx(target.friction, rel=1e-2), contact
+        assert bench.friction(target.penetration) == pytest.approx(target.friction, rel=1e-2), contact
 
 
 @pytest.mark.parametrize("locked", [(BENT, BENT), (BENT, LOCKED), (LOCKED, LOCKED)])
@@ -84,11 +83,13 @@ def test_both_feet_of_a_kneed_walker_get_the_same_spring_from_mujoco(locked):
     scene = kneed().with_knees_locked(np.array(locked, np.int8))
     own = tuned("soft", contact_target(scene))
     model = mujoco.MjModel.from_xml_string(model_xml(scene.model, own))
-    assert inverse_weights(scene.model) == pytest.approx(model.body_invweight0[1:, 0], rel=1e-9)
+    assert inverse_weights(scene.model).bodies == pytest.approx(model.body_invweight0[1:, 0], rel=1e-9)
     feet = [model.geom(f"foot {foot}").id for foot in (0, 1)]
     scales = model.body_invweight0[model.geom_bodyid[feet], :1]
     expected = [[-own.settings["stiffness_N_m"], -own.settings["damping_N_s_m"]]] * 2
     assert model.geom_solref[feet] / scales == pytest.approx(np.array(expected), rel=1e-9)
+    pairs = [model.pair(f"foot {foot} on floor").id for foot in (0, 1)]
+    assert model.pair_solref[pairs] / scales == pytest.approx(np.array(expected), rel=1e-9)
 
 
 def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):

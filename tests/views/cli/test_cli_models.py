@@ -28,6 +28,13 @@ def test_files_beside_a_model_have_its_name(walker):
     assert "the script driven.py applies instead" in done.stderr
 
 
+def test_a_slope_in_the_geometry_is_said_in_the_file(walker):
+    assert walker("export", "paper", "model", "--to", "mjcf", "--slope", "geometry").returncode == 0
+    text = (walker.folder / "paper.xml").read_text()
+    assert "rad, as tilted ground." in text
+    assert 'gravity="0.0 0 -9.81"' in text
+
+
 @pytest.mark.parametrize(("options", "file"), [
     (("--to", "mjcf"), "paper.xml"), (("-o", "a.xml"), "a.xml"), (("-o", "a.mjcf"), "a.mjcf"),
     (("--to", "mjcf", "-o", "b.xml"), "b.xml"), (("--to", "mjcf", "-o", "b.mjcf"), "b.mjcf"),
@@ -47,6 +54,8 @@ def test_the_format_is_named_or_follows_the_file(walker, options, file):
     (("paper", "--to", "adm", "-o", "x.xml"), "contradicts the ending"),
     (("paper", "--to", "adm", "--law", "hertz"), "--law hertz: unknown contact law."),
     (("paper", "--to", "mjcf", "--law", "functions"), "--law chooses between contact laws of ADAMS."),
+    (("paper", "--to", "mjcf", "--slope", "steep"), "--slope steep: unknown way to express a slope."),
+    (("paper", "--to", "adm", "--slope", "geometry"), "models for ADAMS have tilted gravity."),
     (("rigid-only", "--to", "adm"), "contact"),
     (("nowhere", "--to", "adm"), "there is no config nowhere"),
 ])  # fmt: skip

@@ -108,6 +108,10 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             str | None,
             typer.Option(metavar="LAW", help="Contact in ADAMS: contact (its own, default) or functions (exact)."),
         ] = None,
+        slope: Annotated[
+            str | None,
+            typer.Option(metavar="HOW", help="Slope in MuJoCo: gravity (tilted, default) or geometry (tilted ground)."),
+        ] = None,
     ) -> None:
         """Write a figure, a table or a trajectory of a run, or its walker for ADAMS or MuJoCo."""
         from walkerlab.views.cli.target import Target
@@ -116,10 +120,13 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             # Imported here: only this export needs a walker.
             from walkerlab.views.cli.models import write_model
 
-            paths = write_model(run, request.runs, Target(to, output), law, request.console, request.settings)
+            how = slope or "gravity"
+            paths = write_model(run, request.runs, Target(to, output), law, request.console, request.settings, how)
             for path in paths:
                 print(path)
             return
+        if slope is not None:
+            raise typer.BadParameter("changes only a model", param_hint="--slope")
         if request.sets:
             raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
         from walkerlab.views.cli.exports import export_from, run_to_export, walk_in

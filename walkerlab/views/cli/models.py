@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.export import ENDINGS, export_model, law_named
+from walkerlab.exchange.export import ENDINGS, export_model, law_named, slope_named
 from walkerlab.pipeline.resolve import resolve, warn_of_edits
 from walkerlab.pipeline.runner import Options, execute
 from walkerlab.pipeline.stages.walk import rigid_start
@@ -16,11 +16,18 @@ from walkerlab.views.cli.target import Target, write_file
 
 
 def write_model(
-    run: str, runs: Path, target: Target, law: str | None, console: Console, sets: Sequence[str] = ()
+    run: str,
+    runs: Path,
+    target: Target,
+    law: str | None,
+    console: Console,
+    sets: Sequence[str] = (),
+    slope: str = "gravity",
 ) -> list[Path]:
     """Write a model of a run's or config's walker, computing its gait first if necessary; return the files written.
 
-    sets  changes of the config, KEY=VALUE
+    sets   changes of the config, KEY=VALUE
+    slope  what is tilted in a model for MuJoCo: gravity, or the geometry
 
     Raises ConfigError for an unknown run or format, or if a format cannot express the walker; NoAnswer without a gait.
     """
@@ -44,7 +51,7 @@ def write_model(
         assert report.artifact is not None, "a stage with an answer stores it"
         inputs["fixedpoint"] = artifact.read(report.artifact)
     start = rigid_start(config, inputs)
-    exported = export_model(config, *start, kind, adams_law, git_commit(), path.stem)
+    exported = export_model(config, *start, kind, adams_law, git_commit(), path.stem, slope_named(slope))
     for omission in exported.left_out:
         console.note(f"left out: {omission}")
     paths = [path, *(path.with_name(name) for name in list(exported.files)[1:])]

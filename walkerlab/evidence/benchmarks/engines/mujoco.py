@@ -4,7 +4,7 @@ from typing import Any
 
 from walkerlab.evidence.benchmarks.engines import adapter
 from walkerlab.exchange.engine_scene import EngineContact
-from walkerlab.exchange.mjcf import body_text, contact_settings, option_text
+from walkerlab.exchange.mjcf import FEET, body_text, contact_settings, option_text, pair_text
 from walkerlab.exchange.planar import PlanarModel
 from walkerlab.physics.solvers.system import Floats
 
@@ -16,6 +16,7 @@ CANNOT_EXPRESS = (
     "point feet: a ball of half a millimetre replaces each",
     "a knee that locks rigidly at an instant: equality constraints are soft, so the walk continues in another model",
 )
+NEVER_M = -1e9  # margin of a contact that never acts
 INTEGRATOR_CODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
@@ -46,8 +47,8 @@ class MujocoRun(adapter.Simulation):
                 return
 
     def carry(self, ball: int, has_ground: bool) -> None:
-        if self._model.ngeom:
-            self._model.geom_contype[self._model.geom(f"foot {ball}").id] = int(has_ground)
+        if self._model.npair:
+            self._model.pair_margin[self._model.pair(f"foot {ball} on floor").id] = 0.0 if has_ground else NEVER_M
 
 
 def force_callback(forces: adapter.Forces, data: Any) -> Any:
@@ -62,12 +63,15 @@ def force_callback(forces: adapter.Forces, data: Any) -> Any:
 
 def model_xml(model: PlanarModel, own: adapter.OwnContact | None) -> str:
     """Write the model as MJCF, with a floor for its feet if the engine's own contact is used."""
-    contact, floor = None if own is None else own.settings, ""
-    if own is not None:
-        place = f'pos="0 0 {model.balls[0].ground_m!r}" contype="0" conaffinity="1"'
+    contact, floor, pairs = None if own is None else own.settings, "", ""
+    if contact is not None:
+        place = f'pos="0 0 {model.balls[0].ground_m!r}" contype="0" conaffinity="0"'
         floor = f'<geom name="floor" type="plane" size="0 0 1" {place}/>'
+        feet = zip(model.balls, FEET, strict=False)
+        pairs = "".join(pair_text(model, ball, foot, "floor", contact) for ball, foot in feet)
     return f"""<mujoco>
   <compiler autolimits="false" balanceinertia="true"/>
   {option_text(model, contact)}
   <worldbody>{floor}{body_text(model, 0, contact)}</worldbody>
+  <contact>{pairs}</contact>
 </mujoco>"""
