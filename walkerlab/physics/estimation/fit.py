@@ -131,18 +131,18 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
     forecast, u = problem.forecast, start.copy()
     even = np.zeros(forecast.heights)
     noise, heights, why = Noise(FIRST_NOISE * typical_sizes(forecast), 0.0), even, "standard deviations still change"
-    data = linearise(problem, u, heights)
+    data, disturbances = linearise(problem, u, heights), heights
     if data is None:
         return NO_NEIGHBOURS
     robust = None
     for done in range(MAX_ROUNDS):
         on_round()
         before, u = u, least_squares_fit(problem, u, start, heights, data, noise)
-        data = None if forecast.predict(u, even) is None else linearise(problem, u, heights, robust=robust)
+        data = None if forecast.predict(u, even) is None else linearise(problem, u, disturbances, robust=robust)
         if data is None:
             # The data pull the walker out of its basin of attraction: judge the last walk that did not end early.
             u, why = before, NO_NEIGHBOURS
-            data = linearise(problem, u, heights, robust=robust)
+            data = linearise(problem, u, disturbances, robust=robust)
         if data is None:
             return NO_NEIGHBOURS
         rows, earlier = reduce(data), noise
@@ -153,6 +153,7 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
         disturbances = most_probable_disturbances(rows, noise, evaluation.move)
         likeliest = disturbances[: heights.size]
         heights = passable(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
+        disturbances[: heights.size] = heights
         if why == NO_NEIGHBOURS:
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
@@ -163,11 +164,10 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
         if forecast.walks_taken > problem.max_walks:
             why = f"the budget of {problem.max_walks} predicted walks is exhausted (identify.max_walks)"
             break
-    data = linearise(problem, u, heights, True, robust) or linearise(problem, u, heights, robust=robust)
+    data = linearise(problem, u, disturbances, True, robust) or linearise(problem, u, disturbances, robust=robust)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
         return NO_NEIGHBOURS
-    disturbances[: heights.size] = heights
     return Fitted(problem, u, disturbances, noise, evaluate(reduce(data), noise), data, predicted, why)
 
 
@@ -220,24 +220,26 @@ def typical_sizes(forecast: Forecast) -> Floats:
 
 
 def linearise(
-    problem: FitProblem, u: Floats, heights: Floats, exact: bool = False, robust: Robust | None = None
+    problem: FitProblem, u: Floats, disturbances: Floats, exact: bool = False, robust: Robust | None = None
 ) -> Linearised | None:
-    """Linearise the prediction at u (unknowns,) and heights (heights,); None if a walk ends early.
+    """Linearise the prediction at u (unknowns,) and the disturbances; None if a walk ends early.
 
-    robust  how a robust loss trims the residuals; None leaves them whole
+    disturbances  heights (m), then kicks if they are known; the walk goes over these heights, without kicks
+    robust        how a robust loss trims the residuals; None leaves them whole
     """
-    forecast = problem.forecast
+    forecast, heights = problem.forecast, disturbances[: problem.forecast.heights]
     prediction = forecast.predict(u, heights)
     derivatives = forecast.differentiate(u, heights, exact)
     if prediction is None or derivatives is None:
         return None
     J, G = derivatives
-    residuals = whole = forecast.values - prediction.values
+    from_even = forecast.values - prediction.values + G[:, : heights.size] @ heights
+    trimmed = np.zeros_like(from_even)
     if problem.loss == "soft_l1" and robust is not None:
-        residuals = trim(whole, forecast.quantity, robust)
+        residuals = from_even - G[:, : disturbances.size] @ disturbances
+        trimmed = residuals - trim(residuals, forecast.quantity, robust)
     rows, sizes, kicks = problem.prior_rows(u), typical_sizes(forecast), G.shape[1] - heights.size
-    from_even = residuals + G[:, : heights.size] @ heights
-    return Linearised(from_even, J, G, forecast.quantity, rows, sizes, whole - residuals, kicks)
+    return Linearised(from_even - trimmed, J, G, forecast.quantity, rows, sizes, trimmed, kicks)
 
 
 def trim(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floats:
@@ -264,13 +266,13 @@ class Robust(NamedTuple):
 
 
 def robust_at(rows: Reduced, noise: Noise) -> Robust:
-    columns = np.column_stack((rows.fixed[:, 1:], rows.G)) / noise.measurement[rows.quantity][:, None]
+    spread, unknowns = noise.spread(rows.G.shape[1], rows.kicks), rows.unknowns
+    disturbed = spread > 0.0
+    columns = np.column_stack((rows.fixed[:, 1:], rows.G[:, disturbed])) / noise.measurement[rows.quantity][:, None]
     informations = np.array([own.T @ own for own in (columns[rows.quantity == q] for q in range(rows.sizes.size))])
     whole = informations.sum(axis=0)
-    unknowns = rows.unknowns
     whole[:unknowns, :unknowns] += rows.prior[1:, 1:]
-    spread = noise.spread(rows.G.shape[1], rows.kicks)
-    whole[unknowns:, unknowns:] += np.diag(np.maximum(spread, 1e-12) ** -2.0)
+    whole[unknowns:, unknowns:] += np.diag(spread[disturbed] ** -2.0)
     absorbed = np.einsum("qij,ji->q", informations, np.linalg.pinv(whole, hermitian=True)) / rows.counts
     return Robust(math.sqrt(SOFT_EFFICIENCY) * noise.measurement, absorbed)
 
