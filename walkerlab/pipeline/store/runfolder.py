@@ -30,7 +30,7 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Worker:
+class Holder:
     """Process that holds the lock of a run folder."""
 
     command: str  # its command line
@@ -100,10 +100,10 @@ class RunFolder:
         """Write the run record; raises StorageError if that fails."""
         write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
-    def worker(self) -> Worker | None:
+    def worker(self) -> Holder | None:
         """Return the process that works in the folder; None if there is none, or if its command is unknown."""
         try:
-            worker = Worker(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
+            worker = Holder(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
         except (OSError, ValueError, TypeError, RecursionError):
             return None
         # Imported here: a folder without this file is not locked.
@@ -145,7 +145,7 @@ class RunFolder:
                 lock.acquire()
         try:
             remove_leftovers(self.path)
-            worker = Worker(command_line(), os.getpid(), utc_now())
+            worker = Holder(command_line(), os.getpid(), utc_now())
             with contextlib.suppress(OSError):  # only messages of other processes need this file
                 (self.path / WORKER).write_text(json.dumps(asdict(worker)), encoding="utf-8")
             yield
