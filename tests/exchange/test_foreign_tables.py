@@ -8,6 +8,7 @@ from time import process_time
 import numpy as np
 import pytest
 
+import walkerlab
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk, parse_units
 from walkerlab.exchange.recording import read_recording
@@ -493,3 +494,11 @@ def test_links_in_a_circle_are_refused(tmp_path):
     (tmp_path / "walk.csv").symlink_to(tmp_path / "walk.csv")
     with pytest.raises(ConfigError, match="cannot be read"):
         read_recording(tmp_path / "walk.csv")
+
+
+def test_a_file_of_markers_asks_for_those_of_a_leg(tmp_path):
+    path = tmp_path / "markers.csv"
+    path.write_text("time (s),PELVIS.x,PELVIS.y,HEEL.x,HEEL.y\n0,0,1,0,0\n0.01,0,1,0,0\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="has no column for 'angle 1', but markers: PELVIS, HEEL") as refused:
+        walkerlab.read_walk(path)
+    assert refused.value.advice.endswith('--columns "angle 1=HIP>FOOT"')

@@ -287,6 +287,12 @@ def missing(recording: Recording, name: str) -> ConfigError:
             f"{recording.path} has no time column; the first columns are {there}.",
             'Name it: --columns "time=NAME". A file that counts frames needs a column of times.',
         )
+    markers = [column.removesuffix(".x") for column in recording.columns if column.endswith(".x")]
+    if markers and name.startswith("angle"):
+        return ConfigError(
+            f"{recording.path} has no column for {name!r}, but markers: {', '.join(markers[:12])}.",
+            f'Name the markers at the hip and at the foot: --columns "{name}=HIP>FOOT"',
+        )
     near = get_close_matches(plain(name), [plain(column) for column in recording.columns], 1, 0.2)
     nearest = next((column for column in recording.columns if near and plain(column) == near[0]), "NAME")
     return ConfigError(

@@ -102,7 +102,7 @@ class Strike:
 
     @property
     def rough_instant(self) -> float:
-        """The same from fewer samples and trials."""
+        """Instant (s) of the strike in a smooth course, from fewer samples and trials."""
         return self.instant(self.cost_of(ROUGH), FIRST_TRIALS)
 
     def cost_of(self, samples: int) -> Callable[[float], float]:

@@ -94,7 +94,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
             f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
             f"{float(np.abs(angle).max()):.3g} rad.",
             "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit (--units), "
-            "and over at least one whole step.",
+            "and over at least one whole step; the slope must be that of the ground (slope_deg).",
         )
     step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
     refuse_duration(step_s, source)

@@ -96,8 +96,7 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > DEPENDENT:
         yield (
             f"residuals of successive angles go together (averages over half a step scatter "
-            f"{math.sqrt(squares / freedom):.2g} times as much as independent noise allows), so that the standard "
-            "errors are too small"
+            f"{math.sqrt(squares / freedom):.2g} times as much as independent noise allows)"
         )
 
 
