@@ -1,5 +1,6 @@
 """Identified walkers with doubtful errors: noise that the floor hides, outliers, contradictions, other disturbances."""
 
+import re
 import tracemalloc
 from dataclasses import replace
 from functools import cache
@@ -205,6 +206,31 @@ def test_a_bound_that_the_walk_does_not_press_is_no_doubt():
     assert result.pulls[0].standard_deviations == pytest.approx(0.5, abs=2.0 * SETTLED_MOVE)
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [(LEG, 1.0), ("walker.foot_to_mass_m", 0.5), ("walker.leg_mass_kg", 5.0), ("walker.leg_inertia_kg_m2", 0.0)],
+)
+def test_sensitivities_are_what_a_fit_with_another_fixed_value_changes(key, value):
+    fit = {"slope_deg": None, HIP: None}
+    (before, entries), share = fitted_with_sensitivities(key), 0.01
+    changed = value + share * entries["slope_deg"].change
+    after = values(identify(measured_steps(), "slope_deg=2", f"{key}={changed}", fit=fit))
+    for name, entry in entries.items():
+        change = (after[name].value - before[name].value) / share
+        assert entry.per_percent == pytest.approx(change, rel=0.02, abs=1e-3 * before[name].standard_error)
+
+
+def fitted_with_sensitivities(key):
+    result = identify(measured_steps(), "slope_deg=2", fit={"slope_deg": None, HIP: None})
+    return values(result), {entry.estimate: entry for entry in result.sensitivities if entry.to == key}
+
+
+def test_the_size_of_one_percent_of_zero_comes_from_the_leg():
+    _, entries = fitted_with_sensitivities("walker.leg_inertia_kg_m2")
+    assert [entry.change for entry in entries.values()] == pytest.approx([0.01 * 5.0 * 1.0**2] * 2)
+    assert fitted_with_sensitivities("walker.hip.torque_N_m")[1] == {}
+
+
 def test_a_wrong_prior_does_not_become_noise():
     free = identify(measured_steps(), fit={"slope_deg": None, LEG: None})
     wrong = identify(measured_steps(), fit={"slope_deg": None}, prior={LEG: [1.05, 0.003]})
@@ -239,9 +265,12 @@ def test_a_wrong_hip_mass_is_named_and_would_raise_the_likelihood_by_what_a_refi
     wrong = identify(measured, "slope_deg=3.5", HIP + "=11.2", fit={"slope_deg": None})
     assert wrong.verdict.fit == "fits-but"
     text = " ".join(wrong.verdict.reasons)
-    assert f"estimating {HIP}, too" in text or "estimating walker.leg_mass_kg, too" in text
+    # the walk determines the ratio of both masses only
+    assert f"--fit {HIP}" in text or "--fit walker.leg_mass_kg" in text
     right = identify(measured, "slope_deg=3.5", HIP + "=11.2", fit={"slope_deg": None, HIP: None})
-    gain = float(text.rpartition(" ")[2])
+    gain = float(re.search(r"by about ([\d.]+):", text)[1])
+    better, fixed = map(float, re.search(r"of ([\d.]+) \(kg\) instead of ([\d.]+)", text).groups())
+    assert better / fixed == pytest.approx(10.0 / 11.2 if HIP in text else 11.2 / 10.0, rel=0.03)
     assert right.verdict.log_likelihood - wrong.verdict.log_likelihood == pytest.approx(gain, rel=0.3)
     assert right.verdict.usable
     assert abs(values(right)[HIP].value - 10.0) < 3.0 * values(right)[HIP].standard_error

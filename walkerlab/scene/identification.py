@@ -6,19 +6,30 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from walkerlab.config.fields import value_at
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.labels import unit_by_name, with_unit
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import estimate_noise, evaluate, reduce
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
-from walkerlab.physics.estimation.result import USABLE, Estimate, Identification, ModelFit, Pull, StepTable, Uncertain
+from walkerlab.physics.estimation.result import (
+    USABLE,
+    Estimate,
+    Identification,
+    ModelFit,
+    Pull,
+    Sensitivity,
+    StepTable,
+    Uncertain,
+)
 from walkerlab.physics.orbits.family_search import RIGID
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
@@ -37,6 +48,18 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 Values = tuple[float, ...]
+
+
+class Fixed(NamedTuple):
+    """A parameter, or a property of clock and sensors, that is not estimated."""
+
+    name: str
+    value: float  # 0 for properties of clock and sensors
+    scale: float  # typical change
+    unit: str
+    slope: Floats  # (values,) derivative of the predicted values with respect to a change by the scale
+
+
 Begin = Callable[[str, int], Callable[[], None]]
 KEPT_CONFIGS: Final = 512  # changed configs, and as many walkers of them
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
@@ -205,9 +228,10 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         )
     )
     pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(estimates, question.prior))
+    fixed = [*fixed_parameters(subject, question, best)]
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
-        reasons = (*verdict[1], *map(pull_in_words, strong(pulls)), *better_with(subject, question, best))
+        reasons = (*verdict[1], *map(pull_in_words, strong(pulls)), *better_with(fixed, best, len(keys)))
         verdict = ("fits-but" if reasons else "fits"), reasons
     dof = max(1, best.data.residuals.size - best.u.size)
     walk = forecast.predict(best.u, best.heights_m)
@@ -228,6 +252,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         best,
         walk.walk,
         nuisances_with_errors(best, question.nuisance),
+        tuple(sensitivities(fixed, best, estimates, subject.config)),
     )
 
 
@@ -265,34 +290,69 @@ def pull_in_words(pull: Pull) -> str:
     )
 
 
-def better_with(subject: ModelUnderTest, question: Identify, fitted: Fitted) -> Iterator[str]:
+def better_with(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Iterator[str]:
     """Yield the fixed parameter or nuisance that would raise the log-likelihood most if it was estimated, too.
 
     The gain is that of a linearised step with new standard deviations. It is reduced by the share of the values that
     the unknowns use up, since any parameter fits a short walk better.
     """
-    data, problem, count = fitted.data, fitted.problem, len(question.keys)
+    data, problem = fitted.data, fitted.problem
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
     left = (data.residuals.size - fitted.u.size - 1) / data.residuals.size
     best, wider = fitted.evaluation.likelihood, None
-    for name, value, slope in slopes_of_others(subject, question, fitted):
-        rows = reduce(replace(data, J=np.column_stack((data.J, slope)), prior=priors))
+    for other in others:
+        rows = reduce(replace(data, J=np.column_stack((data.J, other.slope)), prior=priors))
         evaluation = evaluate(rows, fitted.noise)
-        moves = np.abs([*evaluation.move[:count], evaluation.move[-1] if value else 0.0])
+        moves = np.abs([*evaluation.move[:parameters], evaluation.move[-1] if other.value else 0.0])
         if evaluation.likelihood > best and moves.max() < LINEAR_MOVE:
-            best, wider = evaluation.likelihood, (name, rows)
+            best, wider = evaluation.likelihood, (other, rows)
     if wider is not None:
-        name, rows = wider
+        other, rows = wider
         noise = estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise)
-        gain = evaluate(rows, noise).likelihood - fitted.evaluation.likelihood
+        free = evaluate(rows, noise)
+        gain = free.likelihood - fitted.evaluation.likelihood
         if gain * left > DECISIVE_GAIN:
-            yield f"estimating {name}, too, would raise the log-likelihood by about {gain:.2g}"
+            start = NUISANCES.get(other.name, (other.value, 0.0))[0]
+            option = "--nuisance" if other.name in NUISANCES else "--fit"
+            value = with_unit(f"{start + free.move[-1] * other.scale:.4g}", other.unit)
+            yield (
+                f"{other.name} of {value} instead of {start:.4g} would raise the log-likelihood by about {gain:.3g}: "
+                f"estimate it, too ({option} {other.name})"
+            )
 
 
-def slopes_of_others(
-    subject: ModelUnderTest, question: Identify, fitted: Fitted
-) -> Iterator[tuple[str, float, Floats]]:
-    """Yield each parameter and nuisance that is not estimated: name, value, and the walk's derivative (values,)."""
+def sensitivities(
+    others: Sequence[Fixed], fitted: Fitted, estimates: Sequence[Estimate], config: ContactConfig
+) -> Iterator[Sensitivity]:
+    """Yield how much each determined estimate changes if a fixed parameter is 1 % larger, to first order.
+
+    The change of an estimate is that of least squares with the noise as it is, without bounds.
+    """
+    data = fitted.data
+    prior = np.column_stack((np.zeros(len(data.prior)), data.prior[:, 1:]))
+    for other in others:
+        change = one_percent(other, config)
+        if other.name in NUISANCES or not change:
+            continue
+        residuals = -other.slope * change / other.scale
+        move = evaluate(reduce(replace(data, residuals=residuals, prior=prior)), fitted.noise).move
+        for estimate, by, scale in zip(estimates, move, fitted.forecast.scales, strict=False):
+            if estimate.standard_error is not None:
+                yield Sensitivity(estimate.key, other.name, float(by * scale), estimate.unit, change)
+
+
+def one_percent(parameter: Fixed, config: ContactConfig) -> float:
+    """Return 1 % of a parameter; of the leg for lengths and inertias of zero, and zero for drives of zero."""
+    leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
+    if parameter.value or parameter.unit == "m":
+        return 0.01 * abs(parameter.value or leg)
+    if name.endswith("inertia_kg_m2"):
+        return 0.01 * float(value_at(config, (*block, name.replace("inertia_kg_m2", "mass_kg")))) * leg**2
+    return 0.0
+
+
+def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted) -> Iterator[Fixed]:
+    """Yield each parameter and nuisance that is not estimated and along which walks can be predicted."""
     config, forecast, count = subject.config, fitted.forecast, len(question.keys)
     estimated = {parameter_of(key, config).path for key in question.keys}
     others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
@@ -309,11 +369,15 @@ def slopes_of_others(
     values = np.array(family.start[count:])
     u = np.concatenate((fitted.u[:count], values / wide.scales[count:], fitted.u[count:], np.zeros(len(sensors))))
     places = [*range(count, count + len(fixed)), *range(u.size - len(sensors), u.size)]
-    for name, value, place in zip((*fixed, *sensors), (*values, *np.zeros(len(sensors))), places, strict=True):
+    scales = [*wide.scales[count:].tolist(), *(NUISANCES[name][1] for name in sensors)]
+    units = [*(parameter_of(key, config).unit for key in fixed), *map(unit_by_name, sensors)]
+    for name, value, scale, unit, place in zip(
+        (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, places, strict=True
+    ):
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[place], fitted.heights_m, exact)
             if slope is not None:
-                yield name, float(value), slope
+                yield Fixed(name, value, scale, unit, slope)
                 break
 
 

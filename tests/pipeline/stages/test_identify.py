@@ -314,7 +314,7 @@ def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
     assert part is not None
     assert part.finding.startswith("The hip weighs ")
     captions = [block.caption for block in part.blocks if isinstance(block, Table)]
-    assert captions == ["Estimates", "Fit to the measurements"]
+    assert captions == ["Estimates", "Fit to the measurements", "If a fixed parameter is off"]
 
 
 def test_a_table_of_periods_alone_is_read(tmp_path):

@@ -69,6 +69,17 @@ class Information:
 
 
 @dataclass(frozen=True)
+class Sensitivity:
+    """Change of an estimate if a fixed parameter is 1 % larger."""
+
+    estimate: str  # key of the estimate
+    to: str  # key of the fixed parameter
+    per_percent: float  # in the estimate's unit
+    unit: str
+    change: float  # of the fixed parameter, in its unit: 1 % of it, or of the leg if it is zero
+
+
+@dataclass(frozen=True)
 class ModelFit:
     model: str
     log_likelihood: float | None
@@ -107,6 +118,7 @@ class Identification:
     fitted: Fitted = field(repr=False)
     walk: DisturbedWalk = field(repr=False)  # walk over the most probable floor
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
+    sensitivities: tuple[Sensitivity, ...]  # to parameters that are not estimated
 
     @property
     def verdict(self) -> ModelFit:

@@ -155,6 +155,7 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
             for estimate in result.estimates
             if pull.against == "prior" and estimate.key == pull.key
         ],
+        "sensitivity": [asdict(sensitivity) for sensitivity in result.sensitivities],
         "nuisance": {name: asdict(value) for name, value in result.nuisances.items()},
         "steps": result.measured.count,
         "rms_residual": dict(result.rms_residual),

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.labels import axis_label, join_words, unit_by_name
+from walkerlab.labels import axis_label, join_words, unit_by_name, with_unit
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.views.report.numbers import fixed, number, quantity
 from walkerlab.views.report.results import Results, stage_section
@@ -15,6 +15,7 @@ from walkerlab.views.report.words import words
 NO_EFFECT = 1e-6
 """Fraction of the largest singular value below which a parameter combination counts as having no effect on any walk."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
+NOTABLE_CHANGE = 0.5  # of an estimate, in standard errors, if a fixed parameter is 1 % larger
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 REFERENCES = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
@@ -37,6 +38,10 @@ QUALITY_COLUMNS = (
     Column("measurement noise", "noise", lambda value: number(value, 3), numeric=True),
     Column("unit", "unit"),
     Column("information lost without it", "share", lambda value: f"{100.0 * value:.0f} %", numeric=True),
+)
+FIXED_COLUMNS = (
+    Column("held fixed", "to"),
+    Column("larger by", lambda row: quantity(row["change"], unit_by_name(row["to"]), 2), numeric=True),
 )
 
 
@@ -72,9 +77,11 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
     beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]), is_usable(verdict))
     quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary), is_usable(verdict))
+    held = next(iter(sensitive_rows(summary, known)), None)
     return [
         *words.parts("identify.findings", summary, verdict, *parameters, *beside),
         *words.parts("identify.quality", summary, verdict, *quality),
+        *([change_in_words(held, known)] if held and is_usable(verdict) else []),
     ]
 
 
@@ -98,10 +105,29 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
         }
         for name, residual in summary["rms_residual"].items()
     ]
+    estimates = [row for row in summary["estimates"] if row["standard_error"] is not None]
+    moves = sensitive_rows(summary, estimates)
+    changes = [Column(with_unit(axis_label(row["key"]), row["unit"]), row["key"], numeric=True) for row in estimates]
     return [
         table("Estimates", ESTIMATE_COLUMNS, summary["estimates"]),
         table("Fit to the measurements", QUALITY_COLUMNS, quality),
+        *([table("If a fixed parameter is off", (*FIXED_COLUMNS, *changes), moves)] if moves else []),
     ]
+
+
+def sensitive_rows(summary: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the fixed parameters, the most influential first, with the change of each estimate if one is 1 % larger.
+
+    A parameter is left out if this changes all estimates by less than half a standard error.
+    """
+    rows = dict[str, dict[str, Any]]()
+    errors = {row["key"]: row["standard_error"] for row in estimates}
+    for entry in summary.get("sensitivity", ()):
+        row = rows.setdefault(entry["to"], {"to": entry["to"], "change": entry["change"], "size": 0.0})
+        row[entry["estimate"]] = fixed(entry["per_percent"], decimals_of(errors[entry["estimate"]]))
+        row["size"] = max(row["size"], abs(entry["per_percent"]) / errors[entry["estimate"]])
+    largest = sorted(rows.values(), key=lambda row: -row["size"])
+    return [row for row in largest if row["size"] > NOTABLE_CHANGE]
 
 
 def rounded(value: float, error: float | None) -> str:
@@ -137,6 +163,16 @@ def estimate_in_words(row: Mapping[str, Any]) -> str:
     if row["key"].endswith("mass_kg"):
         return mass_in_words(row["key"], value.removesuffix(" kg")) + bound
     return f"the {axis_label(row['key'])} is {value}{bound}"
+
+
+def change_in_words(held: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> str:
+    """Describe how estimates change if the most influential fixed parameter is off."""
+    change = quantity(held["change"], unit_by_name(held["to"]), 2)
+    units = [UNITS_IN_WORDS.get(row["unit"], f" {row['unit']}") for row in estimates]
+    changes = [
+        f"the {axis_label(row['key'])} by {held[row['key']]}{unit}" for row, unit in zip(estimates, units, strict=True)
+    ]
+    return f"If {held['to']}, which is held fixed, was {change} larger, this would change {join_words(changes)}."
 
 
 def with_labels(combination: str, keys: Sequence[str]) -> str:
