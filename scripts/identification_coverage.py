@@ -1,16 +1,17 @@
 """Identify walkers from synthetic walks and compare errors with the spread of the estimates.
 
 Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles | contact] [CONFIG ...]
-       [--disturbed-by floor | kicks | slope]
+       [--disturbed-by floor | kicks | pushes | slope]
 
 Walks start off the gait, are disturbed on their way, and are measured with noise; `contact` are steps of the contact
-model. The disturbance is a rough floor; random changes of the rates at each heel strike; or a slope that varies
-smoothly along the ramp. Printed for each walker: the number of walks that took all steps and that the model fits, and
-the share without doubt; the share whose 95 % region holds the truth, with its binomial error; and for each parameter
-the mean standard error over the spread of the estimates.
+model. The disturbance is a rough floor; random changes of the rates at each heel strike; random pushes at the hip in
+the middle of each swing; or a slope that varies smoothly along the ramp. Printed for each walker: the number of walks
+that took all steps and that the model fits, and the share without doubt; the share whose 95 % region holds the truth,
+with its binomial error; and for each parameter the mean standard error over the spread of the estimates.
 """
 
 import argparse
+import itertools
 import os
 
 # Matrices are small: threads that share one would wait for each other.
@@ -29,6 +30,7 @@ from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.physics.hybrid.rigid_record import new_observer
+from walkerlab.physics.mechanics.impact import pushed_at_hip
 from walkerlab.physics.mechanics.rigid_model import step_lengths
 from walkerlab.physics.orbits.family_search import CONTACT, RIGID
 from walkerlab.physics.orbits.rigid_map import state_on_section, unit_kicks
@@ -50,35 +52,59 @@ DISTURBANCE, DISTURBANCES = (0.01, 1e-4), {"simplest": (0.002, 5e-5)}
 less."""
 
 
-KICK, RAMP, WAVE = 2e-3, 1e-4, 7.0
+KICK, RAMP, WAVE, PUSH, MIDDLE = 2e-3, 1e-4, 7.0, 5e-4, 0.4
 """Changes of the rates at heel strikes, as a fraction of the rates; largest change of a varying slope's rise per step,
-in leg lengths; steps of its wave."""
+in leg lengths; steps of its wave; pushes, as a fraction of m sqrt(g l), and when in a gait's step they come."""
 
 
 def kicked_walk(walks, z, p, kick, draw):
     """Walk on even ground with random changes of the rates after each heel strike but the first."""
     unit = walks._unit_at(p)
+
+    def kicked(start, step):
+        kicks = unit_kicks(unit, start)
+        return start + (kick * draw.normal(size=len(kicks)) @ kicks if step else 0.0)
+
+    return walk_in_parts(walks, unit, z, lambda start, step: [(0.0, kicked(start, step))])
+
+
+def pushed_walk(walks, z, p, push, draw):
+    """Walk on even ground with a random push at the hip, along the slope, in the middle of each swing."""
+    unit = walks._unit_at(p)
+
+    def halves(start, _):
+        time = np.array([MIDDLE * walks.step(z, p).period_s / unit.units.time])
+        observer = new_observer(time, start.size)
+        walks._exact.walk(unit.section, z, 1, False, start=start, observer=observer)
+        return [(0.0, start), (time[0], pushed_at_hip(unit.walker, observer.states[0], push * draw.normal()))]
+
+    return walk_in_parts(walks, unit, z, halves)
+
+
+def walk_in_parts(walks, unit, z, parts_of):
+    """Walk on even ground; `parts_of` returns when each part of a step begins, and its state, from state and number."""
     start, periods, lengths, parts = np.array(state_on_section(unit.walker, z)), [], [], []
     for step in range(STEPS):
-        if step:
-            kicks = unit_kicks(unit, start)
-            start = start + kick * draw.normal(size=len(kicks)) @ kicks
-        walk = walks._exact.walk(unit.section, z, 1, False, start=start)
+        own = parts_of(start, step)
+        begun, last = own[-1]
+        walk = walks._exact.walk(unit.section, z, 1, False, start=last)
         if walk.outcome is not Outcome.WALKED:
             return None
-        parts.append(start)
-        periods.append(walk.time[0] * unit.units.time)
-        lengths.append(step_lengths(unit.walker, start[None], walk.strikes.before)[0] * unit.units.length)
+        parts.append([*own, (begun + walk.time[0], None)])
+        periods.append((begun + walk.time[0]) * unit.units.time)
+        first = own[0][1][None]
+        lengths.append(step_lengths(unit.walker, first, walk.strikes.before)[0] * unit.units.length)
         start = walk.strikes.after[0]
     touches = np.append(0.0, np.cumsum(periods))
 
     def sampled(times):
         angles = []
-        for step, start in enumerate(parts):
-            own = times[(times >= touches[step]) & (times < touches[step + 1])] - touches[step]
-            observer = new_observer(own / unit.units.time, start.size)
-            walks._exact.walk(unit.section, z, 1, False, start=start, observer=observer)
-            angles.append(observer.states[:, [0, 1] if step % 2 == 0 else [1, 0]])
+        for step, own in enumerate(parts):
+            since = (times[(times >= touches[step]) & (times < touches[step + 1])] - touches[step]) / unit.units.time
+            for (begin, state), (end, _) in itertools.pairwise(own):
+                observer = new_observer(since[(since >= begin) & (since < end)] - begin, state.size)
+                walks._exact.walk(unit.section, z, 1, False, start=state, observer=observer)
+                angles.append(observer.states[:, [0, 1] if step % 2 == 0 else [1, 0]])
         return np.concatenate(angles)
 
     return np.array(periods), np.array(lengths), sampled
@@ -123,6 +149,8 @@ class Truth:
         p, relative = tuple(self.values), self.roughness / DISTURBANCE[1]
         if self.disturbed_by == "kicks":
             return kicked_walk(self.walks, z, p, KICK * relative, draw)
+        if self.disturbed_by == "pushes":
+            return pushed_walk(self.walks, z, p, PUSH * relative, draw)
         if self.disturbed_by == "slope":
             heights = (
                 RAMP
@@ -198,6 +226,6 @@ if __name__ == "__main__":
     parser.add_argument("walks", type=int, nargs="?", default=1000)
     parser.add_argument("level", nargs="?", default="steps", choices=("steps", "angles", "contact"))
     parser.add_argument("configs", nargs="*")
-    parser.add_argument("--disturbed-by", default="floor", choices=("floor", "kicks", "slope"))
+    parser.add_argument("--disturbed-by", default="floor", choices=("floor", "kicks", "pushes", "slope"))
     options = parser.parse_args()
     main(options.walks, options.level, options.configs or WALKERS, options.disturbed_by)
