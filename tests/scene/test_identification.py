@@ -45,6 +45,23 @@ def test_regions_hold_the_truth_and_errors_are_as_large_as_the_spread():
     assert np.all((ratio > 0.4) & (ratio < 3.0))
 
 
+def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
+    """By least squares they are a quarter too small."""
+    paper = truth("steps", "paper", CAMPAIGN["WALKERS"]["paper"])
+    measured = [paper.identify(*paper.walk(seed)).measured_radius for seed in range(8)]
+    plain, corrected, errors = np.array([(each.plain, each.value, each.standard_error) for each in measured]).T
+    own = paper.gait["spectral_radius"]
+    assert own - plain.mean() > 2.0 * plain.std(ddof=1) / np.sqrt(len(plain))
+    assert abs(corrected.mean() - own) < 2.5 * errors.mean() / np.sqrt(len(plain))
+    assert 0.5 < errors.mean() / corrected.std(ddof=1) < 2.0
+
+
+def test_few_steps_have_no_multiplier_of_their_own():
+    measured, _ = truth().walk(0)
+    few = replace(measured, periods_s=measured.periods_s[:7], lengths_m=measured.lengths_m[:7])
+    assert identify(few).measured_radius is None
+
+
 def test_angles_determine_the_hip_mass():
     keys = ("walker.hip_mass_kg", *KEYS)
     own = truth("angles", "slope-3deg", keys)

@@ -17,6 +17,7 @@ from walkerlab.labels import unit_by_name, with_unit
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
+from walkerlab.physics.estimation.measured_multipliers import measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import estimate_noise, evaluate, reduce
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
@@ -234,6 +235,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         reasons = (*verdict[1], *map(pull_in_words, strong(pulls)), *better_with(fixed, best, len(keys)))
         verdict = ("fits-but" if reasons else "fits"), reasons
     dof = max(1, best.data.residuals.size - best.u.size)
+    gait = gait_with_errors(best, information.covariance, subject.units if question.robustness else None)
     walk = forecast.predict(best.u, best.heights_m)
     assert walk is not None, "a fitted walk takes all steps"
     return Identification(
@@ -246,13 +248,14 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         measurement_noise(steps) | measurement_noise(best),
         rms_residuals(steps) | rms_residuals(best),
         best.evaluation.squares / dof,
-        gait_with_errors(best, information.covariance, subject.units if question.robustness else None),
+        gait,
         (ModelFit(subject.model, float(best.evaluation.likelihood), *verdict),),
         step_tables(steps),
         best,
         walk.walk,
         nuisances_with_errors(best, question.nuisance),
         tuple(sensitivities(fixed, best, estimates, subject.config)),
+        measure_radius(steps, gait["spectral_radius"].value) if gait else None,
     )
 
 

@@ -80,6 +80,15 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
+class MeasuredRadius:
+    """Spectral radius from the steps alone."""
+
+    plain: float  # by least squares, as in the literature
+    value: float  # corrected for the bias that noise causes
+    standard_error: float
+
+
+@dataclass(frozen=True)
 class ModelFit:
     model: str
     log_likelihood: float | None
@@ -119,6 +128,7 @@ class Identification:
     walk: DisturbedWalk = field(repr=False)  # walk over the most probable floor
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
     sensitivities: tuple[Sensitivity, ...]  # to parameters that are not estimated
+    measured_radius: MeasuredRadius | None  # None for few steps, or without a gait
 
     @property
     def verdict(self) -> ModelFit:

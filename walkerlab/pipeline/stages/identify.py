@@ -161,6 +161,7 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
         "rms_residual": dict(result.rms_residual),
         "chi_square_per_dof": result.chi_square_per_dof,
         "gait": {name: asdict(value) for name, value in result.gait.items()},
+        "measured_spectral_radius": None if result.measured_radius is None else asdict(result.measured_radius),
         "models": [{**asdict(model), "reason": "; ".join(model.reasons)} for model in result.models],
         "reference_masses_kg": reference_masses(config, [estimate.key for estimate in result.estimates], result.model),
     }

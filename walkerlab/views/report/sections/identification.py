@@ -77,10 +77,12 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
     beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]), is_usable(verdict))
     quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary), is_usable(verdict))
+    measured = summary.get("measured_spectral_radius")
     held = next(iter(sensitive_rows(summary, known)), None)
     return [
         *words.parts("identify.findings", summary, verdict, *parameters, *beside),
         *words.parts("identify.quality", summary, verdict, *quality),
+        *([radius_in_words(measured)] if measured and is_usable(verdict) else []),
         *([change_in_words(held, known)] if held and is_usable(verdict) else []),
     ]
 
@@ -207,6 +209,14 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
         if name in gait
     ]
     return f"The identified gait has {join_words(parts)}" if parts else ""
+
+
+def radius_in_words(radius: Mapping[str, float]) -> str:
+    value = with_error(radius["value"], radius["standard_error"], "1")
+    plain = fixed(radius["plain"], decimals_of(radius["standard_error"]))
+    return (
+        f"The steps alone, without a model, have a largest multiplier of {value} ({plain} before correction for noise)."
+    )
 
 
 def noise_in_words(summary: Mapping[str, Any]) -> str:

@@ -1,0 +1,51 @@
+"""Largest multiplier of a walk from its steps alone, corrected for noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from walkerlab.physics.estimation.fit import Fitted
+from walkerlab.physics.estimation.result import MeasuredRadius
+from walkerlab.physics.solvers.system import Floats
+
+FEWEST_STEPS = 8
+REPLICATES = 400
+
+
+def spectral_radius(steps: Floats) -> Floats:
+    """Return the largest multiplier (...,) of the linear map that takes each step's values to the next step's.
+
+    The map is that of least squares, as in the literature, so it is biased by noise.
+
+    steps  (..., steps, quantities)
+    """
+    before, after = steps[..., :-1, :], steps[..., 1:, :]
+    before, after = (each - each.mean(axis=-2, keepdims=True) for each in (before, after))
+    scale = np.sqrt(np.mean(before**2, axis=-2, keepdims=True))
+    before, after = before / scale, after / scale
+    products = np.swapaxes(before, -1, -2) @ before
+    step = np.linalg.pinv(products, hermitian=True) @ np.swapaxes(before, -1, -2) @ after
+    return np.asarray(np.abs(np.linalg.eigvals(step)).max(axis=-1))
+
+
+def measure_radius(fitted: Fitted, own: float) -> MeasuredRadius | None:
+    """Measure the spectral radius from periods, lengths and angles of successive steps; None for fewer than 8 steps.
+
+    Bias and standard error are those of the same estimate for walks of the fitted model, with its disturbances and its
+    noise, whose spectral radius is known.
+
+    own  spectral radius of the fitted walker
+    """
+    forecast, rng = fitted.forecast, np.random.default_rng(0)
+    count, channels = forecast.measured.count, len(forecast.channels)
+    if count < FEWEST_STEPS or not channels:
+        return None
+
+    def by_step(values: Floats) -> Floats:
+        return np.swapaxes(values[..., : count * channels].reshape(*values.shape[:-1], channels, count), -1, -2)
+
+    spread, noise = fitted.data.spread(fitted.noise), fitted.noise.measurement[forecast.quantity]
+    disturbed = (rng.normal(size=(REPLICATES, spread.size)) * spread) @ fitted.data.G.T
+    replicates = fitted.predicted.values + disturbed + rng.normal(size=(REPLICATES, noise.size)) * noise
+    plain, simulated = float(spectral_radius(by_step(forecast.values))), spectral_radius(by_step(replicates))
+    return MeasuredRadius(plain, plain + own - float(simulated.mean()), float(simulated.std(ddof=1)))
