@@ -272,6 +272,21 @@ class Motion:
         return self.of(i)[2] - (self.of(j)[2] if j else 0.0)
 
 
+class Sensor:
+    """A SENSOR that waits until its expression is no longer below its value."""
+
+    def __init__(self, statement: Statement) -> None:
+        assert "GE" in statement.flags
+        assert ("HALT" in statement.flags) != ("RETURN" in statement.flags)
+        assert 0.0 < statement.numbers("ERROR")[0] <= 1e-3
+        self.expression, (self.value,) = compile_expression(statement.arguments["FUNCTION"]), statement.numbers("VALUE")
+        self.halts, self.label = "HALT" in statement.flags, statement.label
+
+
+class HaltError(Exception):
+    """A sensor halted the run; the message says which, and when."""
+
+
 @dataclass
 class Dataset:
     """A planar model of ADAMS in its own units (lengths, kg, s), as its text defines it."""
@@ -293,6 +308,15 @@ class Dataset:
         ]
         self.reactions = [s.marker("JFLOAT") for s in self.of("GFORCE")]
         self.single = [(s, compile_expression(s.arguments["FUNCTION"])) for s in self.of("SFORCE")]
+        self.sensors = {s.id: Sensor(s) for s in self.of("SENSOR")}
+        self.inactive: set[tuple[str, int]] = set()
+        joints = {s.id: s for s in self.of("JOINT")}
+        self.motions = {}
+        for s in self.of("MOTION"):
+            assert {"ROTATION", "VELOCITY"} <= set(s.flags)
+            assert float(s.arguments["FUNCTION"]) == 0.0
+            joint = joints[s.marker("JOINT")]
+            self.motions[s.id] = self.relative_turn(joint.marker("I"), joint.marker("J"))
         for s in self.of("GFORCE"):
             assert all(float(s.arguments[key]) == 0.0 for key in ("FZ", "TX", "TY"))
         (units,) = self.of("UNITS")
@@ -398,6 +422,8 @@ class Dataset:
             assert self.markers[reaction].floating
             assert self.markers[reaction].part == self.ground
         for statement, expression in self.single:
+            if ("SFORCE", statement.id) in self.inactive:
+                continue
             value = self.metre * eval(expression, environment)
             assert "ROTATIONAL" in statement.flags, "translational forces along z do not occur in planar models"
             self._apply(out, motion, statement.marker("I"), 0.0, 0.0, value)
@@ -441,6 +467,8 @@ class Dataset:
     def constraints(self, q, u):
         """Rows of the constraints' Jacobian, and minus their derivative times the rates."""
         motion, (pins, steady) = Motion(self, q, u), self.joints
+        held = [row for identity, row in self.motions.items() if ("MOTION", identity) not in self.inactive]
+        steady = np.vstack((steady, *held))
         g, bias = steady.copy(), np.zeros(len(steady))
         for row, i, j in pins:
             for marker, sign in ((i, 1.0), (j, -1.0)):
@@ -474,6 +502,49 @@ class Dataset:
 
     def degrees_of_freedom(self) -> int:
         return 3 * len(self.parts) - len(self.constraints(*self.start)[0])
+
+    def run(self, commands: str, rtol=1e-9, atol=1e-9, method="LSODA") -> list[tuple[str, float]]:
+        """Run a command file (.acf) from the initial conditions; return the sensors that ended simulations, and when.
+
+        Raises HaltError if a sensor halts the run.
+        """
+        t, y, triggered = 0.0, np.concatenate(self.start), []
+        for line in commands.splitlines()[2:]:
+            words = [word.strip() for word in line.split(",")]
+            if words[0] in ("activate/sensor", "activate/motion", "activate/sforce"):
+                self.inactive.remove((words[0].partition("/")[2].upper(), int(words[1].partition("=")[2])))
+            elif words[0].startswith("deactivate/"):
+                self.inactive.add((words[0].partition("/")[2].upper(), int(words[1].partition("=")[2])))
+            elif words[0] == "simulate/dynamic":
+                sensor, t, y = self.simulate(t, y, float(words[1].partition("=")[2]), (rtol, atol, method))
+                triggered += [(sensor.label, t)] if sensor else []
+            else:
+                assert words[0] in ("integrator/hht", "stop"), line
+        return triggered
+
+    def simulate(self, t, y, end_s, how):
+        """Integrate until a sensor triggers; return it, or None at the end, with time and state."""
+        active = [sensor for identity, sensor in self.sensors.items() if ("SENSOR", identity) not in self.inactive]
+        rtol, atol, method = how
+
+        def event_of(sensor):
+            def event(t, y):
+                return self.value(sensor.expression, t, y[: y.size // 2], y[y.size // 2 :]) - sensor.value
+
+            event.terminal, event.direction = True, 1.0
+            return event
+
+        events = [event_of(sensor) for sensor in active]
+        true = [sensor for sensor, event in zip(active, events, strict=True) if event(t, y) >= 0.0]
+        if not true:
+            solution = solve_ivp(self.rate, (t, end_s), y, method, events=events, rtol=rtol, atol=atol, first_step=1e-7)
+            assert solution.success
+            t, y = solution.t[-1], solution.y[:, -1]
+            true = [sensor for sensor, times in zip(active, solution.t_events, strict=True) if times.size]
+        for sensor in true:
+            if sensor.halts:
+                raise HaltError(f"{sensor.label} at {t:.6f} s")
+        return (true[0] if true else None), t, y
 
     def integrate(self, end_s: float, rtol=1e-10, atol=1e-10, events=(), method="Radau", first_step=1e-6):
         """Integrate from the initial conditions; `events` are functions of (t, q, u)."""

@@ -4,10 +4,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from adams_dataset import Dataset
 
 from walkerlab.api import in_memory
 from walkerlab.config.loader import load
-from walkerlab.exchange.export import export_model
+from walkerlab.exchange.export import export_model, with_stops
 from walkerlab.exchange.exported import prepare_export
 
 PADS = "contact.terrain=checkerboard"
@@ -73,6 +74,35 @@ def random_walker(seed):
         ("paper", about("walker.hip.torque_N_m", 0.1), about("walker.leg_inertia_kg_m2", 0.1), *pads),
     )  # fmt: skip
     return kinds[seed % len(kinds)]
+
+
+def random_kneed_walker(seed, strides):
+    """Name and settings of a kneed walker drawn at random, one of each kind in turn."""
+    draw = np.random.default_rng(seed)
+
+    def about(key, value, spread=0.03):
+        return f"{key}={value * draw.uniform(1.0 - spread, 1.0 + spread):.6g}"
+
+    shared = (about("walker.hip_mass_kg", 0.5), about("walker.thigh.mass_kg", 0.5), f"strides={strides}")
+    kinds = (
+        ("kneed", *shared),
+        ("kneed-round-feet", about("walker.foot_radius_m", 0.2), *shared),
+        ("kneed-level", about("push_off.impulse_N_s", 0.2, 0.01), f"strides={strides}"),
+        ("kneed-round-feet", "walker.knee.lock=compliant", about("walker.knee.stop_damping", 5.0), *shared),
+        ("kneed-round-feet", PADS, "walker.knee.release=touch", *shared),
+    )
+    return kinds[seed % len(kinds)]
+
+
+def run_kneed(name, *sets):
+    """Run the ADAMS files of a kneed walker; return times of touches and of locks, and our walk."""
+    dataset, commands = files_of("adm", "functions", name, *sets).files.values()
+    config, length, state = with_gait(name, *sets)
+    events = Dataset(dataset).run(commands)
+    touches, locks = (
+        np.array([time for sensor, time in events if sensor.endswith(ending)]) for ending in ("touches", "straight")
+    )
+    return touches, locks, prepare_export(with_stops(config), length, state).walk
 
 
 def touches_of(dataset, export, count):

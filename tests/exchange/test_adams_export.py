@@ -4,8 +4,18 @@ import re
 
 import numpy as np
 import pytest
-from adams_dataset import Dataset, rotation
-from exported_walkers import PADS, PARTS, export_of, files_of, random_walker, touches_of, with_gait
+from adams_dataset import Dataset, HaltError, rotation
+from exported_walkers import (
+    PADS,
+    PARTS,
+    export_of,
+    files_of,
+    random_kneed_walker,
+    random_walker,
+    run_kneed,
+    touches_of,
+    with_gait,
+)
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.export import export_model
@@ -13,6 +23,7 @@ from walkerlab.physics.ground.external import feet_and_forces
 from walkerlab.physics.ground.walker import new_progress, on_ground
 
 MM = 1000.0
+STOPS = ((), ("walker.knee.lock=compliant",))
 WALKERS = ["compass", "round-feet", "torso", "push-off", "hip-torque"]
 
 
@@ -120,6 +131,47 @@ def test_the_model_as_written_walks_our_walk(seed):
     assert touches_of(dataset, export, 3)[:3] == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize("seed", [0, 2], ids=["ideal lock", "push-off"])
+def test_commands_turn_the_knees_at_sensors_and_the_model_walks_our_walk(seed):
+    """A script runs ten walkers of five kinds for three strides."""
+    touches, locks, walk = run_kneed(*random_kneed_walker(seed, 1))
+    assert touches == pytest.approx(walk.touch_time_s, abs=1e-6)
+    assert locks == pytest.approx(walk.knee_strike_time_s, abs=1e-6)
+
+
+@pytest.mark.parametrize(("slower", "sensor"), [(0.5, "fell"), (0.8, "leg_2_on_bent_knee")])
+def test_a_run_halts_at_the_sensor_that_says_why_the_walk_ends(slower, sensor):
+    dataset, commands = files_of("adm", "functions", "kneed", "strides=1").files.values()
+    model = Dataset(dataset)
+    q, u = model.start
+    model.start = q, slower * u
+    with pytest.raises(HaltError, match=f"^{sensor} at"):
+        model.run(commands)
+
+
+def test_an_ideal_lock_becomes_a_stop_because_adams_changes_velocities_at_activation():
+    ideal, compliant = (files_of("adm", "functions", "kneed", "strides=1", *sets) for sets in STOPS)
+    assert any("plastic impact" in item for item in ideal.left_out)
+    assert not any("plastic impact" in item for item in compliant.left_out)
+    ideal_text, compliant_text = (
+        re.sub(r"(?m)^! .*\n", "", next(iter(each.files.values()))) for each in (ideal, compliant)
+    )
+    assert ideal_text == compliant_text
+
+
+def test_view_script_has_the_commands_of_the_command_file():
+    _, commands = files_of("adm", "functions", "kneed", "strides=1").files.values()
+    text = files_of("cmd", "functions", "kneed", "strides=1").files["kneed.cmd"]
+    script = re.sub(r"\s*&\n\s*", " ", text).splitlines()[-1]
+    quoted = re.findall(r'"(.+?)"', script)
+    assert quoted == [line for line in commands.splitlines()[3:] if line != "stop"]
+    dataset = dataset_of("functions", "kneed", "strides=1")
+    in_order = re.findall(r"sensor_name = \.kneed\.(\w+)\s*&\s*adams_id = (\d+)", text)
+    assert {int(number): name for name, number in in_order} == {
+        number: sensor.label for number, sensor in dataset.sensors.items()
+    }
+
+
 def test_no_constraint_is_redundant():
     assert dataset_of("functions", "paper").degrees_of_freedom() == 4
     torso = dataset_of("functions", "torso", PADS)
@@ -207,7 +259,6 @@ def test_bodies_keep_readable_names(tmp_path):
         ("contact", ("paper", "contact.dynamic_friction=0.9"), "static friction above dynamic", "functions"),
         ("contact", ("paper", "contact.damping=0"), "damping above 0", "functions"),
         ("functions", ("round-feet",), "only after mid-swing", "checkerboard"),
-        ("functions", ("kneed", "strides=1"), "Knees that lock", "straight legs"),
         ("functions", ("simplest",), "next to no mass", "mass"),
         ("functions", ("paper", "ground.roughness_m=0.0005"), "Uneven ground", "--law contact"),
     ],

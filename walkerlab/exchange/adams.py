@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from walkerlab.exchange.adams_model import GROUND, ORIGIN, OUTPUT_S, REFERENCE, AdamsContact, AdamsModel, values
-from walkerlab.exchange.exported import Exported, finite
+from walkerlab.exchange.adams_model import GROUND, ORIGIN, REFERENCE, AdamsContact, AdamsModel, values
+from walkerlab.exchange.exported import finite
 
 MAX_STEP_S, ERROR = 1e-3, 1e-6
 
@@ -16,13 +16,7 @@ def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
 
 def statements(model: AdamsModel) -> Iterator[str]:
     """Yield the lines of all statements; objects of each kind are numbered from 1, and part 1 is the ground."""
-    primitives = [name for name, joint in model.joints.items() if joint.kind == "INLINE"]
-    joints = [name for name in model.joints if name not in primitives]
-    kinds = (
-        model.markers, [*model.shapes, *model.outlines], joints, primitives, model.couplers, model.contacts,
-        model.variables, model.forces, model.torques,
-    )  # fmt: skip
-    ids = {name: number for kind in kinds for number, name in enumerate(kind, start=1)}
+    ids = model.numbers
 
     def expression(text: str) -> str:
         return REFERENCE.sub(lambda match: str(ids[match[1]]), text)
@@ -36,7 +30,7 @@ def statements(model: AdamsModel) -> Iterator[str]:
                 own = marker_name.rpartition(".")[2]
                 yield from named(own, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
     for name, joint in model.joints.items():
-        head = f"{'JPRIM' if name in primitives else 'JOINT'}/{ids[name]}"
+        head = f"{'JPRIM' if joint.kind == 'INLINE' else 'JOINT'}/{ids[name]}"
         yield from named(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
     for name, weights in model.couplers.items():
         coupled, kinds_of_joint = ", ".join(str(ids[joint]) for joint in weights), ":".join("R" for _ in weights)
@@ -63,6 +57,14 @@ def statements(model: AdamsModel) -> Iterator[str]:
     for name, torque in model.torques.items():
         ends = f"I = {ids[torque.i]}", f"J = {ids[torque.j]}"
         yield from named(name, f"SFORCE/{ids[name]}", "ROTATIONAL", *ends, f"FUNCTION = {expression(torque.function)}")
+    for name, held in model.motions.items():
+        how = f"JOINT = {ids[held]}", "ROTATION", "VELOCITY", "FUNCTION = 0"
+        yield from named(name, f"MOTION/{ids[name]}", *how)
+    for name, sensor in model.sensors.items():
+        yield from named(
+            name, f"SENSOR/{ids[name]}", "GE", "VALUE = 0", f"ERROR = {finite(sensor.error)}",
+            "HALT" if sensor.halts else "RETURN", f"FUNCTION = {expression(sensor.function)}",
+        )  # fmt: skip
     along, up = model.gravity
     yield from statement("ACCGRAV/", f"IGRAV = {finite(along)}", f"JGRAV = {finite(up)}", "KGRAV = 0")
     for number, (name, components) in enumerate(model.requests.items(), start=1):
@@ -113,12 +115,11 @@ def contact_arguments(contact: AdamsContact, ids: Mapping[str, int]) -> Iterator
     yield from (f"{name.upper()} = {finite(value)}" for name, value in contact.friction.items())
 
 
-def command_text(export: Exported, dataset: str) -> str:
-    """Write the commands that simulate walkerlab's walk to its end; a pinned foot is released at the first touch."""
-    lines = [dataset, dataset.removesuffix(".adm")]
-    lines.append(f"integrator/hht, error = {finite(ERROR)}, hmax = {finite(MAX_STEP_S)}")
-    if export.pinned and export.touches_s:
-        first = finite(export.touches_s[0])
-        lines += [f"simulate/dynamic, end = {first}, dtout = {finite(OUTPUT_S)}", "deactivate/jprim, id = 1"]
-    lines += [f"simulate/dynamic, end = {finite(export.end_s)}, dtout = {finite(OUTPUT_S)}", "stop"]
-    return "\n".join([*lines, ""])
+def command_text(model: AdamsModel, dataset: str, end_s: float, pinned_until_s: float | None) -> str:
+    """Write the commands that simulate walkerlab's walk, as `AdamsModel.commands` has them."""
+    head = [
+        dataset,
+        dataset.removesuffix(".adm"),
+        f"integrator/hht, error = {finite(ERROR)}, hmax = {finite(MAX_STEP_S)}",
+    ]
+    return "\n".join([*head, *model.commands(end_s, pinned_until_s), "stop", ""])

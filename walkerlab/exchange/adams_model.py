@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.exported import Exported, finite
 from walkerlab.physics.ground.friction import Coulomb, Frictionless
+from walkerlab.physics.ground.knees import FLEXED
 from walkerlab.physics.ground.normal_force import NormalLaw
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.walkers import TORSO
+from walkerlab.scene.contact import knee_rules
 
 MM = 1000.0
 GROUND, ORIGIN, BELOW = "ground", "ground.origin", "ground.below"
@@ -32,6 +36,12 @@ REFERENCE = re.compile(r"\{([\w.]+)\}")
 """Name of a marker or variable in an expression."""
 OUTPUT_S = 1e-3
 """Time between the outputs of a simulation."""
+SLOWER = 1.05
+"""Longest simulation between events, over the duration of walkerlab's walk."""
+SHORTEST_HIP = 0.5
+"""Height of the hip, as a fraction of the leg, below which a walker has fallen."""
+ERROR_RAD, ERROR_MM = 1e-6, 1e-6
+"""Errors to which sensors are located; ADAMS's default is 1e-3 in the unit of the expression."""
 Place = tuple[float, float, float]
 
 
@@ -105,6 +115,24 @@ class Torque:
     function: str
 
 
+@dataclass(frozen=True)
+class Sensor:
+    """Condition that ends a simulation: an expression reaches zero from below; `halts` stops the whole run."""
+
+    function: str
+    error: float
+    halts: bool = False
+
+
+@dataclass(frozen=True)
+class Event:
+    """A sensor that a run waits for, and the objects that are activated and deactivated when it triggers."""
+
+    sensor: str
+    activated: tuple[str, ...] = ()
+    deactivated: tuple[str, ...] = ()
+
+
 @dataclass
 class AdamsModel:
     """All objects of a model by name, in the order in which they are written."""
@@ -121,7 +149,47 @@ class AdamsModel:
     variables: dict[str, str] = field(default_factory=dict)
     forces: dict[str, Force] = field(default_factory=dict)
     torques: dict[str, Torque] = field(default_factory=dict)
+    motions: dict[str, str] = field(default_factory=dict)  # joints whose rate is held at zero
+    sensors: dict[str, Sensor] = field(default_factory=dict)
     requests: dict[str, dict[str, str]] = field(default_factory=dict)
+    inactive: tuple[str, ...] = ()  # objects that are deactivated at the start
+    events: list[Event] = field(default_factory=list)  # in the order of walkerlab's walk
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """Number of each object within its kind, from 1."""
+        primitives = [name for name, joint in self.joints.items() if joint.kind == "INLINE"]
+        joints = [name for name in self.joints if name not in primitives]
+        kinds = (
+            self.markers, [*self.shapes, *self.outlines], joints, primitives, self.couplers, self.contacts,
+            self.variables, self.forces, self.torques, self.motions, self.sensors,
+        )  # fmt: skip
+        return {name: number for kind in kinds for number, name in enumerate(kind, start=1)}
+
+    def commands(self, end_s: float, pinned_until_s: float | None) -> Iterator[str]:
+        """Yield the solver commands that simulate the walk, also for a script of Adams View.
+
+        end_s           end of walkerlab's walk
+        pinned_until_s  time at which a pinned stance foot is released; None if no foot is pinned
+        """
+        run = f"simulate/dynamic, end = {{}}, dtout = {finite(OUTPUT_S)}"
+        if pinned_until_s is not None:
+            yield from (run.format(finite(pinned_until_s)), self.switch("deactivate", "pin"))
+        yield from (self.switch("deactivate", name) for name in self.inactive)
+        for event in self.events:
+            yield self.switch("activate", event.sensor)
+            # a slower walk still reaches its last event
+            yield run.format(finite(SLOWER * end_s))
+            yield from (self.switch("deactivate", name) for name in (event.sensor, *event.deactivated))
+            yield from (self.switch("activate", name) for name in event.activated)
+        if not self.events:
+            yield run.format(finite(end_s))
+
+    def switch(self, word: str, name: str) -> str:
+        """Return the command that activates or deactivates an object."""
+        kinds = (("motion", self.motions), ("sensor", self.sensors), ("sforce", self.torques), ("jprim", self.joints))
+        kind = next(kind for kind, objects in kinds if name in objects)
+        return f"{word}/{kind}, id = {self.numbers[name]}"
 
     def shape_name(self, shape: str) -> str:
         """Prefix a shape's name with the name of its part."""
@@ -133,11 +201,6 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
 
     Raises ConfigError for a contact law, ground or coupling that cannot be expressed.
     """
-    if export.knee_links:
-        raise ConfigError(
-            "Knees that lock cannot be exported to ADAMS.",
-            "Export to MuJoCo, or choose straight legs, such as paper, round-feet or torso.",
-        )
     planar = export.model
     gravity = MM * planar.gravity_along, -MM * planar.gravity_down
     model = AdamsModel(export.model_name, gravity, markers={ORIGIN: Marker(GROUND)})
@@ -150,6 +213,8 @@ def adams_model(export: Exported, law: str) -> AdamsModel:
     add_push_offs(model, export)
     add_forces(model, export)
     add_hip(model, export)
+    if export.knee_links:
+        add_knees(model, export)
     add_requests(model, export, law)
     return model
 
@@ -262,13 +327,14 @@ class FootTerms:
     def height(self) -> str:
         return f"DY({self.place()})-{finite(self.radius)}" if self.radius else f"DY({self.place()})"
 
-    def where_carried(self, expression: str) -> str:
-        """Restrict an expression to the pads of the foot's lane; it is zero over the gaps between them."""
+    def where_carried(self, expression: str, elsewhere: str = "0") -> str:
+        """Restrict an expression to the pads of the foot's lane; over the gaps between them it is `elsewhere`."""
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
         pitch, lane = MM * terrain.pitch, round(terrain.lanes[self.foot] / terrain.pitch)
-        return f"IF({'-' if lane % 2 else ''}COS(PI*DX({self.place()})/{finite(pitch)}):0,0,{expression})"
+        wave = f"{'-' if lane % 2 else ''}COS(PI*DX({self.place()})/{finite(pitch)})"
+        return f"IF({wave}:{elsewhere},{elsewhere},{expression})"
 
 
 def add_ground(model: AdamsModel, export: Exported) -> None:
@@ -405,6 +471,55 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
         terms.append(f"{MM * hip.torque_N_m:+.17g}{signs}")
     if terms:
         model.torques["hip_torque"] = Torque(i, j, "".join(terms).removeprefix("+"))
+
+
+def add_knees(model: AdamsModel, export: Exported) -> None:
+    """Add stops and locks of the knees, and the events of walkerlab's walk that switch them.
+
+    An ADAMS function has no memory, and a command file no branches. So the run waits for one sensor after the other, in
+    the order of walkerlab's walk; other sensors halt it if the walker falls or comes down on a bent knee.
+    """
+    law = knee_rules(export.config.walker).stop
+    assert isinstance(law, NormalLaw), "the export has a compliant stop"
+    stop = ",".join(finite(value) for value in (1.0, MM * law.stiffness, *law[1:2], MM * law.damping, law[3]))
+    for number, leg in enumerate(LEGS):
+        shank, foot, other = export.names[export.knee_links[number]], FootTerms(export, number), LEGS[1 - number]
+        i, j = f"{shank}.hinge", model.joints[f"hinge_of_{shank}"].j
+        angle, rate = f"AZ({{{i}}},{{{j}}})", f"WZ({{{i}}},{{{j}}},{{{j}}})"
+        model.torques[f"stop_{number + 1}"] = Torque(i, j, f"-IMPACT(1-{angle},-{rate},{stop})")
+        model.motions[f"lock_{number + 1}"] = f"hinge_of_{shank}"
+        place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
+        down = foot.where_carried(f"-({foot.height})", elsewhere="-1")
+        sinking = f"VY({foot.motion})"
+        if f"{other}_pulses" in model.variables:
+            # the trailing knee stays locked during the push-off
+            sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
+        model.sensors |= {
+            f"{leg}_bent": Sensor(f"-{finite(FLEXED)}-{angle}", ERROR_RAD),
+            f"{leg}_straight": Sensor(f"IF({angle}:-1,-1,-{rate})", ERROR_RAD),
+            f"{leg}_touches": Sensor(down, ERROR_MM),
+            f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM),
+            f"{leg}_on_bent_knee": Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM, halts=True),
+        }
+    hip, lowest = f"{{{export.names[0]}.hinge}}", SHORTEST_HIP * MM * export.config.walker.leg_length_m
+    model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
+    model.inactive = ("stop_1", "stop_2", "lock_1", *(name for name in model.sensors if name != "fell"))
+    for step in range(export.walk.steps):
+        model.events += step_events(export, step % 2)
+
+
+def step_events(export: Exported, swing: int) -> Iterator[Event]:
+    """Yield the events of a step in which a leg swings: its knee bends and locks, its foot lands and sinks in."""
+    leg, number, trailing = LEGS[swing], swing + 1, 2 - swing
+    on_bent_knee = f"{leg}_on_bent_knee"
+    yield Event(f"{leg}_bent", (f"stop_{number}", on_bent_knee))
+    yield Event(f"{leg}_straight", (f"lock_{number}",), (f"stop_{number}", on_bent_knee))
+    released = (f"lock_{trailing}",)
+    if knee_rules(export.config.walker).release_at_touch and not export.config.push_off.impulse_N_s:
+        yield Event(f"{leg}_touches", (), released)
+    else:
+        yield Event(f"{leg}_touches")
+        yield Event(f"{leg}_sinks_no_longer", (), released)
 
 
 def add_requests(model: AdamsModel, export: Exported, law: str) -> None:

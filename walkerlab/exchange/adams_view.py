@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from walkerlab.exchange.adams_model import GROUND, ORIGIN, OUTPUT_S, REFERENCE, AdamsModel, values
+from walkerlab.exchange.adams_model import GROUND, ORIGIN, REFERENCE, AdamsModel, values
 from walkerlab.exchange.exported import finite
 
 Naming = Callable[[str], str]
@@ -20,7 +20,9 @@ def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until
     pinned_until_s  time (s) at which to remove the pin at the first stance foot; None if there is no pin
     """
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
-    lines += [line for each in (*building(model), script(model, end_s, pinned_until_s)) for line in each]
+    commands = ", ".join(map(quoted, model.commands(end_s, pinned_until_s)))
+    script = command("simulation script create", sim_script_name=f".{model.name}.walk", solver_commands=commands)
+    lines += [line for each in (*building(model), script) for line in each]
     return "\n".join([*lines, ""])
 
 
@@ -69,8 +71,19 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
     for name, torque in model.torques.items():
         yield command(
             "force create direct single_component_force", single_component_force_name=full(name),
-            type_of_freedom="rotational", i_marker_name=full(torque.i), j_marker_name=full(torque.j), action_only="off",
-            function=quoted(""),
+            adams_id=str(model.numbers[name]), type_of_freedom="rotational", i_marker_name=full(torque.i),
+            j_marker_name=full(torque.j), action_only="off", function=quoted(""),
+        )  # fmt: skip
+    for name, held in model.motions.items():
+        yield command(
+            "constraint create motion_generator", motion_name=full(name), adams_id=str(model.numbers[name]),
+            type_of_freedom="rotational", joint_name=full(held), time_derivative="velocity", function=quoted("0"),
+        )  # fmt: skip
+    for name, sensor in model.sensors.items():
+        ending = {"halt": "on", "return": "off"} if sensor.halts else {"halt": "off", "return": "on"}
+        yield command(
+            "executive_control create sensor", sensor_name=full(name), adams_id=str(model.numbers[name]), compare="ge",
+            value="0", error=finite(sensor.error), **ending, function=quoted(""),
         )  # fmt: skip
     along, up = (finite(component) for component in model.gravity)
     gravity = {"x_component_gravity": along, "y_component_gravity": up, "z_component_gravity": "0"}
@@ -94,6 +107,8 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
             "force modify direct single_component_force", single_component_force_name=full(name),
             function=function(torque.function),
         )  # fmt: skip
+    for name, sensor in model.sensors.items():
+        yield command("executive_control modify sensor", sensor_name=full(name), function=function(sensor.function))
 
 
 def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
@@ -150,11 +165,3 @@ def contacts(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
             "contact create", contact_name=full(name), type="solid_to_solid", i_geometry_name=shapes[0],
             j_geometry_name=", ".join(shapes[1:]), **normal, coulomb_friction="on" if friction else "off", **friction,
         )  # fmt: skip
-
-
-def script(model: AdamsModel, end_s: float, pinned_until_s: float | None) -> list[str]:
-    """Write a simulation script; a pinned stance foot is released at `pinned_until_s`."""
-    run = f"simulate/dynamic, end = {{}}, dtout = {finite(OUTPUT_S)}"
-    stages = [] if pinned_until_s is None else [run.format(finite(pinned_until_s)), "deactivate/jprim, id = 1"]
-    commands = ", ".join(quoted(text) for text in (*stages, run.format(finite(end_s))))
-    return command("simulation script create", sim_script_name=f".{model.name}.walk", solver_commands=commands)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, get_args
 
+from walkerlab.config.walkers import Kneed
 from walkerlab.errors import ConfigError
 from walkerlab.exchange import mjcf
 from walkerlab.exchange.adams import command_text, dataset_text
@@ -57,9 +58,9 @@ def export_model(
     Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
     pads depends on a contact gait and none is found.
     """
-    export = prepare_export(config, rigid_step_length_m, rigid_state)
+    export = prepare_export(config if kind == "mjcf" else with_stops(config), rigid_step_length_m, rigid_state)
     stem = stem or export.model_name
-    left_out = tuple(parts_left_out(export, kind, law, f"{stem}.py"))
+    left_out = tuple(parts_left_out(export, config, kind, law, f"{stem}.py"))
     tilted = "gravity" if slope == "gravity" else "ground"
     head = list(export.describe(left_out, commit, tilted))
     if kind == "mjcf":
@@ -68,11 +69,12 @@ def export_model(
     if slope == "geometry":
         raise ConfigError("--slope geometry: models for ADAMS have tilted gravity.", "Leave it out for ADAMS.")
     model = adams_model(export, law)
+    pinned_until_s = export.touches_s[0] if export.pinned and export.touches_s else None
     if kind == "cmd":
-        pinned_until_s = export.touches_s[0] if export.pinned and export.touches_s else None
         return ExportedFiles({f"{stem}.cmd": view_text(model, head, export.end_s, pinned_until_s)}, left_out)
     dataset = f"{stem}.adm"
-    files = {dataset: dataset_text(model, head), f"{stem}.acf": command_text(export, dataset)}
+    commands = command_text(model, dataset, export.end_s, pinned_until_s)
+    files = {dataset: dataset_text(model, head), f"{stem}.acf": commands}
     return ExportedFiles(files, left_out)
 
 
@@ -92,9 +94,21 @@ def slope_named(text: str) -> Slope:
     raise ConfigError(f"--slope {text}: unknown way to express a slope.", f"Choose from {', '.join(SLOPES)}.")
 
 
-def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Iterator[str]:
-    """Describe the parts of the walk that an exported model lacks or replaces."""
-    config, by_functions = export.config, kind != "mjcf" and law == "functions"
+def with_stops(config: Config) -> Config:
+    """Return a config whose knees are caught by a stop before they lock.
+
+    ADAMS changes velocities in a way of its own where a joint is activated, so a knee must be at rest when it locks.
+    """
+    walker = config.walker
+    if not isinstance(walker, Kneed) or walker.knee.lock == "compliant":
+        return config
+    stopped = walker.model_copy(update={"knee": walker.knee.model_copy(update={"lock": "compliant"})})
+    return config.model_copy(update={"walker": stopped})
+
+
+def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, script: str) -> Iterator[str]:
+    """Describe the parts of the walk of a config that an exported model lacks or replaces."""
+    by_functions = kind != "mjcf" and law == "functions"
     if export.scene.ground.terrain.has_pads:
         yield "the end of a walk when a foot hits a pad from the side; here the pad pushes the foot away"
     if not by_functions and any(radius == 0.0 for radius in export.scene.ours.whole.radius):
@@ -104,6 +118,8 @@ def parts_left_out(export: Exported, kind: Kind, law: Law, script: str) -> Itera
         if parts := mjcf.parts_of_script(export):
             yield f"{', '.join(parts)}, which the script {script} applies instead"
     else:
+        if export.config is not config:
+            yield "the plastic impact that locks a knee; a stop catches it first, as with walker.knee.lock: compliant"
         when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"
         if config.push_off.impulse_N_s:
             yield f"the trigger of push-offs; open-loop pulses {when}"
