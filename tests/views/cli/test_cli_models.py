@@ -48,7 +48,6 @@ def test_the_format_is_named_or_follows_the_file(walker, options, file):
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (("kneed", "--to", "adm"), "Knees that lock cannot be exported"),
     (("round-feet", "--to", "mjcf"), "Set contact.terrain=checkerboard."),
     (("paper", "--to", "pdf"), "a model cannot be written as pdf."),
     (("paper", "--to", "adm", "-o", "x.xml"), "contradicts the ending"),
