@@ -183,7 +183,7 @@ def run_unguarded(tmp_path, engine, jobs, from_standard_input):
 
 
 @pytest.mark.parametrize("from_standard_input", [False, True], ids=["script", "stdin"])
-def test_a_script_without_a_guard_sweeps_once(tmp_path, from_standard_input):
+def test_script_without_a_guard_sweeps_once(tmp_path, from_standard_input):
     done = run_unguarded(tmp_path, "local", "2", from_standard_input)
     assert done.stdout == "[0.7036, 0.7343]\n", done.stderr
     assert done.returncode == 0
@@ -259,7 +259,7 @@ def test_robustness_and_design_run_in_memory():
     assert walker.summary["best"] == {"slope_deg": 3.0}
 
 
-def test_a_sweep_without_xarray_computes_nothing(tmp_path, monkeypatch):
+def test_sweep_without_xarray_computes_nothing(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ConfigError, match="a Dataset needs xarray"):
         walkerlab.sweep("fixedpoint", {"slope_deg": [1, 2]}, runs=tmp_path / "runs")
@@ -364,7 +364,7 @@ def test_result_in_memory_can_be_plotted(ask, names):
         result.plot("circle")
 
 
-def test_the_plot_of_a_gait_shows_its_multipliers():
+def test_plot_of_a_gait_shows_its_multipliers():
     gait = walkerlab.find_gait()
     (axes,) = gait.plot().axes
     points = [complex(*line.get_xydata()[0]) for line in axes.lines if line.get_marker() == "o"]
@@ -373,7 +373,7 @@ def test_the_plot_of_a_gait_shows_its_multipliers():
         walkerlab.find_gait(slope_deg=-1).plot()
 
 
-def test_a_group_of_arrays_becomes_a_table_with_units():
+def test_group_of_arrays_becomes_a_table_with_units():
     pytest.importorskip("pandas")
     walk = walkerlab.simulate(strides=1)
     steps = walk.to_dataframe()

@@ -95,7 +95,7 @@ def test_every_module_has_its_layer():
     assert [named(path) for path in IN_LAYERS if not layer_of(path)] == []
 
 
-def test_the_docs_list_the_same_layers():
+def test_docs_list_the_same_layers():
     text = (Path(__file__).parent.parent / "docs" / "architecture.md").read_text()
     listed = text.partition("## Layers")[2].partition("```text")[2].partition("```")[0]
     assert tuple(listed.replace(">", " ").split()) == LAYERS

@@ -159,7 +159,7 @@ def named_runs():
 
 
 @pytest.mark.parametrize("command", commands())
-def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
+def test_documented_command_is_accepted(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     stands_for = {"STAGE": "fixedpoint", "FILE": "my.yaml"}
     words = [stands_for.get(word, word) for word in shlex.split(command)[1:]]
@@ -200,7 +200,7 @@ def test_every_command_is_in_the_docs():
 @pytest.mark.parametrize(
     "text", re.findall(r"^```yaml\n(.*?)^```$", text_of(ROOT / "README.md"), re.DOTALL | re.MULTILINE)
 )
-def test_a_documented_config_is_accepted(text, tmp_path):
+def test_documented_config_is_accepted(text, tmp_path):
     path = tmp_path / "my.yaml"
     path.write_text(text, encoding="utf-8")
     assert load(path, ()).config
@@ -256,12 +256,12 @@ def test_index_links_every_page_and_the_readme_links_the_index():
     assert "(docs/index.md)" in text_of(ROOT / "README.md")
 
 
-def test_the_api_reference_has_every_name_of_the_package():
+def test_api_reference_has_every_name_of_the_package():
     listed = re.search(r"members: \[(.*)\]", text_of(ROOT / "docs" / "api.md"))[1].split(", ")
     assert sorted(listed) == sorted(set(walkerlab.__all__) - {"Config", "ConfigError"})
 
 
-def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
+def test_api_reference_shows_arguments_as_a_list_and_examples_as_code():
     pytest.importorskip("griffe")
     shown = runpy.run_path(str(ROOT / "scripts" / "api_docstrings.py"))["as_markdown"]
     assert shown("Walk.\n\nslope_deg  downhill,\n           deg\na, b       both\n\n>>> 1 + 1\n2\n\nEnd.") == (
@@ -279,7 +279,7 @@ def test_every_picture_of_the_docs_is_registered_and_on_a_page():
 @pytest.mark.parametrize(
     "page", ["index", "tutorial", "howto", "identify", "walkers", "explore", "exchange", "recordings"]
 )
-def test_a_page_for_newcomers_has_a_picture(page):
+def test_page_for_newcomers_has_a_picture(page):
     assert re.search(r"^!\[[^]]+\]\(images/", text_of(ROOT / "docs" / f"{page}.md"), re.MULTILINE)
 
 
@@ -287,7 +287,7 @@ def test_pictures_contain_the_labels_drawn_today(tmp_path):
     assert list(MAKER["stale_pictures"](tmp_path)) == [], "run: python scripts/refresh_docs.py --pictures"
 
 
-def test_a_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
+def test_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
     pictures = MAKER["stale_pictures"].__globals__
     shutil.copytree(ROOT / "docs" / "images", tmp_path / "images")
     monkeypatch.setitem(pictures, "IMAGES", tmp_path / "images")

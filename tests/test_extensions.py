@@ -118,7 +118,7 @@ def test_walk_uses_the_law_of_an_extension_and_records_its_origin(walked):
     assert "tanh-friction 1.0" in site("show", "tanh", "contact-sim").stdout
 
 
-def test_the_figure_of_an_extension_is_drawn(walked):
+def test_figure_of_an_extension_is_drawn(walked):
     site, _ = walked
     done = site("export", "tanh", "friction-over-slip", "--to", "svg", "-o", "drawn.svg")
     assert done.returncode == 0, done.stderr

@@ -146,7 +146,7 @@ twice(3.0)
 """
 
 
-def test_a_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
+def test_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "at-first")}
     command = [sys.executable, "-c", CHOSEN_LATE, str(tmp_path / "later")]
     subprocess.run(command, cwd=tmp_path, env=environment, check=True)

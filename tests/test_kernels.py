@@ -214,7 +214,7 @@ def squared_twice(x):
     return (lambda y: squared(y))(squared(x))
 
 
-def test_a_function_inside_a_kernel_is_compiled_with_it():
+def test_function_inside_a_kernel_is_compiled_with_it():
     assert squared_twice(3.0) == uncompiled(squared_twice)(3.0) == 81.0
 
 
@@ -246,7 +246,7 @@ def nested(tmp_path, monkeypatch):
     kernel_cache.cache_folder.cache_clear()
 
 
-def test_a_kernel_called_by_a_kernel_is_compiled_into_it(nested, tmp_path):
+def test_kernel_called_by_a_kernel_is_compiled_into_it(nested, tmp_path):
     """Stored machine code cannot be linked."""
     names = []
     with watch_compilation(names.append):

@@ -30,7 +30,7 @@ def test_readme_states_the_two_install_commands():
     ]
 
 
-def test_the_readme_fits_on_a_few_screens():
+def test_readme_fits_on_a_few_screens():
     assert len(README.split()) <= 700
 
 

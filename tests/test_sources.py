@@ -158,7 +158,7 @@ def test_closure_contains_every_module_that_python_imports(name, imported):
     assert imported[name] <= {module.name for module in Sources().closure(name, *added, *declared)}
 
 
-def test_a_new_version_number_changes_no_stage_key(tmp_path):
+def test_new_version_number_changes_no_stage_key(tmp_path):
     def digest(version):
         shutil.copytree(Path(walkerlab.__file__).parent, tmp_path / version / "walkerlab", ignore=NO_CACHES)
         init = tmp_path / version / "walkerlab" / "__init__.py"

@@ -31,7 +31,7 @@ def test_built_in_configs_equal_those_of_the_repository() -> None:
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_a_built_in_config_runs_under_its_own_name(name: str) -> None:
+def test_built_in_config_runs_under_its_own_name(name: str) -> None:
     loaded = load(Path(name))
     assert (loaded.run_name, loaded.warnings) == (name, ())
 

@@ -77,7 +77,7 @@ def test_config_slice_of_a_stage_does_not_depend_on_imported_modules(stage: Stag
     assert stage.reads == KEYS[stage.name]
 
 
-def test_a_type_has_the_keys_of_its_bases() -> None:
+def test_type_has_the_keys_of_its_bases() -> None:
     keys = ("walker", "gravity_m_s2", "slope_rad", "push_off", "equations", "contact", "start")
     assert tuple(dotted_keys(SceneConfig)) == keys
     assert tuple(slice_of(CONFIG, SceneConfig)) == keys
@@ -93,7 +93,7 @@ def test_missing_block_is_none() -> None:
     assert only(Config(), ContactConfig).contact is None
 
 
-def test_a_slice_does_not_depend_on_the_order_of_keys() -> None:
+def test_slice_does_not_depend_on_the_order_of_keys() -> None:
     one, other = slice_of(CONFIG, ToleranceThenStart), slice_of(CONFIG, StartThenTolerance)
     assert list(one) != list(other)
     assert canonical_json(one) == canonical_json(other)

@@ -46,7 +46,7 @@ def test_null_removes_an_inherited_block(loaded: Loaded) -> None:
     assert loaded("extends: paper\ncontact: null\n").config.contact is None
 
 
-def test_a_list_is_replaced_whole(loaded: Loaded) -> None:
+def test_list_is_replaced_whole(loaded: Loaded) -> None:
     assert loaded("extends: paper\noutputs: [forces]\n").config.outputs == ("forces",)
 
 
@@ -87,7 +87,7 @@ def test_setting_is_parsed_as_yaml_and_typed_by_the_schema() -> None:
     assert (config.walker.hip_mass_kg, config.equations) == (0.0, "as-printed")
 
 
-def test_a_later_setting_wins() -> None:
+def test_later_setting_wins() -> None:
     assert load(None, ["strides=3", "strides=4"]).config.strides == 4
     assert load(None, ["slope_deg=3", "slope_deg=4"]).config.slope_rad == math.radians(4)
 

@@ -44,7 +44,7 @@ def test_file_takes_precedence_over_a_built_in_config(
     assert load(Path("paper")).config.slope_rad == math.radians(2)
 
 
-def test_a_config_without_a_name_is_named_after_its_file(loaded: Loaded) -> None:
+def test_config_without_a_name_is_named_after_its_file(loaded: Loaded) -> None:
     assert loaded("slope_deg: 2\n").run_name == "mine"
 
 
@@ -354,7 +354,7 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(refused: Refused
     assert "\x1b" not in refused('"a\\e[31m": 1\n')
 
 
-def test_the_exit_code_is_3_and_the_advice_names_a_command(write: Write) -> None:
+def test_config_error_exits_3_and_suggests_a_command(write: Write) -> None:
     with pytest.raises(ConfigError) as caught:
         load(write("foo: 1\n"))
     assert caught.value.exit_code == 3

@@ -63,7 +63,7 @@ def ball(force, height=0.0, speed=0.0, gravity=0.0):
     return Dataset(HEAD.format("METER") + BALL.format(**locals()) + TAIL.format(gravity))
 
 
-def test_a_pendulum_falls_as_adams_computed_it():
+def test_pendulum_falls_as_adams_computed_it():
     dataset = pendulum()
     solution = dataset.integrate(5.0)
     for time, place in CHRONO.items():
@@ -139,7 +139,7 @@ def test_damaged_dataset_is_rejected(wrong, right):
         rate_at_start(text.replace(wrong, right))
 
 
-def test_a_coupler_keeps_a_body_on_the_bisector():
+def test_coupler_keeps_a_body_on_the_bisector():
     parts = "".join(
         f"PART/{n}\n, QG = 0, 0, 0\n, REULER = {turn}, 0, 0\n, WX = 0, WY = 0, WZ = {spin}\n, VX = {vx}\n, VY = {vy}\n"
         f", MASS = {n}\n, CM = {n}1\n, IP = 1, 1, {0.1 * n}\nMARKER/{n}1\n, PART = {n}\n, QP = 0, -0.5, 0\n"

@@ -164,7 +164,7 @@ def test_unused_labels_may_be_repeated_or_empty(name, tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.mot", opensim(within, ("time", name, name, "angle_1", "angle_2"))))
 
 
-def test_an_index_without_a_name_can_be_the_time(tmp_path):
+def test_index_without_a_name_can_be_the_time(tmp_path):
     """The index of a data frame has an empty header cell."""
     text = table(header=("", *HEADER[1:]))
     with pytest.raises(ConfigError, match="no time column; the first columns are column 1, angle 1"):
@@ -176,12 +176,12 @@ def test_an_index_without_a_name_can_be_the_time(tmp_path):
 
 @pytest.mark.parametrize("units", [("s", "rad", "rad"), ("[s]", "[rad]", "[rad]"), ("Seconds", "radians", "Radians")])
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-def test_a_row_of_units_is_read(units, delimiter, tmp_path):
+def test_row_of_units_is_read(units, delimiter, tmp_path):
     text = table(header=("time", "angle 1", "angle 2"), delimiter=delimiter, below=[units], above=["Walk of today"])
     assert holds_the_walk(read(tmp_path, "walk.txt", text))
 
 
-def test_a_row_of_units_may_have_unknown_units_and_gaps(tmp_path):
+def test_row_of_units_may_have_unknown_units_and_gaps(tmp_path):
     rows = with_column(["7"] * 6, with_column(["1"] * 6))
     text = table(rows, ("time", "angle 1", "angle 2", "load", "n"), below=[("s", "rad", "rad", "%", "")])
     assert holds_the_walk(read(tmp_path, "walk.csv", text))
@@ -216,7 +216,7 @@ def test_times_in_micro_and_nanoseconds_are_read(header, scale, tmp_path):
     assert parse_units(["us"]) == {"time": "us"}
 
 
-def test_a_unit_that_contradicts_the_file_is_an_error(tmp_path):
+def test_unit_that_contradicts_the_file_is_an_error(tmp_path):
     for units in ({"angle": "deg"}, {"angle 1": "deg"}):
         with pytest.raises(ConfigError, match=r"states that 'angle 1' .* is in rad, but --units that it is in deg"):
             read(tmp_path, "walk.csv", table(), units=units)
@@ -266,7 +266,7 @@ def test_marker_with_a_repeated_coordinate_is_rejected(tmp_path):
         read(tmp_path, "walk.csv", table(rows, ("time (s)", *names)), LINES)
 
 
-def test_a_line_between_markers_in_different_units_is_scaled(tmp_path):
+def test_line_between_markers_in_different_units_is_scaled(tmp_path):
     names = "HIP.x (m)", "HIP.y (m)", "F1.x (mm)", "F1.y (mm)", "F2.x (mm)", "F2.y (mm)"
     places = positions()[:, [0, 1, 3, 4, 6, 7]] / [1000.0, 1000.0, 1.0, 1.0, 1.0, 1.0]
     rows = [[row[0], *(f"{place:.12f}" for place in each)] for row, each in zip(ROWS, places, strict=True)]
@@ -377,7 +377,7 @@ def test_unsupported_table_names_its_program(beginning, program, tmp_path):
     assert re.search(r"\.c3d|time \(s\)", caught.value.advice)
 
 
-def test_a_qualisys_table_with_column_headers_is_read(tmp_path):
+def test_qualisys_table_with_column_headers_is_read(tmp_path):
     names = [f"{marker} {axis}" for marker in ("HIP", "F1", "F2") for axis in "XYZ"]
     above = ["NO_OF_FRAMES\t6", "NO_OF_CAMERAS\t8", "NO_OF_MARKERS\t3", "FREQUENCY\t10", "MARKER_NAMES\tHIP\tF1\tF2"]
     rows = [[str(n), row[0], *map(str, each)] for n, (row, each) in enumerate(zip(ROWS, positions(), strict=True), 1)]

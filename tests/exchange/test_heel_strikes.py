@@ -85,7 +85,7 @@ def test_noise_does_not_make_the_first_sample_a_heel_strike(cut_ms, fps, tmp_pat
 
 @pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0, 1000.0])
 @pytest.mark.parametrize("noise", [0.0, 2e-4])
-def test_a_recording_that_begins_on_a_heel_strike_keeps_its_first_step(noise, fps, tmp_path):
+def test_recording_that_begins_on_a_heel_strike_keeps_its_first_step(noise, fps, tmp_path):
     summary = read(tmp_path, *sampled(fps=fps, noise=noise, seed=1))
     assert summary["first_heel_strike_s"] == 0.0
     assert summary["steps"] == 7
@@ -103,7 +103,7 @@ def test_heel_strike_near_the_end_is_correct_or_omitted(after_ms, fps, tmp_path)
     assert summary["steps"] >= (3 if after_ms >= 0 else 2)
 
 
-def test_a_recording_that_begins_just_before_a_heel_strike_begins_on_it(tmp_path):
+def test_recording_that_begins_just_before_a_heel_strike_begins_on_it(tmp_path):
     summary = read(tmp_path, *sampled(begin=PERIOD_S - 5e-3))
     assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=1e-5)
     assert all_steps_are_right(summary)

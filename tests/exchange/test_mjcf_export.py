@@ -177,7 +177,7 @@ def test_torso_stays_on_the_bisector():
     assert data.joint("hinge of torso").qpos[0] == pytest.approx(0.5 * data.joint("hip").qpos[0], abs=2e-4)
 
 
-def test_a_hip_spring_and_damper_are_joint_properties():
+def test_hip_spring_and_damper_are_joint_properties():
     model = model_of("paper", "walker.hip.spring_N_m_per_rad=1", "walker.hip.damping_N_m_s_per_rad=0.02")
     hip = model.joint("hip")
     assert (float(hip.stiffness[0]), float(model.dof_damping[hip.dofadr[0]])) == (1.0, 0.02)
@@ -251,7 +251,7 @@ def test_exported_script_reacts_to_the_state_and_not_to_time(tmp_path):
     assert abs(periods[0] - export_of(*KNEED).walk.periods_s[0]) > 0.001
 
 
-def test_a_locked_knee_stays_straight_under_load(tmp_path):
+def test_locked_knee_stays_straight_under_load(tmp_path):
     walk, bends = walk_of(tmp_path, *KNEED), []
     while walk.data.time < 0.3:
         mujoco.mj_step(walk.model, walk.data)

@@ -114,7 +114,7 @@ def test_data_frame_with_a_default_index_is_read(style, tmp_path):
     assert walk_of(path).both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
 
 
-def test_a_data_frame_with_the_time_as_index_is_read(tmp_path):
+def test_data_frame_with_the_time_as_index_is_read(tmp_path):
     """As kineticstoolkit's to_dataframe() makes it; its header begins with an empty cell."""
     path = tmp_path / "walk.csv"
     frame(TIMES).to_csv(path)

@@ -81,7 +81,7 @@ def read(path, columns=(), units=()):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_the_same_walk_is_read_from_every_format(name, tmp_path):
+def test_same_walk_is_read_from_every_format(name, tmp_path):
     units = {} if name == "own.csv" else {"angle": "rad", "time": "s"} if name == "table.txt" else {"time": "s"}
     walk = as_walk(read_recording(written(tmp_path, name, FILES[name])), {}, units)
     assert walk.time_s == pytest.approx(TIMES, abs=1e-12)
@@ -89,7 +89,7 @@ def test_the_same_walk_is_read_from_every_format(name, tmp_path):
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-def test_a_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
+def test_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
     rows = "".join(f"{line.replace(',', delimiter)}{delimiter}\n" for line in OWN.splitlines())
     walk = as_walk(read_recording(written(tmp_path, "own.csv", f"Walk of today\n{rows}\n")), {}, {})
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)

@@ -127,7 +127,7 @@ def test_pads_at_the_rigid_step_length_always_need_the_gait():
 
 
 @pytest.mark.parametrize("terrain", ["plane", "after-mid-swing"])
-def test_a_given_start_needs_no_gait_on_ground_without_pads(terrain):
+def test_given_start_needs_no_gait_on_ground_without_pads(terrain):
     assert needed("contact-sim", EXPLICIT, f"contact.terrain={terrain}") == ["contact-sim"]
 
 

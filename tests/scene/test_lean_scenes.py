@@ -90,7 +90,7 @@ def rates_with_point_feet(walker, y):
 
 
 @given(state=states)
-def test_a_point_foot_is_a_ball_of_radius_zero(state):
+def test_point_foot_is_a_ball_of_radius_zero(state):
     walker = walker_with(radius=0.0)
     y = over(walker, *state)
     same_to_rounding(rate_of(on_ground(walker, BOTH), y), rates_with_point_feet(walker, y), stiffest(walker, y))
@@ -106,7 +106,7 @@ def test_foot_in_the_air_moves_as_without_ground(state, clearance):
 
 
 @given(state=states)
-def test_a_leg_without_inertia_is_a_point_mass_on_a_bar_without_mass(state):
+def test_leg_without_inertia_is_a_point_mass_on_a_massless_bar(state):
     """Described in two ways: a body with an inertia of zero, and a particle."""
     legs = compass_assembly(CompassParts(1.0, 0.5, 5.0, 10.0, 0.0, 0.001))
     particles = tuple(Particle(f"mass of {leg.name}", leg.mass_kg, leg.name, leg.centre_m) for leg in legs.bodies)
@@ -120,7 +120,7 @@ def test_a_leg_without_inertia_is_a_point_mass_on_a_bar_without_mass(state):
     same_to_rounding(found, expected, stiffest(one, y))
 
 
-def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
+def test_walk_on_frictionless_ground_equals_that_with_zero_coefficients():
     """The same steps to the last bit, where no step ends at a switching point of the friction law."""
     ends = []
     for law in (NO_FRICTION, Frictionless()):

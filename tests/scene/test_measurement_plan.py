@@ -83,6 +83,6 @@ def test_prior_determines_what_periods_cannot(config, gait):
     assert error == pytest.approx(0.01, rel=0.05)
 
 
-def test_a_start_too_far_from_the_gait_has_no_plan(config, gait):
+def test_start_too_far_from_the_gait_has_no_plan(config, gait):
     with pytest.raises(NoAnswer, match=r"takes only \d+ of 9 steps"):
         plan_measurements(config, gait, QUESTION, PLAN.model_copy(update={"start_change": 0.5}))

@@ -255,7 +255,7 @@ def test_summary_has_the_expected_keys(rows, reference):
     assert {"method", "second_method", "agreement", "state"} <= summary["reference"]["rigid"].keys()
 
 
-def test_a_walk_that_ends_early_has_no_reference():
+def test_walk_that_ends_early_has_no_reference():
     lying = replace(TRIAL, start=(-1.6, 1.6, 0.0, 0.0))
     with pytest.raises((WalkEndsError, ValueError)):
         reference_for(lying)

@@ -163,7 +163,7 @@ def test_torso_and_compliant_knee_stop_are_rejected():
         kneed("walker.torso={mass_kg: 1.0, above_hip_m: 0.1}")
 
 
-def test_a_pinned_walker_hangs_from_its_stance_foot(scene):
+def test_pinned_walker_hangs_from_its_stance_foot(scene):
     model = pinned_model(scene)
     assert model.freedoms == ("turn",)
     assert model.links[0].point_m == scene.assembly.feet[STANCE_FOOT].centre_m

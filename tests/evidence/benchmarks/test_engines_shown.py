@@ -69,7 +69,7 @@ def test_each_panel_has_its_own_legend(results):
         assert looks == {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in lines_of(axes)}
 
 
-def test_a_panel_without_a_finished_walk_says_so():
+def test_panel_without_a_finished_walk_says_so():
     unfinished = {"engines": content([row for row in ROWS if row.experiment == "same-law" or row.engine == "exudyn"])}
     with styled():
         for figure, place in ((ERRORS, 1), (PERIODS, 0)):

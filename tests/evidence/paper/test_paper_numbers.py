@@ -236,7 +236,7 @@ def test_uncontradicted_adams_values_are_at_most_not_reproduced(rows):
     assert {verdicts[entry] for entry in verdicts.keys() - contradicted} == {NumberVerdict.NOT_REPRODUCED}
 
 
-def test_a_cycle_that_is_the_sum_of_its_steps_is_not_contradicted(rows):
+def test_cycle_that_is_the_sum_of_its_steps_is_not_contradicted(rows):
     assert rows()[T_CYCLE.matlab].verdict == NumberVerdict.NOT_REPRODUCED
 
 

@@ -159,7 +159,7 @@ def kneed():
     )
 
 
-def test_a_kneed_walker_needs_no_adjustment_on_plain_ground():
+def test_kneed_walker_needs_no_adjustment_on_plain_ground():
     summary = kneed().summary
     found = summary["adjustment"]
     assert (found["needed"], found["found"], found["walked_steps"]) == (False, True, 2)

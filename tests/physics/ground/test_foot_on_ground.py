@@ -105,7 +105,7 @@ def test_power_balances_and_the_ground_only_dissipates(theta, omega, slip, verti
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)
 
 
-def test_a_foot_in_the_air_or_without_ground_feels_nothing():
+def test_foot_in_the_air_or_without_ground_feels_nothing():
     walker = ground.compass()
     hovering = ground.placed(walker, 1, -0.3, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
     inside = ground.placed(walker, 1, 1e-4, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
@@ -202,7 +202,7 @@ def creep_velocity(slope, friction):
 
 
 @pytest.mark.parametrize("slope", [0.02, 0.1])
-def test_a_loaded_block_creeps_downhill_instead_of_sticking(slope):
+def test_loaded_block_creeps_downhill_instead_of_sticking(slope):
     """T/N = tan(slope); the cubic gives mu = mu_s (3 u - u^3) / 2 at u = v / v_s, near v_s (T/N) / (1.5 mu_s)."""
     law = ground.COULOMB
     velocity = creep_velocity(slope, law)
@@ -211,7 +211,7 @@ def test_a_loaded_block_creeps_downhill_instead_of_sticking(slope):
     assert velocity == pytest.approx(law.stiction_velocity * np.tan(slope) / (1.5 * law.static), rel=u**2)
 
 
-def test_a_block_on_a_slope_steeper_than_its_friction_slides_away():
+def test_block_on_a_slope_steeper_than_its_friction_slides_away():
     law = Coulomb(0.2, 0.1, 0.01, 0.1)
     velocity = creep_velocity(0.3, law)
     expected = ground.GRAVITY * (np.sin(0.3) - 0.1 * np.cos(0.3))  # after 1 s, less the moment in which mu_s held it

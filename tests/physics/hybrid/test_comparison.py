@@ -88,7 +88,7 @@ def test_late_heel_strike_makes_velocities_differ_by_the_jump():
 
 
 @pytest.mark.parametrize("step", range(STEPS))
-def test_a_step_begins_after_its_impact_and_ends_before_the_next(step):
+def test_step_begins_after_its_impact_and_ends_before_the_next(step):
     angle, velocity = walk().during(step, np.array([0.0, 1.0]))
     assert_allclose(angle[0], legs_at(np.array([float(step)]), 1.0)[0][0], atol=1e-12)
     assert_allclose(velocity[0], legs_at(np.array([float(step)]), 1.0)[1][0] / PERIOD, atol=1e-9)

@@ -148,7 +148,7 @@ def test_push_does_its_work_within_its_duration():
     assert done[5] == done[4]
 
 
-def test_a_trailing_knee_is_released_as_its_push_ends():
+def test_trailing_knee_is_released_as_its_push_ends():
     changes = ("push_off.duration_s=0.02", "walker.knee.release=touch")
     walk = at("kneed-level", [-1e-3, 1e-3, 0.0199, 0.0201], *changes)
     trailing = 1

@@ -196,13 +196,13 @@ def test_walk_in_pieces_equals_the_whole_walk():
     assert whole.touch_time_s[-1] == pytest.approx(first.touch_time_s[-1] + second.touch_time_s[-1], abs=1e-10)
 
 
-def test_a_stable_walk_settles_on_the_gait():
+def test_stable_walk_settles_on_the_gait():
     walk = walked(PAPER, start_of(PAPER, (0.16, -0.55, -0.87)), 60, 1e-11)
     assert walk.outcome is Outcome.WALKED
     assert walk.final_state == pytest.approx(GAIT, abs=1e-9)
 
 
-def test_a_slow_walker_falls():
+def test_slow_walker_falls():
     walk = walked(PAPER, start_of(PAPER, (0.1674, -0.4, -0.5)), 10, sampled=True)
     assert walk.outcome is Outcome.FELL
     assert walk.steps == 0

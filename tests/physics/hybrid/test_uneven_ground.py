@@ -91,7 +91,7 @@ def test_landing_less_than_a_quarter_step_ahead_is_not_a_step(name, share, seed)
     np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-7)
 
 
-def test_a_walk_on_even_ground_has_no_shortest_landing():
+def test_walk_on_even_ground_has_no_shortest_landing():
     _, walker, gait = gait_of("slope-3deg")
     even, judged = (take_walk(walker, TIGHT, gait.state, 3, step_length=length) for length in (None, 1e3))
     np.testing.assert_array_equal(even.after, judged.after)

@@ -197,5 +197,5 @@ def test_walker_without_two_feet_is_rejected():
         contact_walker(one_legged, NormalLaw(1.0, 1.0, 0.0, 1.0), Frictionless(), 9.81, 0.0)
 
 
-def test_a_foot_of_zero_length_has_no_lever_at_the_root():
+def test_foot_of_zero_length_has_no_lever_at_the_root():
     assert not levers(kneed.KNEED, kneed.STANCE_POINT, kneed.STANCE_POINT).any()

@@ -115,7 +115,7 @@ def test_rolling_kneed_walker_with_torso_obeys_lagrange_equations(lagrange, numb
 
 
 @given(free)
-def test_a_straight_leg_moves_as_one_body(lagrange, numbers):
+def test_straight_leg_moves_as_one_body(lagrange, numbers):
     """Lagrange's equations with thigh and shank held together: their sum, for one angle."""
     thigh, stance, _, d_thigh, d_stance, _ = numbers
     y = kneed_state((thigh, stance, thigh, d_thigh, d_stance, d_thigh))

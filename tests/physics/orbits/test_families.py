@@ -332,7 +332,7 @@ def test_lyapunov_exponent_is_positive_in_chaos_and_negative_on_a_stable_gait():
 
 
 @pytest.mark.parametrize("lasting", [0.0, 5.0, 20.0], ids="correlated over {:g} steps".format)
-def test_a_standard_error_covers_the_error_whether_or_not_steps_are_correlated(lasting):
+def test_standard_error_covers_the_error_even_for_correlated_steps(lasting):
     """Of means of normal noise whose correlation falls e-fold in so many steps: the mean is 0."""
     kept, noise = np.exp(-1.0 / lasting) if lasting else 0.0, np.random.default_rng(1).standard_normal((400, 6000))
     for step in range(1, noise.shape[1]):

@@ -156,7 +156,7 @@ def test_short_period_gait_is_found_and_unstable():
     assert not short.stable
 
 
-def test_the_same_seed_draws_the_same_starts():
+def test_same_seed_draws_the_same_starts():
     assert find_gaits(PAPER, seed=3) == find_gaits(PAPER, seed=3)
 
 

@@ -47,7 +47,7 @@ def test_order_and_limit_of_a_power_law_are_recovered(order, ratio):
     assert limit.uncertainty < 1e-9
 
 
-def test_a_series_that_does_not_converge_has_no_limit():
+def test_series_that_does_not_converge_has_no_limit():
     assert extrapolate(distances([0.7, 0.71, 0.73, 0.77], 2.0)) is None
     assert extrapolate(distances([0.7, 0.71], 2.0)) is None
 

@@ -39,7 +39,7 @@ def found():
     return find_gaits(with_torso())
 
 
-def test_an_unstable_gait_is_found_where_few_starts_walk(found):
+def test_unstable_gait_is_found_even_if_few_starts_walk(found):
     (gait,) = found.gaits
     assert not gait.stable
     assert gait.spectral_radius == pytest.approx(3.664, abs=5e-4)

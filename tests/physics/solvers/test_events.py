@@ -34,11 +34,11 @@ def with_roots(*roots, sign=1.0):
     return sign * Polynomial.fromroots(roots)
 
 
-def test_a_single_crossing_is_found():
+def test_single_crossing_is_found():
     assert crossing(with_roots(0.3)) == pytest.approx(0.3, abs=1e-14)
 
 
-def test_a_double_crossing_inside_one_step_is_found():
+def test_double_crossing_inside_one_step_is_found():
     event = with_roots(0.4, 0.41)
     assert event(0.0) > 0.0
     assert event(1.0) > 0.0
@@ -68,7 +68,7 @@ def test_touching_zero_without_sign_change_is_not_a_crossing():
     assert crossing(-touching - 1e-12) == NO_CROSSING
 
 
-def test_a_zero_at_the_start_is_not_found_again():
+def test_zero_at_the_start_is_not_found_again():
     # what the event before left behind: zero but for rounding, of either sign
     for rounding in (0.0, 1e-17, -1e-17):
         event = with_roots(0.0, 1.5) + rounding
@@ -84,7 +84,7 @@ def test_crossing_right_after_the_start_is_found():
     assert crossing(with_roots(1e-9)) == pytest.approx(1e-9, abs=1e-15)
 
 
-def test_a_crossing_at_the_end_belongs_to_one_step_only():
+def test_crossing_at_the_end_belongs_to_one_step_only():
     # the value at the step's end is the next step's first value: a sign change lies in one of the two
     before, after = with_roots(1.0 - 1e-13), with_roots(-1e-13)
     found = [crossing(before) <= 1.0, crossing(after) <= 1.0]

@@ -249,7 +249,7 @@ def test_counted_work_rises_with_accuracy(name):
 
 
 @every_method
-def test_a_budget_ends_the_run(name):
+def test_budget_ends_the_run(name):
     method, status = driven(name, 1e-8, PERIOD, budget=100)
     assert status == OUT_OF_BUDGET
     assert method.counts[RHS] <= 130  # a step that has begun may be finished

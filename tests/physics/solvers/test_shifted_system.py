@@ -54,7 +54,7 @@ def test_general_systems_are_solved_at_full_size(J):
     assert unknowns(J) == J.shape[0]
 
 
-def test_a_stiff_contact_step_is_solved_to_rounding():
+def test_stiff_contact_step_is_solved_to_rounding():
     """A foot on 1e9 N/m with 1e5 N s/m, and a step of a microsecond."""
     J = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [-40.0, 3.0, -0.1, 0.0], [2.0, -5e7, 0.0, -5e3]])
     x = np.array([0.1, 1e-6, -2.0, 1e-2])

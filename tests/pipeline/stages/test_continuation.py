@@ -227,7 +227,7 @@ def test_regions_of_the_plane_meet_at_the_flip_curve(monkeypatch):
 
 
 @pytest.mark.parametrize(("name", "unit"), [("paper", "mm/s"), ("contact-si", "m/s")])
-def test_the_unit_of_a_contact_key_is_that_of_the_config(name, unit):
+def test_unit_of_a_contact_key_is_that_of_the_config(name, unit):
     config = load(Path(name)).config
     assert parameter_of("contact.stiction_velocity", config).unit == unit
     assert parameter_of("walker.hip_mass_kg", config).unit == "kg"
@@ -339,7 +339,7 @@ def flips_of(said, steps):
     return [one["value"] for one in said["bifurcations"] if (one["kind"], one["period"]) == ("flip", steps)]
 
 
-def test_a_span_without_a_gait_has_no_answer():
+def test_span_without_a_gait_has_no_answer():
     with pytest.raises(NoAnswer, match="no gait was found with slope_deg from -3 to -1 deg"):
         follow("over=slope_deg", "from=-3", "to=-1")
 

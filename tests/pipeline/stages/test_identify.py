@@ -317,7 +317,7 @@ def test_report_section_begins_with_the_estimates(identified):
     assert captions == ["Estimates", "Fit to the measurements"]
 
 
-def test_a_table_of_periods_alone_is_read(tmp_path):
+def test_table_of_periods_alone_is_read(tmp_path):
     path = tmp_path / "stopwatch.csv"
     path.write_text("period_s\n0.70\n0.71\n0.70\n")
     measured = read_measured(taken(*ask(path)).identify, taken())
@@ -358,7 +358,7 @@ def written_angles(path, transient, offset):
     return path
 
 
-def test_an_offset_of_the_sensors_is_estimated_with_the_walker(transient, gait, tmp_path):
+def test_offset_of_the_sensors_is_estimated_with_the_walker(transient, gait, tmp_path):
     path = written_angles(tmp_path / "off.csv", transient, 0.02)
     changes = ask(path, "identify.level=angles", "identify.fit={slope_deg: null}", "slope_deg=1.2")
     summary = identify.run(taken(*changes, "identify.nuisance=[angle_offset_rad]"), gait, Silent()).summary
@@ -370,7 +370,7 @@ def test_an_offset_of_the_sensors_is_estimated_with_the_walker(transient, gait, 
     assert "The angle offset is 0.0" in text
 
 
-def test_an_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path):
+def test_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path):
     path = written_angles(tmp_path / "off.csv", transient, 0.02)
     changes = ask(path, "identify.level=angles", "identify.fit={walker.hip_mass_kg: null}")
     summary = identify.run(taken(*changes), gait, Silent()).summary

@@ -105,7 +105,7 @@ def test_single_outlier_is_reported_and_omitted(tmp_path):
     assert read["doubts"] == [f"Angle 1 is off its course at sample 200 (time {float(time):.6g} s), which is left out."]
 
 
-def test_a_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(tmp_path):
+def test_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(tmp_path):
     walk = simulated("rigid")
     lines = table(walk).splitlines()
     late = [line for line in lines[1:] if float(line.split(",")[0]) > 0.3]
@@ -115,7 +115,7 @@ def test_a_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(t
     assert read.summary["step_periods_s"] == pytest.approx(walk.summary["step_periods_s"][1:], abs=1e-6)
 
 
-def test_a_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
+def test_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
     folder = RunFolder(tmp_path, "paper")
     config = load(None, ("strides=2",)).config
     execute(config, "simulate", folder)

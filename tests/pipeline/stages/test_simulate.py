@@ -180,7 +180,7 @@ def test_walk_reports_forces_that_no_ground_can_give():
 
 
 @pytest.mark.parametrize("heights", [(-0.03, 0.05), (0.0, 0.0)])
-def test_a_fall_on_uneven_ground_is_not_blamed_on_the_start(heights):
+def test_fall_on_uneven_ground_is_not_blamed_on_the_start(heights):
     uneven = any(heights)
     start = "fixed-point" if uneven else SLOW
     walk = run(contact=None, start=start, ground={"heights_m": heights}, strides=2).summary

@@ -116,7 +116,7 @@ def test_nonportable_paths_are_rejected(path):
         Content({path: Group({})})
 
 
-def test_a_group_and_an_array_may_not_share_a_name():
+def test_group_and_an_array_may_not_share_a_name():
     with pytest.raises(ValueError, match="group"):
         Content({"a": Group({"b": metres([1.0])}), "a/b": Group({})})
 

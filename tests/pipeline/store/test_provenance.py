@@ -24,7 +24,7 @@ def test_stored_config_loads_unchanged(name, tmp_path):
     assert load(tmp_path / "stored.yaml").config == original
 
 
-def test_a_result_records_seed_inputs_and_times():
+def test_result_records_seed_inputs_and_times():
     origin = provenance.begin(Config(seed=7), {"fixedpoint": "abc"}).until_now()
     assert origin.seed == 7
     assert origin.input_digests == {"fixedpoint": "abc"}

@@ -64,7 +64,7 @@ def test_sample_is_within_its_intervals_and_determined_by_its_seed(sampler):
     assert question(*over, sample=f"{sampler}:16", seed=4).axes != drawn.axes
 
 
-def test_a_latin_hypercube_has_one_point_in_each_layer():
+def test_latin_hypercube_has_one_point_in_each_layer():
     slopes = np.array(question("slope_deg=0:8", "walker.hip_mass_kg=1:9", sample="latin-hypercube:8").axes[0].values)
     assert sorted(np.floor(slopes)) == list(range(8))
 

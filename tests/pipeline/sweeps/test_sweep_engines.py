@@ -296,7 +296,7 @@ def test_sweep_workers_import_nothing_from_the_current_folder(tmp_path, monkeypa
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_a_dask_cluster_without_workers_gets_new_ones(monkeypatch):
+def test_dask_cluster_without_workers_gets_new_ones(monkeypatch):
     monkeypatch.setattr(engines, "RESTART_S", 1.0)
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     with ENGINES["dask"].opened(Order(1)) as pool:

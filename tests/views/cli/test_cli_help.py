@@ -139,7 +139,7 @@ def test_schema_prints_every_key_as_text_and_as_json(walker):
 
 
 @pytest.mark.parametrize("arguments", [["--set", "slope=1"], ["--set", "slope_rad=.nan"], ["--config", "nowhere.yaml"]])
-def test_a_bad_config_exits_3_before_anything_runs(walker, arguments):
+def test_bad_config_exits_3_before_anything_runs(walker, arguments):
     done = walker("simulate", *arguments)
     assert done.returncode == 3
     assert done.stderr.startswith("error: ")

@@ -304,7 +304,7 @@ def test_characters_missing_from_the_terminal_are_escaped(walker):
     assert (done.returncode, "Traceback" in done.stderr) == (0, False)
 
 
-def test_a_closed_stdout_ends_quietly(walker):
+def test_closed_stdout_ends_quietly(walker):
     command = f"exec {shlex.join(walker.command)} schema >&-"
     done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")

@@ -136,7 +136,7 @@ def test_case_with_a_built_in_name_is_rejected_before_anything_runs(toy):
     assert not (toy.folder / "runs").exists()
 
 
-def test_a_result_that_cannot_be_stored_exits_4(toy):
+def test_result_that_cannot_be_stored_exits_4(toy):
     (toy.folder / "runs").write_text("a file stands where the folder belongs")
     done = toy("drop")
     assert done.returncode == 4
@@ -144,7 +144,7 @@ def test_a_result_that_cannot_be_stored_exits_4(toy):
     assert done.stderr.splitlines()[-1].startswith("advice: ")
 
 
-def test_a_bug_keeps_its_traceback_and_exits_1(toy, tmp_path):
+def test_bug_keeps_its_traceback_and_exits_1(toy, tmp_path):
     source = tmp_path / "source" / "toy" / "drop.py"
     source.write_text(source.read_text().replace("progress.start(", "progress.begin("))
     done = toy("drop")

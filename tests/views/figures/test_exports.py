@@ -215,7 +215,7 @@ def test_film_has_a_frame_for_every_instant(run, tmp_path):
         assert (np.asarray(film.convert("L")) != first).any()
 
 
-def test_a_film_of_both_models_needs_both_walks(run, tmp_path):
+def test_film_of_both_models_needs_both_walks(run, tmp_path):
     path = write_film(run, Target("gif", None), Film("both", 1, 5, 1.0), QUIET)
     assert path.name == "paper-both.gif"
     with Image.open(path) as film:

@@ -128,20 +128,20 @@ def film_frame(result, pads=None, **changed):
     return picture
 
 
-def test_a_film_shows_the_arcs_of_round_feet():
+def test_film_shows_the_arcs_of_round_feet():
     flat, round_feet = (film_frame(rigid(), radius=radius) for radius in (0.0, 0.2))
     for look in LEGS:
         assert coloured(round_feet, look) > coloured(flat, look) + 50
 
 
-def test_a_film_of_a_walk_on_pads_shows_them_and_no_plane():
+def test_film_of_a_walk_on_pads_shows_pads_instead_of_a_plane():
     result = contact()
     plane, on_pads = film_frame(result), film_frame(result, result.groups["terrain"])
     tinted = [int((np.ptp(picture, axis=2) > 10).sum()) for picture in (plane, on_pads)]
     assert tinted[1] > tinted[0] + 200
 
 
-def test_a_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
+def test_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
     walks = both_models()
     contact_sticks, rigid_sticks = sticks_of(walks["contact-sim"]), sticks_of(walks["simulate"])
     (alone,) = pictures(contact_sticks, np.array([0.3]))
@@ -202,7 +202,7 @@ def test_trailing_leg_pushes_off_just_after_each_landing():
     assert replace(driven, pushes=False).pushing(driven.strikes[0]) is None
 
 
-def test_a_film_shows_the_push_off():
+def test_film_shows_the_push_off():
     walk = sticks_of(both_models()["simulate"])
     at = np.array([walk.strikes[0] + 0.02])
     (still,), (pushed,) = (list(pictures(replace(walk, pushes=pushes), at)) for pushes in (False, True))

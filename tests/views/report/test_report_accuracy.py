@@ -104,7 +104,7 @@ def test_run_with_another_outcome_is_shown_with_it(made):
     assert costs["rigid", "scipy-bdf"][-1] == "slid at 10⁻³"
 
 
-def test_the_fastest_methods_are_marked(made):
+def test_fastest_methods_are_marked(made):
     made_of = next(block for block in made.blocks if isinstance(block, Table)).groups
     assert {line[0].text: line[0].tone for line in next(iter(made_of.values()))} == {
         "dop853": "good",
