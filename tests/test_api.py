@@ -22,13 +22,13 @@ from walkerlab.config.walkers import CompassWalker, Kneed
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 
 
-def test_the_examples_of_the_docstrings_say_what_happens(tmp_path):
+def test_docstring_examples_show_the_actual_output(tmp_path):
     found = doctest.testmod(api, extraglobs={"folder": tmp_path})
     assert found.attempted > 10
     assert found.failed == 0
 
 
-def test_everything_that_is_offered_is_there_and_described():
+def test_every_public_name_exists_and_has_a_docstring():
     for name in walkerlab.__all__:
         assert getattr(walkerlab, name).__doc__
     assert set(walkerlab.__all__) <= set(dir(walkerlab))
@@ -36,7 +36,7 @@ def test_everything_that_is_offered_is_there_and_described():
         _ = walkerlab.sprint
 
 
-def test_type_checkers_are_told_of_the_same_names():
+def test_type_stub_lists_the_same_names():
     stub = ast.parse((Path(walkerlab.__file__).parent / "__init__.pyi").read_text())
     imported = [one.name for node in stub.body if isinstance(node, ast.ImportFrom) for one in node.names]
     assert sorted(imported) == sorted(walkerlab.__all__)
@@ -49,7 +49,7 @@ def test_importing_the_package_loads_nothing():
     assert loaded <= {"walkerlab"} | sys.stdlib_module_names
 
 
-def test_no_stage_is_made_of_the_python_interface():
+def test_stages_do_not_depend_on_the_python_interface():
     """Else every result would be out of date once a docstring of it is edited."""
     names = {module.name for module in Sources().closure("walkerlab.pipeline.stages.fixedpoint")}
     assert "walkerlab" in names
@@ -68,18 +68,18 @@ IN_GRAMS = {"walker.leg_mass_kg": 5000}
     ],
     ids=["run", "sweep", "in memory"],
 )
-def test_what_the_command_line_warns_of_is_a_warning_to_who_calls(ask, tmp_path):
+def test_warnings_of_the_command_line_are_python_warnings(ask, tmp_path):
     with pytest.warns(UserWarning, match="^[^:]*walker.leg_mass_kg.* masses are in kg, not in g$") as said:
         ask(tmp_path)
     assert {one.filename for one in said} == {__file__}
 
 
-def test_a_start_that_is_moved_in_memory_is_told():
+def test_moved_start_is_reported_in_memory():
     with pytest.warns(UserWarning, match="^start: theta_1 moved from -0.2 to "):
         walkerlab.simulate(slope_deg=1, start=[-0.2, 0.17, -0.6, -0.86], strides=1)
 
 
-def test_a_run_from_python_is_the_run_of_the_command_line(tmp_path):
+def test_python_and_command_line_share_runs(tmp_path):
     result = walkerlab.run("simulate", set={"slope_deg": 2}, runs=tmp_path, strides=1)
     assert result.artifact == tmp_path / "paper@slope_deg=2,strides=1" / "simulate.h5"
     assert result.summary["stage"] == "simulate"
@@ -94,7 +94,7 @@ def test_a_run_from_python_is_the_run_of_the_command_line(tmp_path):
         opened.result("tune")
 
 
-def test_in_memory_is_what_the_run_finds_and_leaves_no_file(tmp_path, monkeypatch):
+def test_result_in_memory_equals_the_stored_one_and_writes_no_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     walk = walkerlab.simulate(slope_deg=2, strides=1)
     assert not list(tmp_path.iterdir())
@@ -105,7 +105,7 @@ def test_in_memory_is_what_the_run_finds_and_leaves_no_file(tmp_path, monkeypatc
     assert walk.dataset("steps").equals(stored.dataset("steps"))
 
 
-def test_no_answer_is_a_value():
+def test_missing_gait_is_returned_as_a_value():
     gait = walkerlab.find_gait(slope_deg=-1)
     assert "no gait at a slope" in gait.no_answer
     walk = walkerlab.simulate(slope_deg=-1)
@@ -113,7 +113,7 @@ def test_no_answer_is_a_value():
     assert walk.summary == {}
 
 
-def test_what_cannot_be_meant_is_refused():
+def test_impossible_arguments_are_rejected():
     with pytest.raises(ConfigError, match=r"did you mean walker\.hip_mass_kg"):
         walkerlab.compass(hip_mas_kg=3)
     with pytest.raises(ConfigError, match="unknown stage"):
@@ -135,12 +135,12 @@ def test_what_cannot_be_meant_is_refused():
         (lambda: walkerlab.find_gait(slope_deg=3, slope_rad=0.05), "slope already set by"),
     ],
 )
-def test_arguments_that_are_no_config_are_refused_in_words(asked, message):
+def test_arguments_that_are_not_a_config_are_rejected(asked, message):
     with pytest.raises(ConfigError, match=message):
         asked()
 
 
-def test_what_is_left_out_is_as_the_built_in_config_has_it(monkeypatch):
+def test_omitted_arguments_default_to_the_built_in_config(monkeypatch):
     asked = []
     monkeypatch.setattr(api, "in_memory", lambda stage, config: asked.append(config))
     walkerlab.find_gait()
@@ -183,26 +183,26 @@ def run_unguarded(tmp_path, engine, jobs, from_standard_input):
 
 
 @pytest.mark.parametrize("from_standard_input", [False, True], ids=["script", "stdin"])
-def test_a_script_without_a_guard_sweeps_once(tmp_path, from_standard_input):
+def test_script_without_a_guard_sweeps_once(tmp_path, from_standard_input):
     done = run_unguarded(tmp_path, "local", "2", from_standard_input)
     assert done.stdout == "[0.7036, 0.7343]\n", done.stderr
     assert done.returncode == 0
 
 
-def test_a_keyword_that_a_sweep_does_not_have_is_refused(tmp_path):
+def test_unknown_keyword_of_a_sweep_is_rejected(tmp_path):
     with pytest.raises(TypeError, match="smaple"):
         walkerlab.sweep("fixedpoint", {"slope_deg": "1:3"}, runs=tmp_path, smaple="sobol:4")
 
 
 @pytest.mark.parametrize("from_standard_input", [False, True], ids=["script", "stdin"])
-def test_where_a_guard_is_needed_this_is_said_at_once(tmp_path, from_standard_input):
+def test_missing_main_guard_is_reported_at_once(tmp_path, from_standard_input):
     pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     done = run_unguarded(tmp_path, "dask", "1", from_standard_input)
     assert done.returncode == 1
     assert "ConfigError: --engine dask: its processes did not start" in done.stderr
 
 
-def test_what_is_printed_of_a_result_and_of_a_run_fits_on_a_screen(tmp_path):
+def test_printed_results_and_runs_fit_on_a_screen(tmp_path):
     stored = walkerlab.run("simulate", runs=tmp_path, strides=1)
     run = walkerlab.open_run(stored.artifact.parent)
     for shown in (walkerlab.find_gait(), stored, run, run.result("fixedpoint"), run.config, walkerlab.contact()):
@@ -242,15 +242,13 @@ def test_multipliers_are_complex_numbers():
         (lambda: walkerlab.robustness(to="slope_deg"), r"^robustness.to: 'slope_deg' is not a list"),
     ],
 )
-def test_what_is_wrong_with_an_argument_is_told_in_words_and_without_a_place_in_a_text(
-    call, said, tmp_path, monkeypatch
-):
+def test_error_in_an_argument_has_no_file_position(call, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match=said):
         call()
 
 
-def test_robustness_and_design_are_asked_in_memory():
+def test_robustness_and_design_run_in_memory():
     asked = {"model": "rigid", "steps": 5, "roughness_m": [0.002], "max_steps": 50}
     found = walkerlab.robustness(walkerlab.compass(), 3, to=["slope_deg"], walks=4, **asked)
     assert [(row["model"], row["steps"]) for row in found.summary["largest_step"]] == [("rigid", 5)]
@@ -261,19 +259,19 @@ def test_robustness_and_design_are_asked_in_memory():
     assert walker.summary["best"] == {"slope_deg": 3.0}
 
 
-def test_a_sweep_without_xarray_computes_nothing(tmp_path, monkeypatch):
+def test_sweep_without_xarray_computes_nothing(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ConfigError, match="a Dataset needs xarray"):
         walkerlab.sweep("fixedpoint", {"slope_deg": [1, 2]}, runs=tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
 
 
-def test_a_list_without_an_end_is_refused(tmp_path):
+def test_infinite_list_is_rejected(tmp_path):
     with pytest.raises(ConfigError, match="10000001 points"):
         walkerlab.sweep("fixedpoint", {"seed": itertools.count()}, runs=tmp_path / "runs")
 
 
-def test_a_model_is_written_with_the_start_of_its_gait(tmp_path):
+def test_exported_model_starts_on_its_gait(tmp_path):
     walker = walkerlab.compass(foot_radius_m=0.1)
     written = walkerlab.export_model(tmp_path / "round.adm", walker, slope_deg=0.9, strides=2, law="functions")
     assert [path.name for path in written] == ["round.adm", "round.acf"]
@@ -282,7 +280,7 @@ def test_a_model_is_written_with_the_start_of_its_gait(tmp_path):
         walkerlab.export_model(tmp_path / "round.pdf")
 
 
-def test_a_walker_is_identified_in_memory():
+def test_identify_runs_in_memory():
     walk = walkerlab.simulate(slope_deg=3, strides=5, start=[-2.0 * np.radians(3.0) - 0.2253, 0.2253, -0.37, -1.1])
     summary = walk.summary
     columns = {"period_s": summary["step_periods_s"], "length_m": summary["step_lengths_m"]}
@@ -292,7 +290,7 @@ def test_a_walker_is_identified_in_memory():
     assert slope["value"] == pytest.approx(3.0, abs=0.01)
 
 
-def test_measurements_are_planned_in_memory():
+def test_measurement_plan_runs_in_memory():
     plan = walkerlab.plan_measurements("slope-3deg", ["slope_deg"], steps=4, max_steps=6, errors={"slope_deg": 0.02})
     angles = plan.summary["measurements"][3]
     assert angles["measurement"] == "angles over time"
@@ -303,21 +301,21 @@ def test_measurements_are_planned_in_memory():
     ("maker", "block"),
     [(walkerlab.compass, CompassWalker), (walkerlab.kneed, Kneed), (walkerlab.contact, Contact)],
 )
-def test_editors_can_complete_every_key_of_a_walker_and_a_ground(maker, block):
+def test_walker_and_ground_signatures_list_every_key(maker, block):
     signature = inspect.signature(maker)
     assert set(signature.parameters) == {*block.model_fields, "others"} - {"type"}
     assert signature.return_annotation is block
     assert isinstance(maker(), block)
 
 
-def test_keys_that_are_passed_arrive_and_omitted_ones_keep_their_defaults():
+def test_omitted_keys_keep_their_defaults():
     walker = walkerlab.compass(leg_length_m=0.8, hip={"spring_N_m_per_rad": 1.0})
     assert (walker.leg_length_m, walker.foot_to_mass_m, walker.hip.spring_N_m_per_rad) == (0.8, 0.4, 1.0)
     assert walkerlab.kneed(thigh={"length_m": 0.4}).thigh.length_m == 0.4
     assert walkerlab.contact(friction="none", pad_pitch=0.2).pad_pitch == 0.2
 
 
-def test_values_of_a_result_are_attributes_and_items():
+def test_result_values_are_attributes_and_items():
     walk = walkerlab.simulate(strides=1)
     assert walk.outcome == walk["outcome"] == walk.summary["outcome"]
     assert walk.last_step_period_s == walk["last_step_period_s"] == walk.summary["step_periods_s"][-1]
@@ -325,7 +323,7 @@ def test_values_of_a_result_are_attributes_and_items():
     assert pickle.loads(pickle.dumps(walk)).outcome == copy.deepcopy(walk).outcome == "walked"
 
 
-def test_a_value_that_a_result_lacks_is_answered_with_a_hint():
+def test_missing_result_value_gives_a_hint():
     walk = walkerlab.simulate(strides=1)
     with pytest.raises(AttributeError, match=r"has no value 'outcom'\. Did you mean outcome\?"):
         _ = walk.outcom
@@ -356,7 +354,7 @@ def test_notebooks_show_a_result_as_tables(tmp_path):
     ],
     ids=["rigid", "contact", "basin"],
 )
-def test_a_result_in_memory_is_drawn(ask, names):
+def test_result_in_memory_can_be_plotted(ask, names):
     result = ask()
     assert names <= set(result.figures)
     for name in ("", *result.figures):
@@ -366,7 +364,7 @@ def test_a_result_in_memory_is_drawn(ask, names):
         result.plot("circle")
 
 
-def test_the_plot_of_a_gait_shows_its_multipliers():
+def test_plot_of_a_gait_shows_its_multipliers():
     gait = walkerlab.find_gait()
     (axes,) = gait.plot().axes
     points = [complex(*line.get_xydata()[0]) for line in axes.lines if line.get_marker() == "o"]
@@ -375,7 +373,7 @@ def test_the_plot_of_a_gait_shows_its_multipliers():
         walkerlab.find_gait(slope_deg=-1).plot()
 
 
-def test_a_group_of_arrays_becomes_a_table_with_units():
+def test_group_of_arrays_becomes_a_table_with_units():
     pytest.importorskip("pandas")
     walk = walkerlab.simulate(strides=1)
     steps = walk.to_dataframe()
@@ -392,7 +390,7 @@ def test_a_group_of_arrays_becomes_a_table_with_units():
         walk.to_dataframe("walks")
 
 
-def test_a_table_without_pandas_is_refused_with_advice(monkeypatch):
+def test_table_without_pandas_raises_an_error_with_advice(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ConfigError, match="a DataFrame needs pandas") as caught:
         walkerlab.find_gait().to_dataframe()
@@ -406,7 +404,7 @@ def mujoco():
     module.set_mjcb_control(None)
 
 
-def test_a_mujoco_model_walks_from_a_run_a_config_or_a_name(mujoco, tmp_path):
+def test_mujoco_model_is_built_from_a_run_a_config_or_a_name(mujoco, tmp_path):
     walkerlab.run("fixedpoint", "kneed", runs=tmp_path)
     run = walkerlab.open_run("kneed", tmp_path)
     for config in (run, run.config, "kneed"):
@@ -417,7 +415,7 @@ def test_a_mujoco_model_walks_from_a_run_a_config_or_a_name(mujoco, tmp_path):
         assert data.eq_active.all()
 
 
-def test_a_mujoco_model_takes_blocks_and_the_way_to_tilt(mujoco):
+def test_mujoco_model_accepts_blocks_and_tilt_option(mujoco):
     heavy = walkerlab.compass(hip_mass_kg=20)
     model, _ = walkerlab.mujoco_model("paper", slope="geometry", walker=heavy)
     assert model.body_subtreemass[model.joint("height").bodyid[0]] == pytest.approx(30.0)

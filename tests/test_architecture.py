@@ -95,7 +95,7 @@ def test_every_module_has_its_layer():
     assert [named(path) for path in IN_LAYERS if not layer_of(path)] == []
 
 
-def test_the_docs_list_the_same_layers():
+def test_docs_list_the_same_layers():
     text = (Path(__file__).parent.parent / "docs" / "architecture.md").read_text()
     listed = text.partition("## Layers")[2].partition("```text")[2].partition("```")[0]
     assert tuple(listed.replace(">", " ").split()) == LAYERS
@@ -113,7 +113,7 @@ def test_imports_run_downward():
 PHYSICS = sorted((PACKAGE / "physics").rglob("*.py"))
 
 
-def test_physics_knows_no_config_no_file_and_no_study():
+def test_physics_imports_no_config_file_or_study_code():
     known = {"physics", "outcome", "errors", "code_digest", "private_files"}
     assert len(PHYSICS) > 50
     assert exceptions(lambda path: {layer.partition(".")[0] for layer in imported_layers(path)} - known, PHYSICS) == {}
@@ -121,7 +121,7 @@ def test_physics_knows_no_config_no_file_and_no_study():
     assert exceptions(lambda path: {name.partition(".")[0] for name in imported_modules(path)} & foreign, PHYSICS) == {}
 
 
-def test_compiled_functions_stand_where_the_cache_key_looks():
+def test_compiled_functions_are_in_layers_covered_by_the_cache_key():
     elsewhere = [path for path in IN_LAYERS if layer_of(path) not in KERNEL_LAYERS | COMPILER]
     compilers = {"numba", "llvmlite"}
     assert exceptions(lambda path: {name.split(".")[0] for name in imported_modules(path)} & compilers, elsewhere) == {}
@@ -129,7 +129,7 @@ def test_compiled_functions_stand_where_the_cache_key_looks():
     assert exceptions(lambda path: compiling.intersection(imported_modules(path)), elsewhere) == {}
 
 
-def test_compiled_functions_are_made_only_of_what_the_cache_key_covers():
+def test_compiled_functions_import_only_code_covered_by_the_cache_key():
     """A constant from elsewhere would be frozen into machine code that its change does not renew."""
     covered = {*KERNEL_LAYERS, "physics.kernels", "physics.energy_channels", "outcome", "errors"}
     compiled = [path for path in IN_LAYERS if layer_of(path) in KERNEL_LAYERS]
@@ -137,7 +137,7 @@ def test_compiled_functions_are_made_only_of_what_the_cache_key_covers():
     assert exceptions(lambda path: imported_layers(path) - covered, compiled) == {}
 
 
-def test_no_two_modules_of_tests_have_one_name():
+def test_test_modules_have_unique_names():
     names = [path.name for path in Path(__file__).parent.rglob("*.py")]
     assert {name for name in names if names.count(name) > 1} <= {"conftest.py", "__init__.py"}
 
@@ -154,7 +154,7 @@ print(*sorted(sys.modules))
 """
 
 
-def test_a_walk_of_the_rigid_model_never_loads_contact_code(tmp_path):
+def test_rigid_walk_does_not_import_contact_code(tmp_path):
     config = tmp_path / "rigid.yaml"
     config.write_text("extends: rigid-only\nstrides: 1\n")
     command = [sys.executable, "-c", RUN, "simulate", "--config", str(config), "--runs", str(tmp_path), "--quiet"]
@@ -171,7 +171,7 @@ def test_a_walk_of_the_rigid_model_never_loads_contact_code(tmp_path):
     assert [name for name in loaded if name.startswith(physical)] == []
 
 
-def test_a_walk_from_a_given_start_loads_nothing_that_draws_or_seeks_gaits(tmp_path):
+def test_walk_from_a_given_start_imports_no_drawing_or_gait_search(tmp_path):
     config = tmp_path / "given.yaml"
     config.write_text("extends: rigid-only\nstrides: 1\nstart: [-0.2042, 0.1694, -0.6, -0.86]\n")
     command = [sys.executable, "-c", RUN, "simulate", "--config", str(config), "--runs", str(tmp_path), "--quiet"]
@@ -182,7 +182,7 @@ def test_a_walk_from_a_given_start_loads_nothing_that_draws_or_seeks_gaits(tmp_p
     assert {"matplotlib", "scipy.optimize", "walkerlab.physics.orbits.fixed_point", "jinja2"} & set(loaded) == set()
 
 
-def test_a_gait_is_found_and_told_without_the_page_or_scipy_linalg(tmp_path):
+def test_finding_a_gait_imports_neither_report_nor_scipy_linalg(tmp_path):
     command = [sys.executable, "-c", RUN, "fixedpoint", "--runs", str(tmp_path), "--force"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -205,13 +205,13 @@ def quoted_modules(path):
     return {match[0] for text in texts if isinstance(text, str) and (match := QUOTED_MODULE.match(text))}
 
 
-def test_no_module_names_one_of_a_higher_layer_in_quotes():
+def test_no_module_names_a_higher_layer_in_quotes():
     quoted = [(path, name, layer_of_module(name)) for path in IN_LAYERS for name in quoted_modules(path)]
     upward = [(named(path), name) for path, name, layer in quoted if layer and rank(layer) < rank(layer_of(path))]
     assert upward == []
 
 
-def test_quoted_names_of_modules_are_found_and_the_packages_own_extensions_are_listed_once():
+def test_built_in_extensions_are_listed_once():
     table = PACKAGE / "pipeline" / "stages" / "table.py"
     assert "walkerlab.pipeline.stages.simulate" in quoted_modules(table)
     listed = {code.partition(":")[0].removeprefix(".") for code in walkerlab.EXTENSIONS.values()}

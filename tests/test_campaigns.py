@@ -37,14 +37,14 @@ def kill():
     return script("kill_campaign")
 
 
-def test_fuzzed_configs_are_refused_in_words_or_walked(fuzz):
+def test_fuzzed_configs_walk_or_raise_config_error(fuzz):
     fates, wrong = fuzz.fuzz_configs(150, seed=1)
     assert wrong == []
     assert fates["refused with its place"] > 20
     assert sum(fates.values()) == 150
 
 
-def test_damaged_results_are_not_accepted(fuzz):
+def test_damaged_results_are_rejected(fuzz):
     fates, wrong = fuzz.damage_results(40, seed=1)
     assert wrong == []
     assert fates["not accepted"] > 20
@@ -56,7 +56,7 @@ def test_killed_runs_lose_nothing(kill):
     assert sum(moments.values()) == 3
 
 
-def test_runs_killed_while_each_result_is_made_lose_nothing(kill):
+def test_runs_killed_during_any_stage_lose_nothing(kill):
     moments, lost = kill.spread("simulate", "rigid-only", kills=2, seed=1)
     assert lost == []
     assert sum(moments.values()) == 2
@@ -66,11 +66,11 @@ def test_two_runs_at_once_do_not_disturb_each_other(kill):
     assert kill.together("simulate", "rigid-only", [2]) == []
 
 
-def test_random_walkers_with_light_hips_have_both_their_ordinary_gaits():
+def test_both_ordinary_gaits_of_random_light_hipped_walkers_are_found():
     assert script("walker_campaign").tally("light-hips", 12, seed=1).wrong == []
 
 
-def test_random_walkers_on_rough_ground_land_short_where_a_library_says():
+def test_short_landings_on_rough_ground_agree_with_an_independent_integrator():
     """Landings just ahead of the other foot, which once were steps, are among what is drawn."""
     found = script("walker_campaign").tally("straight-legs", 8, seed=1)
     assert found.wrong == []
@@ -78,14 +78,14 @@ def test_random_walkers_on_rough_ground_land_short_where_a_library_says():
 
 
 @pytest.mark.parametrize("name", ["straight-legs", "parts", "torso", "kneed-torso", "kneed-torque"])
-def test_gaits_of_random_walkers_forget_starts_aside_as_their_multipliers_say(name):
+def test_disturbances_of_random_gaits_decay_at_the_rate_of_their_multipliers(name):
     found = script("walker_campaign").tally(name, 6, seed=2)
     assert found.wrong == []
     assert found.steps_seen > 0
     assert sum(found.ends.values()) == 6
 
 
-def test_the_benchmark_compares_methods_that_are_exact_enough(monkeypatch):
+def test_benchmark_compares_methods_of_sufficient_accuracy(monkeypatch):
     benchmark = script("benchmark")
     monkeypatch.setattr(benchmark, "LADDER", (1e-10, 1e-11, 1e-12))
     against_numpy, against_ours, smallest = benchmark.rigid_lines(benchmark.Stopwatch(1, 0.0))
@@ -95,12 +95,12 @@ def test_the_benchmark_compares_methods_that_are_exact_enough(monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["../../x", "a/b", "..", "-x", MARKUP, "x\n", ""])
-def test_a_name_cannot_lead_out_of_the_runs_folder(name):
+def test_run_name_cannot_escape_the_runs_folder(name):
     with pytest.raises(ConfigError):
         load(sets=[f"name={name!r}"])
 
 
-def test_texts_of_cases_do_not_become_markup():
+def test_case_texts_are_escaped_in_the_page():
     case = CaseResult("x", "own", "contact", MARKUP, ("walked",), "fell", 0, 0.0, 1, 0.1, (), (MARKUP,))
     summary = summarise([case], [], [])
     stability = type("Stored", (), {"summary": summary, "groups": {}})()
@@ -109,7 +109,7 @@ def test_texts_of_cases_do_not_become_markup():
     assert "&lt;script&gt;" in page
 
 
-def test_stiffer_ground_does_not_let_the_trailing_foot_go_as_the_rigid_impact_does():
+def test_trailing_foot_keeps_slipping_on_stiffer_ground_unlike_in_the_rigid_impact():
     script("flip_shift")
     trailing = script("trailing_foot")
     losses, shares = [], []

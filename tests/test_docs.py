@@ -67,7 +67,7 @@ def commands():
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
-def test_links_lead_to_files_that_are_there(path):
+def test_links_lead_to_existing_files(path):
     relative = [link for link in LINK.findall(text_of(path)) if "://" not in link]
     assert [link for link in relative if not (path.parent / link).exists()] == []
 
@@ -80,7 +80,7 @@ def anchors(page):
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
-def test_links_lead_to_headings_that_are_there(path):
+def test_links_lead_to_existing_headings(path):
     links = [(file, anchor) for file, anchor in ANCHOR.findall(text_of(path)) if "://" not in file]
     assert [link for link in links if link[1] not in anchors(path.parent / link[0] if link[0] else path)] == []
 
@@ -90,7 +90,7 @@ def code_to_add():
     return re.findall(r"^```python\n(.*?)^```$", text_of(ROOT / "docs" / "adding.md"), re.DOTALL | re.MULTILINE)
 
 
-def test_the_figure_of_the_docs_is_drawn(tmp_path, monkeypatch):
+def test_example_figure_of_the_docs_is_drawn(tmp_path, monkeypatch):
     words = re.search(r"^```jinja\n(.*?)^```$", text_of(ROOT / "docs" / "adding.md"), re.DOTALL | re.MULTILINE)[1]
     (tmp_path / "slip-per-step.j2").write_text(words, encoding="utf-8")
     monkeypatch.setattr(illustration, "WORDS", replace(illustration.WORDS, folder=tmp_path))
@@ -106,7 +106,7 @@ def test_the_figure_of_the_docs_is_drawn(tmp_path, monkeypatch):
     assert drawing.caption.endswith("contact model, at most 0.6 mm.")
 
 
-def test_the_stage_of_the_docs_runs():
+def test_example_stage_of_the_docs_runs():
     type_it_takes, module, entry = (code for code in code_to_add() if "peed" in code)
     names = {"Protocol": Protocol, "Mapping": dict, "Content": Content, "Group": Group, "Variable": Variable}
     exec(type_it_takes + module, names | {"Progress": object, "Stage": Stage, "results_of": results_of}, names)
@@ -118,7 +118,7 @@ def test_the_stage_of_the_docs_runs():
     assert found.summary == {"speed_m_s": 1.0, "froude": 0.1}
 
 
-def test_the_friction_of_the_docs_is_a_whole_law_with_the_derivative_that_it_says(monkeypatch):
+def test_example_friction_law_of_the_docs_is_complete_and_its_derivative_correct(monkeypatch):
     monkeypatch.setattr(friction_coefficient, "_bodies", dict(friction_coefficient._bodies))
     example = runpy.run_path(str(ROOT / "docs" / "examples" / "extension" / "tanh_friction" / "law.py"))["Tanh"]
     assert missing_members(example) == []
@@ -134,7 +134,7 @@ def test_the_friction_of_the_docs_is_a_whole_law_with_the_derivative_that_it_say
 
 
 @pytest.mark.parametrize("page", ["architecture", "pipeline", "adding"])
-def test_files_and_names_of_the_pages_about_the_inside_are_there(page):
+def test_files_and_names_in_the_developer_pages_exist(page):
     text = re.sub(r"^```.*?^```$", "", text_of(ROOT / "docs" / f"{page}.md"), flags=re.DOTALL | re.MULTILINE)
     source = "".join(text_of(file) for file in (ROOT / "walkerlab").rglob("*.py"))
     said = set(re.findall(r"`([a-z_/]+\.py|[a-z_]+/[a-z_/]+)`", text)) - {
@@ -159,7 +159,7 @@ def named_runs():
 
 
 @pytest.mark.parametrize("command", commands())
-def test_a_documented_command_is_accepted(command, tmp_path, monkeypatch):
+def test_documented_command_is_accepted(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     stands_for = {"STAGE": "fixedpoint", "FILE": "my.yaml"}
     words = [stands_for.get(word, word) for word in shlex.split(command)[1:]]
@@ -183,7 +183,7 @@ def commands_around_runs():
 
 
 @pytest.mark.parametrize("command", commands_around_runs())
-def test_a_documented_command_around_runs_has_the_options_that_it_is_given(command):
+def test_documented_run_commands_have_their_options(command):
     _, name, *words = shlex.split(command)
     asked = whole_program().commands[name]
     if words:
@@ -200,7 +200,7 @@ def test_every_command_is_in_the_docs():
 @pytest.mark.parametrize(
     "text", re.findall(r"^```yaml\n(.*?)^```$", text_of(ROOT / "README.md"), re.DOTALL | re.MULTILINE)
 )
-def test_a_documented_config_is_accepted(text, tmp_path):
+def test_documented_config_is_accepted(text, tmp_path):
     path = tmp_path / "my.yaml"
     path.write_text(text, encoding="utf-8")
     assert load(path, ()).config
@@ -217,11 +217,11 @@ def run(command, exit_code_before):
 
 
 @pytest.mark.parametrize("path", MAKER["with_examples"](), ids=lambda path: path.name)
-def test_examples_print_what_documents_show(path, tmp_path):
+def test_documented_output_is_the_actual_output(path, tmp_path):
     assert "\n".join(MAKER["differences"](path, tmp_path, run=run)) == ""
 
 
-def test_an_example_that_prints_otherwise_is_found(tmp_path):
+def test_example_with_different_output_is_detected(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(
         "```yaml\n# a.yaml\nname: a\n```\n```console\n$ cat a.yaml\n...\nname: b\n$ ls -- no-such; exit 3\n...\n"
@@ -239,29 +239,29 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", MAKER["DOCUMENTS"])
-def test_tables_are_what_the_tool_gives(name, results):
+def test_generated_tables_are_up_to_date(name, results):
     text = text_of(ROOT / name)
     assert MAKER["refreshed"](text, results) == text, "run: python scripts/refresh_docs.py"
 
 
-def test_every_part_has_a_maker_and_a_place():
+def test_every_generated_part_has_a_generator_and_is_used_once():
     placed = [part for name in MAKER["DOCUMENTS"] for _, part, _, _ in MAKER["PART"].findall(text_of(ROOT / name))]
     assert sorted(placed) == sorted(MAKER["PARTS"])
 
 
-def test_the_index_leads_to_every_page_and_the_readme_to_the_index():
+def test_index_links_every_page_and_the_readme_links_the_index():
     index = text_of(ROOT / "docs" / "index.md")
     pages = {page.name for page in (ROOT / "docs").glob("*.md")} - {"index.md"}
     assert sorted(page for page in pages if f"({page})" not in index) == []
     assert "(docs/index.md)" in text_of(ROOT / "README.md")
 
 
-def test_the_api_reference_has_every_name_of_the_package():
+def test_api_reference_has_every_name_of_the_package():
     listed = re.search(r"members: \[(.*)\]", text_of(ROOT / "docs" / "api.md"))[1].split(", ")
     assert sorted(listed) == sorted(set(walkerlab.__all__) - {"Config", "ConfigError"})
 
 
-def test_the_api_reference_shows_arguments_as_a_list_and_examples_as_code():
+def test_api_reference_shows_arguments_as_a_list_and_examples_as_code():
     pytest.importorskip("griffe")
     shown = runpy.run_path(str(ROOT / "scripts" / "api_docstrings.py"))["as_markdown"]
     assert shown("Walk.\n\nslope_deg  downhill,\n           deg\na, b       both\n\n>>> 1 + 1\n2\n\nEnd.") == (
@@ -279,15 +279,15 @@ def test_every_picture_of_the_docs_is_registered_and_on_a_page():
 @pytest.mark.parametrize(
     "page", ["index", "tutorial", "howto", "identify", "walkers", "explore", "exchange", "recordings"]
 )
-def test_a_page_for_newcomers_has_a_picture(page):
+def test_page_for_newcomers_has_a_picture(page):
     assert re.search(r"^!\[[^]]+\]\(images/", text_of(ROOT / "docs" / f"{page}.md"), re.MULTILINE)
 
 
-def test_pictures_have_the_words_that_are_drawn_today(tmp_path):
+def test_pictures_contain_the_labels_drawn_today(tmp_path):
     assert list(MAKER["stale_pictures"](tmp_path)) == [], "run: python scripts/refresh_docs.py --pictures"
 
 
-def test_a_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
+def test_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
     pictures = MAKER["stale_pictures"].__globals__
     shutil.copytree(ROOT / "docs" / "images", tmp_path / "images")
     monkeypatch.setitem(pictures, "IMAGES", tmp_path / "images")
@@ -297,13 +297,13 @@ def test_a_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
     assert list(MAKER["stale_pictures"](tmp_path / "runs")) == [tmp_path / "images" / "figure-06.png"]
 
 
-def test_words_of_a_drawing_leave_numbers_out():
+def test_words_of_a_drawing_exclude_numbers():
     words_of = MAKER["stale_pictures"].__globals__["words_of"]
     svg = "<text x='1'>slope (rad)</text><text>0.25</text><text><tspan>step 12</tspan></text>"
     assert words_of(svg) == "slope (rad)\nstep #\n"
 
 
-def test_links_out_of_the_site_lead_to_source_code_and_become_text():
+def test_links_that_leave_the_site_become_text_or_source_links():
     keep_text = runpy.run_path(str(ROOT / "scripts" / "mkdocs_hooks.py"))["on_page_markdown"]
     assert keep_text("See [`tree.py`](../walkerlab/tree.py) and [theory](theory.md).", page=None) == (
         "See `tree.py` and [theory](theory.md)."
@@ -313,13 +313,13 @@ def test_links_out_of_the_site_lead_to_source_code_and_become_text():
         assert [link for link in outside if not link.startswith(("../walkerlab/", "../tests/", "../configs/"))] == []
 
 
-def test_the_start_page_links_every_page_of_the_site():
+def test_start_page_links_every_page_of_the_site():
     pages = re.findall(r": ([\w-]+\.md)$", text_of(ROOT / "scripts" / "mkdocs.yml"), re.MULTILINE)
     assert "identify.md" in pages
     assert [page for page in pages if f"({page})" not in text_of(ROOT / "docs" / "index.md")] == ["index.md"]
 
 
-def test_the_gallery_has_a_page_whose_gaits_walk(tmp_path):
+def test_gallery_page_contains_animated_gaits(tmp_path):
     make = runpy.run_path(str(ROOT / "scripts" / "make_gallery.py"))["sweep_page"]
     make.__globals__.update(SLOPES="3:20:2", HIPS=[10])
     page = make(tmp_path)
@@ -332,7 +332,7 @@ def test_the_gallery_has_a_page_whose_gaits_walk(tmp_path):
     assert "no gait" in none["said"]
 
 
-def test_the_draft_of_the_paper_cites_what_its_references_hold_and_leaves_its_blanks_marked():
+def test_paper_draft_cites_every_reference_and_marks_its_blanks():
     folder = ROOT / "docs" / "joss"
     text, references = text_of(folder / "paper.md"), text_of(folder / "paper.bib")
     assert set(re.findall(r"@(\w+)", text.partition("# Summary")[2])) == set(
@@ -343,6 +343,6 @@ def test_the_draft_of_the_paper_cites_what_its_references_hold_and_leaves_its_bl
     assert text.count("[BLANK") >= 5
 
 
-def test_the_pipeline_page_draws_every_stage():
+def test_pipeline_diagram_contains_every_stage():
     drawing = re.search(r"```mermaid\n(.*?)```", text_of(ROOT / "docs" / "pipeline.md"), re.DOTALL)[1]
     assert [stage.name for stage in PIPELINE.stages if not re.search(rf"\b{stage.name}\b", drawing)] == []

@@ -23,18 +23,18 @@ def test_each_failure_has_the_exit_code_of_the_command_line(kind: type[errors.Wa
     assert kind.exit_code == exit_code
 
 
-def test_a_failure_says_what_happened_and_what_to_do() -> None:
+def test_failure_says_what_happened_and_what_to_do() -> None:
     error = errors.NoAnswer("no gait at 10 deg", "try a slope below 5 deg", partial={"states": 3})
     assert (str(error), error.advice, error.partial) == ("no gait at 10 deg", "try a slope below 5 deg", {"states": 3})
 
 
-def test_a_failure_survives_the_way_from_a_worker_process() -> None:
+def test_failure_survives_pickling_from_a_worker_process() -> None:
     sent = errors.NoAnswer("no gait", "less slope")
     got = pickle.loads(pickle.dumps(sent))
     assert (type(got), got.message, got.advice) == (errors.NoAnswer, "no gait", "less slope")
 
 
-def test_a_failure_quotes_no_character_that_controls_a_terminal() -> None:
+def test_failure_messages_contain_no_control_characters() -> None:
     name = "hip\x1b[2J\x1b]0;gone\x07\r\u202e\x9b1m, Hüfte\n\tfoot"
     error = errors.ConfigError(f"no column {name}", f"Name it: {name}")
     told = "hip\\x1b[2J\\x1b]0;gone\\x07\\r\\u202e\\x9b1m, Hüfte\n\tfoot"

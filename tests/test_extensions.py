@@ -88,12 +88,12 @@ def walked(example):
     return example, json.loads(done.stdout)
 
 
-def test_a_law_and_its_figure_take_at_most_forty_lines():
+def test_example_law_and_figure_take_at_most_forty_lines():
     texts = [path.read_text() for path in (EXAMPLE / PACKAGE).glob("*.py")]
     assert sum(bool(line.strip()) for text in texts for line in text.splitlines()) <= 40
 
 
-def test_the_docs_show_the_whole_example():
+def test_docs_show_the_whole_example():
     page = (ROOT / "docs" / "adding.md").read_text()
     for path in (EXAMPLE / PACKAGE).glob("*.py"):
         assert f"```python\n{path.read_text()}```" in page
@@ -101,7 +101,7 @@ def test_the_docs_show_the_whole_example():
     assert f"```toml\n{chr(10).join(lines[-2:])}\n```" in page
 
 
-def test_the_example_can_be_installed_by_pip(tmp_path):
+def test_example_can_be_installed_with_pip(tmp_path):
     pytest.importorskip("hatchling")
     pytest.importorskip("pip")
     source = shutil.copytree(EXAMPLE, tmp_path / "source")
@@ -112,13 +112,13 @@ def test_the_example_can_be_installed_by_pip(tmp_path):
     assert "tanh-friction (tanh-friction 1.0): friction: tanh\n" in Site(tmp_path)("extensions").stdout
 
 
-def test_a_walk_uses_the_law_of_an_extension_and_records_where_it_came_from(walked):
+def test_walk_uses_the_law_of_an_extension_and_records_its_origin(walked):
     site, summary = walked
     assert summary["friction"] == "friction of 0.7 tanh(v / 0.1 m/s)"
     assert "tanh-friction 1.0" in site("show", "tanh", "contact-sim").stdout
 
 
-def test_the_figure_of_an_extension_is_drawn(walked):
+def test_figure_of_an_extension_is_drawn(walked):
     site, _ = walked
     done = site("export", "tanh", "friction-over-slip", "--to", "svg", "-o", "drawn.svg")
     assert done.returncode == 0, done.stderr
@@ -130,7 +130,7 @@ def stale(site):
     return {row["stage"] for row in rows if row["state"] == "stale"}
 
 
-def test_an_edited_law_renews_its_results_and_an_edited_figure_does_not(walked):
+def test_editing_a_law_invalidates_results_but_editing_a_figure_does_not(walked):
     site, _ = walked
     law, figure = (site.packages / PACKAGE / f"{name}.py" for name in ("law", "figure"))
     before = {path: path.read_text() for path in (law, figure)}
@@ -165,7 +165,7 @@ def answer():
 """
 
 
-def test_an_edited_law_renews_its_kernels(site):
+def test_editing_a_law_recompiles_its_kernels(site):
     install_example(site.packages)
     (site.packages / "kernel_of_friction.py").write_text(KERNEL)
 
@@ -182,7 +182,7 @@ def test_an_edited_law_renews_its_kernels(site):
     assert compiled() == ["friction_at"]
 
 
-def test_the_schema_says_where_a_word_comes_from(example):
+def test_schema_names_the_extension_of_an_option(example):
     assert "tanh: extension tanh-friction (tanh-friction 1.0)" in " ".join(
         example("schema", "contact.friction").stdout.split()
     )
@@ -191,7 +191,7 @@ def test_the_schema_says_where_a_word_comes_from(example):
     assert "tanh-friction 1.0" in schema["source"]
 
 
-def test_the_packages_own_extensions_are_listed_with_what_they_add(example):
+def test_built_in_extensions_are_listed_with_what_they_add(example):
     rows = {row["name"]: row for row in json.loads(example("extensions", "--json").stdout)["extensions"]}
     assert list(rows) == [*walkerlab.EXTENSIONS, "tanh-friction"]
     assert rows["study"]["source"] == f"walkerlab {walkerlab.__version__}"
@@ -199,7 +199,7 @@ def test_the_packages_own_extensions_are_listed_with_what_they_add(example):
     assert rows["tanh-friction"]["adds"]["friction"] == ["tanh"]
 
 
-def test_a_config_whose_extension_is_missing_is_told_what_is_installed(site):
+def test_config_with_a_missing_extension_lists_the_installed_ones(site):
     add(site.packages, "other", "from walkerlab.extensions import Extension\nEXTENSION = Extension(1)\n")
     done = site("contact-sim", "--set", "contact.friction=tanh")
     assert done.returncode == 3
@@ -232,7 +232,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("why", FAULTS)
-def test_a_broken_extension_is_named_and_left_out_and_the_rest_works(site, why):
+def test_broken_extension_is_reported_and_the_rest_works(site, why):
     install_example(site.packages)
     add(site.packages, "broken", FAULTS[why])
     done = site("schema", "contact.friction")
@@ -262,7 +262,7 @@ CLASHES = {
 
 
 @pytest.mark.parametrize("message", CLASHES)
-def test_two_equal_names_are_an_error_of_every_command(site, message):
+def test_duplicate_names_are_an_error_in_every_command(site, message):
     install_example(site.packages)
     add(site.packages, "second", CLASHES[message])
     done = site("schema", "gravity_m_s2")
@@ -272,7 +272,7 @@ def test_two_equal_names_are_an_error_of_every_command(site, message):
     assert "second" in site("extensions").stdout
 
 
-def test_two_extensions_of_one_name_are_an_error(site):
+def test_extensions_of_equal_name_are_an_error(site):
     add(site.packages, "first", extension(), same="first:EXTENSION")
     add(site.packages, "second", extension(), same="second:EXTENSION")
     assert "first 1.0 and second 1.0 both add the extension same." in site("schema", "seed").stderr
@@ -285,7 +285,7 @@ print(*(found.name for found in registry() if found.source), "importlib.metadata
 """
 
 
-def test_folders_are_scanned_again_only_after_they_have_changed(site):
+def test_unchanged_folders_are_not_scanned_again(site):
     long_ago = 1_600_000_000
     install_example(site.packages)
     os.utime(site.packages, (long_ago, long_ago))
@@ -299,7 +299,7 @@ def test_folders_are_scanned_again_only_after_they_have_changed(site):
     assert site.python(SCANNED).stdout.split() == ["new", "True"]
 
 
-def test_without_a_place_for_scans_each_process_scans(site):
+def test_without_a_cache_folder_each_process_scans(site):
     install_example(site.packages)
     for _ in range(2):
         done = site.python(SCANNED, environment={"XDG_CACHE_HOME": "nowhere"})
@@ -307,7 +307,7 @@ def test_without_a_place_for_scans_each_process_scans(site):
     assert [path.name for path in site.folder.iterdir()] == ["site"]
 
 
-def test_scans_that_others_may_have_written_are_not_trusted(site):
+def test_scans_writable_by_others_are_not_trusted(site):
     long_ago = 1_600_000_000
     install_example(site.packages)
     os.utime(site.packages, (long_ago, long_ago))
@@ -319,7 +319,7 @@ def test_scans_that_others_may_have_written_are_not_trusted(site):
     assert site.python(SCANNED).stdout.split() == ["tanh-friction", "True"]
 
 
-def test_a_worker_with_other_extensions_says_which(example):
+def test_worker_with_different_extensions_reports_them(example):
     refuse_other_versions("")
     config = load().config
     asked = "tanh-friction: tanh-friction 1.0 (code 0123abcd)"
@@ -339,7 +339,7 @@ main()
 """
 
 
-def test_the_study_runs_from_a_copy_outside_the_package(site):
+def test_study_runs_from_a_copy_outside_the_package(site):
     """The evidence uses nothing that other packages cannot use: the same walk is judged the same from outside."""
     shutil.copytree(
         Path(walkerlab.__file__).parent / "evidence",
@@ -362,6 +362,6 @@ def test_the_study_runs_from_a_copy_outside_the_package(site):
     assert judged["paper_numbers"] == expected["paper_numbers"]
 
 
-def test_an_extension_lists_all_code_that_it_names():
+def test_extension_lists_all_code_that_it_names():
     everything = Extension(1, figures="a:A", sections={"task": ("b:B",)}, friction={"icy": "c:C"})
     assert [*everything.code()] == ["a:A", "b:B", "c:C"]

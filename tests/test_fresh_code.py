@@ -74,7 +74,7 @@ def compiled(folder):
     return {path.name: path.stat().st_mtime_ns for path in folder.rglob("*.kernel")}
 
 
-def test_an_edited_function_of_another_file_never_runs_stale(copy):
+def test_editing_an_imported_function_recompiles_its_callers(copy):
     package, run = copy
     called = package / "physics" / "mechanics" / "trial_of_code.py"
     before = called.stat()
@@ -85,7 +85,7 @@ def test_an_edited_function_of_another_file_never_runs_stale(copy):
     assert run()[0] == 10.0
 
 
-def test_the_package_as_before_installed_anew_or_elsewhere_uses_what_is_compiled(copy, tmp_path):
+def test_reinstalled_or_moved_package_reuses_compiled_code(copy, tmp_path):
     package, run = copy
     _, folder = run()
     kept = compiled(tmp_path / "cache" / folder)
@@ -103,7 +103,7 @@ def test_the_package_as_before_installed_anew_or_elsewhere_uses_what_is_compiled
 
 
 @pytest.mark.parametrize("also", [False, True], ids=["chosen", "chosen and usual"])
-def test_a_cache_folder_that_cannot_be_written_into_is_told_once_and_workers_use_the_same(copy, tmp_path, also):
+def test_unwritable_cache_is_reported_once_and_workers_share_a_substitute(copy, tmp_path, also):
     (tmp_path / "file").write_text("")
     usual = str(tmp_path / ("file" if also else "usual"))
     given = {"WALKERLAB_CACHE": str(tmp_path / "file"), "XDG_CACHE_HOME": usual, "TMPDIR": str(tmp_path)}
@@ -146,7 +146,7 @@ twice(3.0)
 """
 
 
-def test_a_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
+def test_cache_folder_chosen_after_the_import_is_used(copy, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "at-first")}
     command = [sys.executable, "-c", CHOSEN_LATE, str(tmp_path / "later")]
     subprocess.run(command, cwd=tmp_path, env=environment, check=True)
@@ -171,11 +171,11 @@ def generations(copy, tmp_path):
     return left_after_a_new_one
 
 
-def test_older_compiled_code_that_others_may_be_using_is_left(generations):
+def test_recently_used_older_code_is_kept(generations):
     assert generations(days=1) == list(range(12))
 
 
-def test_compiled_code_that_nobody_has_used_for_long_goes_but_for_the_latest(generations):
+def test_long_unused_compiled_code_is_deleted_except_the_latest(generations):
     assert generations(days=100) == list(range(KEPT_GENERATIONS - 1))
 
 
@@ -189,7 +189,7 @@ print(twice(3))
 """
 
 
-def test_a_process_whose_compiled_code_is_removed_compiles_anew(copy, tmp_path):
+def test_process_recompiles_if_its_compiled_code_is_removed(copy, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "WALKERLAB_CACHE": str(tmp_path / "cache")}
     done = subprocess.run(
         [sys.executable, "-c", FOLDER_GONE], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
@@ -236,7 +236,7 @@ def digest_after_an_edit(unchanged, tmp_path_factory):
         "physics/mechanics/parts.py",
     ],
 )
-def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(digest_after_an_edit, path):
+def test_editing_uncompiled_code_keeps_the_compiled_code(digest_after_an_edit, path):
     before, after = digest_after_an_edit(path)
     assert after == before
 
@@ -251,12 +251,12 @@ def test_an_edit_outside_the_compiled_parts_keeps_the_compiled_code(digest_after
         "physics/compiler.py",
     ],
 )
-def test_an_edit_of_what_kernels_are_made_of_compiles_them_anew(digest_after_an_edit, path):
+def test_editing_kernel_sources_recompiles_them(digest_after_an_edit, path):
     before, after = digest_after_an_edit(path)
     assert after != before
 
 
-def test_each_processor_has_compiled_code_of_its_own(copy, monkeypatch):
+def test_each_processor_type_has_separate_compiled_code(copy, monkeypatch):
     _, run = copy
     _, here = run()
     monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
@@ -280,7 +280,7 @@ print(own(1.0), own._cache.cache_path)
 
 
 @pytest.mark.usefixtures("copy")
-def test_what_another_program_caches_stays_where_it_was(tmp_path):
+def test_numba_cache_of_another_program_stays_in_its_folder(tmp_path):
     program = tmp_path / "elsewhere" / "program.py"
     program.parent.mkdir()
     program.write_text(NOTEBOOK)
@@ -344,7 +344,7 @@ def valued(system: Any) -> float:
 '''
 
 
-def test_code_compiled_for_types_of_another_program_does_not_stand_in_the_way(copy, tmp_path):
+def test_code_compiled_for_types_of_another_program_is_ignored(copy, tmp_path):
     package, _ = copy
     (package / "physics" / "mechanics" / "trial_of_system.py").write_text(SYSTEM)
     (package / "physics" / "orbits" / "trial_of_system.py").write_text(VALUED)
@@ -401,13 +401,13 @@ def built(copy, tmp_path):
     return package, run
 
 
-def test_kernels_from_the_package_are_used_and_nothing_is_compiled_or_written(built, tmp_path):
+def test_packaged_kernels_are_used_without_compiling_or_writing(built, tmp_path):
     _, run = built
     assert run(USE) == ["8.0", ""]
     assert not (tmp_path / "cache").exists()
 
 
-def test_a_processor_that_lacks_what_the_packages_kernels_need_compiles_its_own(built):
+def test_processor_without_required_features_compiles_its_own_kernels(built):
     _, run = built
     value, name, why = run(USE, NUMBA_CPU_FEATURES="")
     assert (value, name) == ("8.0", "twice")
@@ -433,7 +433,7 @@ def test_kernels_built_from_other_sources_are_not_used(built):
     assert why.startswith("sources differs: ")
 
 
-def test_a_damaged_kernel_of_the_package_is_compiled_once(built):
+def test_damaged_packaged_kernel_is_compiled_once(built):
     package, run = built
     (file,) = (package / "physics" / "machine_code").glob("*.kernel")
     file.write_bytes(file.read_bytes()[:-1])
@@ -460,7 +460,7 @@ print(valued(Law(1.0)), *names, sep="|")
 """
 
 
-def test_an_edited_law_of_a_user_never_runs_stale(copy, tmp_path):
+def test_editing_a_user_law_recompiles_it(copy, tmp_path):
     package, _ = copy
     (package / "physics" / "mechanics" / "trial_of_system.py").write_text(SYSTEM)
     (package / "physics" / "orbits" / "trial_of_system.py").write_text(VALUED)

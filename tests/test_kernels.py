@@ -65,7 +65,7 @@ def allocating(n):
     return np.zeros(n).sum()
 
 
-def test_memory_comes_with_the_arguments():
+def test_kernels_cannot_allocate_memory():
     """Code that allocates would count references, which takes as long as its arithmetic."""
     with pytest.raises(TypingError):
         allocating(3)
@@ -73,7 +73,7 @@ def test_memory_comes_with_the_arguments():
 
 
 @pytest.mark.parametrize("shape", [Circle(2.0), Square(3.0)])
-def test_the_body_is_chosen_by_type_in_python_and_compiled(shape):
+def test_dispatch_by_type_works_in_python_and_compiled(shape):
     assert compiled_area(shape) == area(shape) == uncompiled(compiled_area)(shape)
 
 
@@ -84,7 +84,7 @@ class Blob(NamedTuple):
 
 
 @pytest.mark.parametrize("call", [area, compiled_area], ids=["python", "compiled"])
-def test_a_type_without_a_body_is_refused_in_one_line_that_names_it(call):
+def test_type_without_a_case_is_named_in_one_line(call):
     with pytest.raises(TypeError) as said:
         call(Blob(1.0))
     assert str(said.value) == "area has no case for Blob: register one with @area.case(...)"
@@ -108,7 +108,7 @@ def compiled_corners(shape):
     return corners(shape)
 
 
-def test_types_without_a_body_of_their_own_have_the_default():
+def test_types_without_a_case_use_the_default():
     for shape, expected in ((Circle(1.0), 0), (Square(1.0), 4)):
         assert compiled_corners(shape) == corners(shape) == expected
     assert Square in corners
@@ -144,7 +144,7 @@ def filled_twice(box, share):
     return filled(box, share) + filled(box, 2.0 * share)
 
 
-def test_a_record_handed_on_by_its_address_is_the_callers_own():
+def test_record_passed_by_reference_is_not_copied():
     """If a new numba breaks this, see `Reference`."""
     for run in (filled_twice, uncompiled(filled_twice)):
         box = Box(np.array([1.0, 2.0]), 3.0, Lid(True, np.array([5.0, 7.0])))
@@ -180,7 +180,7 @@ def scratch_beside_scratch(like, out):
 
 
 @pytest.mark.parametrize("like", [(0.0, 0.0, 0.0), np.rec.array([((1.0, 2.0, 3.0),)], dtype=[("n", "f8", (3,))])[0]])
-def test_scratch_is_as_long_as_its_type_says_and_its_functions_own(like):
+def test_scratch_arrays_have_the_length_of_their_type_and_are_not_shared(like):
     """If a new numba breaks this, what kernels compute is wrong: see `_on_the_stack`."""
     function = scratch_beside_scratch if isinstance(like, tuple) else scratch_like_a_field
     for run in (function, uncompiled(function)):
@@ -199,7 +199,7 @@ def scratch_like_a_field(record, out):
     return len(mine)
 
 
-def test_scratch_that_is_read_unwritten_shows_in_python():
+def test_uninitialised_scratch_is_nan_in_python():
     assert np.isnan(vector((0.0, 0.0))).all()
     assert np.isnan(matrix((0.0, 0.0))).all()
 
@@ -214,7 +214,7 @@ def squared_twice(x):
     return (lambda y: squared(y))(squared(x))
 
 
-def test_a_function_inside_a_kernel_is_compiled_with_it():
+def test_function_inside_a_kernel_is_compiled_with_it():
     assert squared_twice(3.0) == uncompiled(squared_twice)(3.0) == 81.0
 
 
@@ -246,7 +246,7 @@ def nested(tmp_path, monkeypatch):
     kernel_cache.cache_folder.cache_clear()
 
 
-def test_a_kernel_called_by_a_kernel_is_compiled_into_it(nested, tmp_path):
+def test_kernel_called_by_a_kernel_is_compiled_into_it(nested, tmp_path):
     """Stored machine code cannot be linked."""
     names = []
     with watch_compilation(names.append):
@@ -255,7 +255,7 @@ def test_a_kernel_called_by_a_kernel_is_compiled_into_it(nested, tmp_path):
     assert [path.name.partition("-")[0] for path in tmp_path.rglob("*.kernel")] == ["outer"]
 
 
-def test_a_kernel_whose_compilation_is_interrupted_gives_its_lock_back(nested):
+def test_interrupted_compilation_releases_its_lock(nested):
     def interrupt(_):
         raise KeyboardInterrupt
 
@@ -267,7 +267,7 @@ def test_a_kernel_whose_compilation_is_interrupted_gives_its_lock_back(nested):
 @pytest.mark.parametrize(
     "damage", [lambda data: data[:-100], lambda data: data[:500] + b"x" + data[501:], lambda _: b""]
 )
-def test_damaged_machine_code_is_compiled_again(nested, tmp_path, damage):
+def test_damaged_machine_code_is_recompiled(nested, tmp_path, damage):
     assert nested.inner(1.0) == 2.0
     (stored,) = tmp_path.rglob("inner*.kernel")
     stored.write_bytes(damage(stored.read_bytes()))
@@ -292,7 +292,7 @@ def test_machine_code_without_its_bitcode_runs(nested, tmp_path):
     assert [path.stat().st_mtime_ns for path in tmp_path.rglob("*.kernel")] == [written]
 
 
-def test_machine_code_names_records_by_their_layout_so_that_processes_agree(monkeypatch):
+def test_machine_code_names_records_by_their_layout(monkeypatch):
     two, three = (typeof(np.zeros((), [("numbers", float, (n,))])).dtype for n in (2, 3))
     named = mangle_type(two)
     assert named != mangle_type(three)

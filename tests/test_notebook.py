@@ -21,20 +21,20 @@ def names():
     names["plt"].close("all")
 
 
-def test_a_step_takes_longer_on_soft_ground(names):
+def test_steps_take_longer_on_soft_ground(names):
     periods = [names[walk].summary["step_periods_s"][-1] for walk in ("rigid", "soft")]
     assert names["gait"].summary["stable"]
     assert periods[0] < periods[1] < 1.05 * periods[0]
 
 
-def test_the_gait_loses_its_stability_between_four_and_five_degrees(names):
+def test_gait_loses_stability_between_four_and_five_degrees(names):
     assert [names["gaits"][slope]["stable"] for slope in names["slopes"]] == [True, True, True, True, False]
 
 
-def test_on_the_steep_slope_it_is_said_in_words_why_there_is_no_gait(names):
+def test_notebook_explains_the_missing_gait_on_a_steep_slope(names):
     assert "no gait" in names["steep"].no_answer
 
 
-def test_it_is_stored_as_it_was_run():
+def test_stored_notebook_was_run_from_top_to_bottom():
     cells = [cell for cell in json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))

@@ -48,7 +48,7 @@ def assigned_names(tree):
             yield node.arg.strip("_"), node.lineno
 
 
-def test_functions_are_verbs_or_name_what_they_return():
+def test_function_names_are_not_participles_or_genitives():
     functions = (ast.FunctionDef, ast.AsyncFunctionDef)
     nodes = [(path, node) for path in SOURCES for node in ast.walk(tree_of(path)) if isinstance(node, functions)]
     names = [(named(path), node.lineno, node.name.strip("_")) for path, node in nodes]
@@ -57,13 +57,13 @@ def test_functions_are_verbs_or_name_what_they_return():
     assert [(*place, name) for *place, name in names if name.startswith("of_")] == []
 
 
-def test_docstrings_begin_with_a_verb_or_the_thing():
+def test_docstrings_do_not_begin_as_fragments():
     nodes = [(path, node) for path in SOURCES for node in ast.walk(tree_of(path)) if isinstance(node, DOCUMENTED)]
     texts = [(named(path), getattr(node, "lineno", 1), ast.get_docstring(node) or "") for path, node in nodes]
     assert [(*place, text.split("\n")[0]) for *place, text in texts if FRAGMENT.match(text)] == []
 
 
-def test_references_lead_somewhere():
+def test_references_in_docstrings_exist():
     """Files named in docstrings and comments exist, and dotted names in backticks are names of the package."""
     files = {path.name for path in PROJECT.rglob("*.*") if ".git" not in path.parts}
     trees = {path: tree_of(path) for path in SOURCES}

@@ -98,7 +98,7 @@ def compiled(folder):
 
 
 @pytest.mark.parametrize("umask", [0o002, 0o000, 0o077])
-def test_compiled_code_is_for_its_user_alone_whatever_the_umask(home, ordinary, umask):
+def test_compiled_code_is_private_for_any_umask(home, ordinary, umask):
     cache = home / "deep" / "cache"
     folder, said = call(home, cache, ordinary, umask)
     assert said == ""
@@ -110,7 +110,7 @@ def test_compiled_code_is_for_its_user_alone_whatever_the_umask(home, ordinary, 
     assert compiled(folder) == first
 
 
-def test_an_older_cache_of_a_user_whose_group_may_write_is_closed_and_used(home, ordinary):
+def test_older_group_writable_cache_is_made_private_and_used(home, ordinary):
     cache = home / "cache"
     folder, _ = call(home, cache, ordinary)
     first = compiled(folder)
@@ -122,7 +122,7 @@ def test_an_older_cache_of_a_user_whose_group_may_write_is_closed_and_used(home,
     assert permissions(cache) == ({0o700}, {0o600})
 
 
-def test_code_that_everybody_could_have_written_is_compiled_again(home, ordinary):
+def test_world_writable_code_is_recompiled(home, ordinary):
     cache = home / "cache"
     folder, _ = call(home, cache, ordinary)
     witness = home / "witness"
@@ -136,7 +136,7 @@ def test_code_that_everybody_could_have_written_is_compiled_again(home, ordinary
     assert permissions(cache) == ({0o700}, {0o600})
 
 
-def test_a_folder_of_compiled_code_that_everybody_could_have_filled_is_filled_again(home, ordinary):
+def test_world_writable_code_folder_is_refilled(home, ordinary):
     cache = home / "cache"
     folder, _ = call(home, cache, ordinary)
     folder.chmod(0o777)
@@ -161,7 +161,7 @@ def test_links_into_the_cache_are_not_followed(home, ordinary, kind):
     assert not chosen.is_symlink()
 
 
-def test_a_cache_that_is_itself_a_link_is_used(home, ordinary):
+def test_cache_that_is_a_link_is_used(home, ordinary):
     (home / "scratch").mkdir(0o700)
     os.chown(home / "scratch", ordinary, -1)
     (home / "cache").symlink_to(home / "scratch")
@@ -172,7 +172,7 @@ def test_a_cache_that_is_itself_a_link_is_used(home, ordinary):
 
 @need_root
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o755])
-def test_a_cache_with_code_of_another_user_is_refused(home, mode):
+def test_cache_with_code_of_another_user_is_rejected(home, mode):
     cache = home / "cache"
     folder, _ = call(home, cache, 0)
     witness = home / "witness"
@@ -188,7 +188,7 @@ def test_a_cache_with_code_of_another_user_is_refused(home, mode):
 
 
 @need_root
-def test_a_cache_folder_of_another_user_is_refused(home):
+def test_cache_folder_of_another_user_is_rejected(home):
     cache = home / "cache"
     cache.mkdir()
     os.chown(cache, NOBODY, NOBODY)
@@ -197,7 +197,7 @@ def test_a_cache_folder_of_another_user_is_refused(home):
     assert said.count("belongs to another user") == 1
 
 
-def test_a_cache_that_all_users_share_is_refused_and_left_as_it_is(home, ordinary):
+def test_cache_shared_by_all_users_is_rejected_and_left_untouched(home, ordinary):
     shared = home / "shared"
     shared.mkdir()
     (shared / "file of others").touch()
@@ -209,7 +209,7 @@ def test_a_cache_that_all_users_share_is_refused_and_left_as_it_is(home, ordinar
 
 
 @need_root
-def test_foreign_files_in_a_folder_of_ours_are_deleted(home):
+def test_foreign_files_in_the_cache_are_deleted(home):
     folder = home / "folder"
     make_private_folder(folder / "inner")
     (folder / "inner" / "ours").touch(0o644)

@@ -16,25 +16,25 @@ FENCED = re.findall(r"^```(\w*)\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
 BLOCKS = [block for language, block in FENCED if not language]
 
 
-def test_the_first_command_after_the_install_answers_in_seconds():
+def test_first_command_after_the_install_takes_seconds():
     install = README.index("`pip install .`")
     assert README.index("$ walkerlab fixedpoint") == min(
         place for place in (README.find("$ walkerlab "), README.find("```\npip")) if place > install
     )
 
 
-def test_a_block_installs_and_reports_and_the_next_installs_and_tests():
+def test_readme_states_the_two_install_commands():
     assert [block.strip() for block in BLOCKS] == [
         "pip install . && walkerlab report",
         "pip install '.[test]' && pytest",
     ]
 
 
-def test_the_readme_fits_on_a_few_screens():
+def test_readme_fits_on_a_few_screens():
     assert len(README.split()) <= 700
 
 
-def test_the_check_runs_the_first_command_with_the_report_in_an_empty_folder():
+def test_ci_runs_the_report_command_in_an_empty_folder():
     parts = dict(re.findall(r'^ +part \d+ "README: ([^"]+)" (.*)$', CHECK, re.MULTILINE))
     assert f"{parts['install']} && {parts['walkerlab report']}" == BLOCKS[0].strip()
     installing = CHECK[: CHECK.index('"README: install"')].splitlines()
@@ -45,16 +45,16 @@ def test_the_check_runs_the_first_command_with_the_report_in_an_empty_folder():
     assert 'cd "$scratch/empty"' in between
 
 
-def test_the_check_runs_the_second_command_to_the_letter():
+def test_ci_runs_the_test_command_verbatim():
     assert f'readme_test="{BLOCKS[1].strip()}"' in CHECK
     assert 'part 1800 "README: test" bash -euc "$readme_test"' in CHECK
 
 
-def test_the_check_names_no_place_to_install_from():
+def test_ci_names_no_package_index():
     assert not re.search(r"https?://|index-url|--extra-index|--find-links", CHECK)
 
 
-def test_versions_agree():
+def test_version_numbers_agree():
     pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert pyproject["project"]["dynamic"] == ["version"]
     assert pyproject["tool"]["hatch"]["version"]["path"] == "walkerlab/__init__.py"
@@ -63,7 +63,7 @@ def test_versions_agree():
     assert f"## {heading}\n" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
-def test_the_conda_recipe_asks_for_what_the_package_asks_for():
+def test_conda_recipe_requires_the_same_packages():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     text = (ROOT / "docs" / "conda" / "meta.yaml").read_text(encoding="utf-8")
     recipe = YAML(typ="safe").load(jinja2.Template(text).render(PYTHON="python"))
@@ -77,7 +77,7 @@ def test_the_conda_recipe_asks_for_what_the_package_asks_for():
     assert (recipe["package"]["version"], "://" in text) == (walkerlab.__version__, False)
 
 
-def test_the_least_python_is_the_one_that_is_promised():
+def test_minimum_python_version_is_the_documented_one():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["requires-python"] == ">=3.11"
     assert "Python 3.11 or newer" in README

@@ -52,7 +52,7 @@ IMPORTS = [
 
 
 @pytest.mark.parametrize("statement", IMPORTS)
-def test_digest_follows_every_way_to_import(package, statement):
+def test_digest_follows_every_form_of_import(package, statement):
     name = package(other="", law="FORCE = 1\n")
     package(start=statement.format(package=name) + "\n")
     before = Sources().code_digest(f"{name}.start")
@@ -60,7 +60,7 @@ def test_digest_follows_every_way_to_import(package, statement):
     assert Sources().code_digest(f"{name}.start") != before
 
 
-def test_digest_follows_imports_of_imports_and_packages_on_the_way(package):
+def test_digest_follows_indirect_imports_and_parent_packages(package):
     sources = {
         "__init__": "",
         "start": "from .a import x",
@@ -77,14 +77,14 @@ def test_digest_follows_imports_of_imports_and_packages_on_the_way(package):
     assert Sources().code_digest(f"{name}.start") == before
 
 
-def test_digest_ignores_what_is_not_imported(package):
+def test_digest_ignores_modules_that_are_not_imported(package):
     name = package(start="from .law import force  # not: from .other import x", law="force = 1", other="x = 1")
     before = Sources().code_digest(f"{name}.start")
     package(other="x = 2", new="y = 3")
     assert Sources().code_digest(f"{name}.start") == before
 
 
-def test_digest_covers_data_beside_the_code(package):
+def test_digest_covers_data_files_next_to_the_code(package):
     name = package(start="", page__SLASH____init__="", page__SLASH__draw="")
     package(**{"page__SLASH__parts__SLASH__page.html": "<html>"})
     drawing, other = Sources().code_digest(f"{name}.page.draw"), Sources().code_digest(f"{name}.start")
@@ -93,17 +93,17 @@ def test_digest_covers_data_beside_the_code(package):
     assert Sources().code_digest(f"{name}.start") == other
 
 
-def test_a_stage_outside_this_package_is_followed_into_it(package):
+def test_closure_of_an_external_stage_includes_this_package(package):
     name = package(start="from walkerlab.errors import NoAnswer")
     assert "walkerlab.errors" in {module.name for module in Sources().closure(f"{name}.start")}
 
 
-def test_circular_imports_end(package):
+def test_circular_imports_are_handled(package):
     name = package(a="from . import b", b="from . import a")
     assert [module.name for module in Sources().closure(f"{name}.a")] == [name, f"{name}.a", f"{name}.b"]
 
 
-def test_a_module_that_does_not_exist_is_an_error(package):
+def test_missing_module_is_an_error(package):
     with pytest.raises(ModuleNotFoundError):
         Sources().code_digest(package() + ".nowhere")
 
@@ -149,7 +149,7 @@ def imported():
 
 
 @pytest.mark.parametrize("name", STARTS)
-def test_what_python_imports_is_in_the_closure(name, imported):
+def test_closure_contains_every_module_that_python_imports(name, imported):
     """The scanner reads text; the interpreter is the independent witness."""
     assert name in imported[name]
     drawn = {code for extension in extensions().values() for code in extension.views()}
@@ -158,7 +158,7 @@ def test_what_python_imports_is_in_the_closure(name, imported):
     assert imported[name] <= {module.name for module in Sources().closure(name, *added, *declared)}
 
 
-def test_a_new_version_number_changes_no_stage_key(tmp_path):
+def test_new_version_number_changes_no_stage_key(tmp_path):
     def digest(version):
         shutil.copytree(Path(walkerlab.__file__).parent, tmp_path / version / "walkerlab", ignore=NO_CACHES)
         init = tmp_path / version / "walkerlab" / "__init__.py"

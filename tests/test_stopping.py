@@ -42,7 +42,7 @@ except typer.Exit as end:
 
 
 @pytest.mark.parametrize("number", ["2", "15"])
-def test_a_signal_while_a_kernel_is_compiled_ends_a_command_in_two_lines(number, tmp_path):
+def test_interrupting_compilation_prints_two_lines(number, tmp_path):
     (tmp_path / "stopped.py").write_text(STOPPED)
     environment = {**os.environ, "WALKERLAB_CACHE": str(tmp_path / "cache")}
     command = [sys.executable, "stopped.py", number]

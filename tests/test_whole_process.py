@@ -18,12 +18,12 @@ def loaded_by(code, *arguments):
     return done.stderr.splitlines()[-1].split()
 
 
-def test_the_bare_process_walks_writes_and_is_bare(tmp_path):
+def test_bare_process_walks_and_loads_no_heavy_package(tmp_path):
     assert loaded_by(SCRIPT["BARE"], str(tmp_path / "bare.h5")) == []
     assert (tmp_path / "bare.h5").stat().st_size > 0
 
 
-def test_a_warm_simulate_loads_no_more_heavy_packages_than_the_bare_process(tmp_path):
+def test_warm_simulate_loads_no_more_packages_than_the_bare_process(tmp_path):
     simulate = (
         "from walkerlab.views.cli.main import main\n"
         "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"

@@ -32,18 +32,18 @@ def pool():
         yield two
 
 
-def test_results_are_in_the_order_of_the_calls():
+def test_results_come_in_the_order_of_the_calls():
     assert list(in_order([partial(calls.square, n) for n in range(7)], jobs=3)) == [n * n for n in range(7)]
 
 
-def test_one_job_is_done_here_and_so_is_what_comes_first():
+def test_single_job_and_first_calls_run_in_this_process():
     assert set(in_order([calls.own_id] * 3, jobs=1)) == {os.getpid()}
     ids = list(in_order([calls.own_id] * 3, jobs=2, first=(1,)))
     assert ids[1] == os.getpid()
     assert os.getpid() not in (ids[0], ids[2])
 
 
-def test_calls_of_least_rank_begin_first():
+def test_calls_of_lowest_rank_start_first():
     begun = list(in_order([calls.begun_at] * 3, jobs=2, rank=lambda place: -place))
     assert begun[0] == max(begun)
 
@@ -63,7 +63,7 @@ class Holder:
 """
 
 
-def test_a_worker_that_is_told_to_end_while_it_loads_says_nothing(tmp_path, monkeypatch, capfd):
+def test_worker_terminated_while_loading_prints_nothing(tmp_path, monkeypatch, capfd):
     (tmp_path / "loads_slowly.py").write_text(LOADS_SLOWLY)
     monkeypatch.syspath_prepend(str(tmp_path))
     with WorkerPool(1, ("loads_slowly",)) as one:
@@ -72,13 +72,13 @@ def test_a_worker_that_is_told_to_end_while_it_loads_says_nothing(tmp_path, monk
     assert capfd.readouterr().err == ""
 
 
-def test_a_worker_that_is_told_to_end_twice_says_nothing(capfd):
+def test_worker_terminated_twice_prints_nothing(capfd):
     with WorkerPool(1) as one, pytest.raises(WorkerDiedError, match="SIGTERM"):
         one.start(calls.be_told_to_end_twice).result()
     assert capfd.readouterr().err == ""
 
 
-def test_an_error_comes_back_as_it_is_with_its_traceback(pool):
+def test_error_is_returned_with_its_traceback(pool):
     with pytest.raises(ZeroDivisionError) as caught:
         pool.start(calls.divide_by_zero).result()
     assert "divide_by_zero" in caught.value.__notes__[0]
@@ -91,21 +91,21 @@ def test_an_error_comes_back_as_it_is_with_its_traceback(pool):
     ("call", "said"),
     [(calls.raise_what_cannot_be_sent, "NeedsTwoError: 1 and 2"), (calls.return_what_cannot_be_sent, "pickle")],
 )
-def test_what_cannot_be_sent_back_is_told_in_words(pool, call, said):
+def test_unpicklable_result_gets_an_explanation(pool, call, said):
     with pytest.raises(Exception, match=said):
         pool.start(call).result()
     assert pool.submit(calls.square, 3).result() == 9
 
 
 @pytest.mark.parametrize(("call", "how"), [(calls.kill_itself, "SIGKILL"), (calls.leave_with_3, "exit code 3")])
-def test_a_worker_that_dies_is_told_and_replaced_and_the_others_go_on(pool, call, how):
+def test_dead_worker_is_reported_and_replaced(pool, call, how):
     others = [pool.submit(calls.square, number) for number in range(4)]
     with pytest.raises(WorkerDiedError, match=how):
         pool.start(call).result()
     assert [future.result() for future in [*others, pool.submit(calls.square, 5)]] == [0, 1, 4, 9, 25]
 
 
-def test_a_worker_that_dies_while_idle_costs_nothing():
+def test_death_of_an_idle_worker_loses_no_call():
     with WorkerPool(1) as pool:
         first = pool.start(calls.own_id).result()
         os.kill(first, signal.SIGKILL)
@@ -113,13 +113,13 @@ def test_a_worker_that_dies_while_idle_costs_nothing():
         assert pool.start(calls.own_id).result() != first
 
 
-def test_what_a_call_tells_is_heard_in_its_order(pool):
+def test_messages_of_a_call_arrive_in_order(pool):
     heard = []
     assert pool.start(partial(calls.count_to, 5), heard.append).result() == "done"
     assert heard == [0, 1, 2, 3, 4]
 
 
-def test_a_call_that_takes_too_long_can_be_given_up():
+def test_call_that_takes_too_long_can_be_abandoned():
     worker = Worker()
     with pytest.raises(WorkerTimeoutError):
         worker.do(calls.sleep, timeout_s=0.01)
@@ -127,22 +127,22 @@ def test_a_call_that_takes_too_long_can_be_given_up():
     assert not worker.alive
 
 
-def test_workers_that_are_ended_clean_up_behind_them(tmp_path):
+def test_terminated_workers_clean_up(tmp_path):
     with WorkerPool(1) as pool:
         pool.start(partial(calls.clean_up_at_the_end, tmp_path / "ended"))
         until((tmp_path / "ended.begun").exists)
     assert (tmp_path / "ended").exists()
 
 
-def test_workers_may_have_workers(pool):
+def test_workers_may_start_workers(pool):
     assert pool.start(partial(calls.squares_of_workers_own, 3)).result() == [0, 1, 4]
 
 
-def test_an_interrupt_of_the_keyboard_is_left_to_whoever_waits(pool):
+def test_workers_ignore_keyboard_interrupts(pool):
     assert pool.start(calls.interrupt_handler).result() is signal.SIG_IGN
 
 
-def test_a_pool_starts_no_more_workers_than_it_needs(pool):
+def test_pool_starts_no_more_workers_than_needed(pool):
     assert len({pool.start(calls.own_id).result() for _ in range(5)}) <= 2
 
 
@@ -159,7 +159,7 @@ with WorkerPool(2) as pool:
 
 @pytest.mark.skipif(not THERE, reason="needs the kernel's table of processes")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
-def test_no_worker_outlives_whoever_started_it(number):
+def test_workers_end_with_their_parent_process(number):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(
         [sys.executable, "-c", WAITS],
@@ -187,7 +187,7 @@ print(list(in_order([partial(calls.square, n) for n in range(4)], 2)))
 
 
 @pytest.mark.parametrize("how", ["script", "stdin", "command"])
-def test_a_program_without_a_guard_runs_once_and_has_its_workers(tmp_path, how):
+def test_script_without_a_main_guard_runs_once_with_workers(tmp_path, how):
     path = tmp_path / "unguarded.py"
     path.write_text(UNGUARDED)
     arguments = {"script": [str(path)], "stdin": ["-"], "command": ["-c", UNGUARDED]}[how]

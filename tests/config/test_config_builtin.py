@@ -16,7 +16,7 @@ from walkerlab.config.writer import to_yaml
 REPOSITORY = Path(__file__).parents[2] / "configs"
 
 
-def test_the_built_in_configs_are_these() -> None:
+def test_built_in_configs_are_listed() -> None:
     others = ("kneed", "kneed-round-feet", "parts", "round-feet", "simplest", "torso")
     papers = ("contact-si", "paper", "paper-as-printed", "rigid-only", "sliding-feet", "slope-3deg")
     driven = ("kneed-level", "kuo", "level")
@@ -24,14 +24,14 @@ def test_the_built_in_configs_are_these() -> None:
 
 
 @pytest.mark.skipif(not REPOSITORY.is_dir(), reason="the repository's configs/ are not beside the tests")
-def test_the_built_in_configs_are_those_of_the_repository() -> None:
+def test_built_in_configs_equal_those_of_the_repository() -> None:
     """In a checkout they are one folder; an installed package has its texts."""
     texts = {path.name: path.read_text(encoding="utf-8") for path in REPOSITORY.iterdir()}
     assert texts == {path.name: path.read_text(encoding="utf-8") for path in BUILTIN_FOLDER.iterdir()}
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_a_built_in_config_runs_under_its_own_name(name: str) -> None:
+def test_built_in_config_runs_under_its_own_name(name: str) -> None:
     loaded = load(Path(name))
     assert (loaded.run_name, loaded.warnings) == (name, ())
 
@@ -41,7 +41,7 @@ def test_as_printed_differs_from_the_paper_by_the_equations_only() -> None:
     assert printed == paper.model_copy(update={"name": "paper-as-printed", "equations": "as-printed"})
 
 
-def test_the_wrong_units_are_the_papers_numbers_read_in_si() -> None:
+def test_wrong_units_config_reads_the_papers_values_in_si() -> None:
     contact = load(Path("contact-si")).config.contact
     assert contact is not None
     law = contact.in_si()
@@ -51,7 +51,7 @@ def test_the_wrong_units_are_the_papers_numbers_read_in_si() -> None:
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_a_resolved_config_loads_back_to_itself(name: str, loaded: Callable[..., LoadedConfig]) -> None:
+def test_resolved_config_loads_back_unchanged(name: str, loaded: Callable[..., LoadedConfig]) -> None:
     config = load(Path(name)).config
     assert loaded(to_yaml(config)).config == config
 
@@ -75,6 +75,8 @@ def configs(draw: st.DrawFn) -> dict[str, Any]:
 
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(configs())
-def test_any_config_loads_back_from_its_text(loaded: Callable[..., LoadedConfig], data: dict[str, Any]) -> None:
+def test_any_config_survives_a_round_trip_through_text(
+    loaded: Callable[..., LoadedConfig], data: dict[str, Any]
+) -> None:
     config = Config.model_validate(data)
     assert loaded(to_yaml(config)).config == config

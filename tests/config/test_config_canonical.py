@@ -73,52 +73,52 @@ KEYS = {stage.name: stage.reads for stage in PIPELINE.stages}
 
 
 @pytest.mark.parametrize("stage", PIPELINE.stages, ids=KEYS)
-def test_what_a_stage_takes_does_not_depend_on_what_is_imported(stage: Stage, blocks_imported: None) -> None:
+def test_config_slice_of_a_stage_does_not_depend_on_imported_modules(stage: Stage, blocks_imported: None) -> None:
     assert stage.reads == KEYS[stage.name]
 
 
-def test_a_type_has_the_keys_of_its_bases() -> None:
+def test_type_has_the_keys_of_its_bases() -> None:
     keys = ("walker", "gravity_m_s2", "slope_rad", "push_off", "equations", "contact", "start")
     assert tuple(dotted_keys(SceneConfig)) == keys
     assert tuple(slice_of(CONFIG, SceneConfig)) == keys
 
 
-def test_a_slice_holds_what_a_type_names_of_blocks_and_nothing_else() -> None:
+def test_slice_contains_only_the_keys_that_a_type_names() -> None:
     assert tuple(dotted_keys(ToleranceConfig)) == ("solver.rigid.rtol", "solver.contact.rtol")
     assert slice_of(CONFIG, ToleranceConfig) == {"solver": {"rigid": {"rtol": 1e-10}, "contact": {"rtol": 1e-7}}}
 
 
-def test_a_block_that_is_left_out_is_none() -> None:
+def test_missing_block_is_none() -> None:
     assert slice_of(Config(), ContactConfig)["contact"] is None
     assert only(Config(), ContactConfig).contact is None
 
 
-def test_a_slice_does_not_depend_on_the_order_of_keys() -> None:
+def test_slice_does_not_depend_on_the_order_of_keys() -> None:
     one, other = slice_of(CONFIG, ToleranceThenStart), slice_of(CONFIG, StartThenTolerance)
     assert list(one) != list(other)
     assert canonical_json(one) == canonical_json(other)
 
 
-def test_without_a_type_it_is_the_config() -> None:
+def test_slice_without_a_type_is_the_whole_config() -> None:
     assert slice_of(CONFIG, None) == CONFIG.model_dump(mode="json")
     assert only(CONFIG, None) is CONFIG
 
 
-def test_a_key_that_does_not_exist_is_a_bug() -> None:
+def test_slice_with_an_unknown_key_is_a_bug() -> None:
     with pytest.raises(KeyError, match="slope_deg"):
         slice_of(CONFIG, MisspeltConfig)
     with pytest.raises(AttributeError, match="slope_deg"):
         only(CONFIG, MisspeltConfig)
 
 
-def test_canonical_json_is_one_text_for_one_content() -> None:
+def test_equal_contents_have_equal_canonical_json() -> None:
     assert canonical_json({"b": 1e-10, "a": [0.1, "θ"]}) == '{"a":[0.1,"\\u03b8"],"b":1e-10}'
     assert json.loads(canonical_json({"x": 0.1 + 0.2}))["x"] == 0.1 + 0.2
     with pytest.raises(ValueError, match="not JSON compliant"):
         canonical_json(math.nan)
 
 
-def test_what_is_given_has_its_keys_as_the_config_has_them() -> None:
+def test_slice_has_the_same_values_as_the_config() -> None:
     given = only(CONFIG, SceneConfig)
     assert given.walker is CONFIG.walker
     assert given.contact is CONFIG.contact
@@ -127,7 +127,7 @@ def test_what_is_given_has_its_keys_as_the_config_has_them() -> None:
 
 
 @pytest.mark.parametrize("key", ["strides", "solver.rigid.atol", "solver.model_dump", "model_dump"])
-def test_what_is_given_has_no_other_keys(key: str) -> None:
+def test_slice_has_no_other_keys(key: str) -> None:
     given, (*blocks, name) = only(CONFIG, StartThenTolerance), key.split(".")
     for block in blocks:
         given = getattr(given, block)

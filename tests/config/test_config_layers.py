@@ -23,7 +23,7 @@ Loaded = Callable[..., LoadedConfig]
 Refused = Callable[..., str]
 
 
-def test_a_file_inherits_and_blocks_are_merged(write: Write) -> None:
+def test_inherited_blocks_are_merged(write: Write) -> None:
     write("extends: paper\nname: base\nstrides: 7\nwalker: {hip_mass_kg: 3}\n", "base.yaml")
     config = load(write("extends: base.yaml\nwalker: {leg_mass_kg: 2}\ncontact: {damping: 50}\n")).config
     assert (config.walker.hip_mass_kg, config.walker.leg_mass_kg, config.strides) == (3, 2, 7)
@@ -31,54 +31,54 @@ def test_a_file_inherits_and_blocks_are_merged(write: Write) -> None:
     assert (config.contact.damping, config.contact.stiffness) == (50, 1e5)
 
 
-def test_the_name_is_not_inherited_so_that_runs_do_not_mix(loaded: Loaded) -> None:
+def test_name_is_not_inherited(loaded: Loaded) -> None:
     assert loaded("extends: paper\n").run_name == "mine"
 
 
 @pytest.mark.parametrize("slope", ["slope_deg: 3", "slope_rad: 0.05235987755982989"])
-def test_a_slope_displaces_the_inherited_one_in_either_unit(write: Write, slope: str) -> None:
+def test_slope_in_either_unit_replaces_the_inherited_one(write: Write, slope: str) -> None:
     write("slope_deg: 1\n", "base.yaml")
     config = load(write(f"extends: base.yaml\n{slope}\n")).config
     assert config.slope_rad == pytest.approx(math.radians(3), rel=1e-15)
 
 
-def test_null_leaves_an_inherited_block_out(loaded: Loaded) -> None:
+def test_null_removes_an_inherited_block(loaded: Loaded) -> None:
     assert loaded("extends: paper\ncontact: null\n").config.contact is None
 
 
-def test_a_list_is_replaced_whole(loaded: Loaded) -> None:
+def test_list_is_replaced_whole(loaded: Loaded) -> None:
     assert loaded("extends: paper\noutputs: [forces]\n").config.outputs == ("forces",)
 
 
-def test_a_problem_in_an_inherited_file_is_placed_there(write: Write) -> None:
+def test_error_in_an_inherited_file_names_that_file(write: Write) -> None:
     write("strides: none\n", "base.yaml")
     with pytest.raises(ConfigError, match=r"base\.yaml:1:10: strides: 'none' is not an integer"):
         load(write("extends: base.yaml\n"))
 
 
-def test_a_circle_is_refused(write: Write) -> None:
+def test_circular_inheritance_is_rejected(write: Write) -> None:
     write("extends: mine.yaml\n", "other.yaml")
     with pytest.raises(ConfigError, match=r"other\.yaml:1:10: extends: .*mine\.yaml extends itself"):
         load(write("extends: other.yaml\n"))
 
 
-def test_a_missing_parent_is_placed_where_it_is_asked_for(refused: Refused) -> None:
+def test_missing_parent_is_reported_at_its_extends_key(refused: Refused) -> None:
     assert re.match(r"mine.yaml:2:10: there is no config .*nope\.yaml", refused("strides: 3\nextends: nope.yaml\n"))
 
 
 @pytest.mark.parametrize("parent", ["[paper]", "3", "''", "{a: 1}"])
-def test_a_parent_is_the_name_of_a_config(refused: Refused, parent: str) -> None:
+def test_parent_must_be_the_name_of_a_config(refused: Refused, parent: str) -> None:
     assert "extends: is not the name of a config" in refused(f"extends: {parent}\n")
 
 
-def test_a_long_chain_ends(write: Write) -> None:
+def test_long_chain_of_parents_is_rejected(write: Write) -> None:
     for index in range(20):
         write(f"extends: c{index + 1}.yaml\n", f"c{index}.yaml")
     with pytest.raises(ConfigError, match="files deep"):
         load(write("extends: c0.yaml\n"))
 
 
-def test_a_value_is_yaml_typed_by_the_schema() -> None:
+def test_setting_is_parsed_as_yaml_and_typed_by_the_schema() -> None:
     config = load(
         None, ["contact.stiffness=1e6", "outputs=[forces]", "walker.hip_mass_kg=0", "equations=as-printed"]
     ).config
@@ -87,28 +87,28 @@ def test_a_value_is_yaml_typed_by_the_schema() -> None:
     assert (config.walker.hip_mass_kg, config.equations) == (0.0, "as-printed")
 
 
-def test_a_later_setting_wins() -> None:
+def test_later_setting_wins() -> None:
     assert load(None, ["strides=3", "strides=4"]).config.strides == 4
     assert load(None, ["slope_deg=3", "slope_deg=4"]).config.slope_rad == math.radians(4)
 
 
 @pytest.mark.parametrize("settings", [["slope_rad=0.1", "slope_deg=3"], ["slope_deg=3", "slope_rad=0.1"]])
-def test_the_slope_set_twice_in_different_units_is_refused(settings) -> None:
+def test_slope_set_in_both_units_is_rejected(settings) -> None:
     with pytest.raises(ConfigError, match="slope"):
         load(None, settings)
 
 
-def test_a_block_is_replaced_whole() -> None:
+def test_setting_a_block_replaces_all_of_it() -> None:
     contact = load(None, ["contact.damping=50", "contact={stiffness: 2e5}"]).config.contact
     assert contact == Contact(stiffness=2e5)
 
 
-def test_a_block_can_be_left_out_and_brought_in() -> None:
+def test_block_can_be_removed_and_added() -> None:
     assert load(None, ["contact=null"]).config.contact is None
     assert load(Path("rigid-only"), ["contact.damping=50"]).config.contact == Contact(damping=50)
 
 
-def test_strides_of_the_command_line_are_over_everything() -> None:
+def test_strides_option_overrides_everything() -> None:
     assert load(None, ["strides=3"], strides=2).config.strides == 2
 
 
@@ -143,11 +143,11 @@ def test_strides_of_the_command_line_are_over_everything() -> None:
         (r'source={title: "\0"}', r"holds a character that no file can store"),
     ],
 )
-def test_a_bad_setting_is_refused_with_its_place(refused: Refused, setting: str, expected: str) -> None:
+def test_bad_setting_is_rejected_with_its_position(refused: Refused, setting: str, expected: str) -> None:
     assert re.search(expected, refused("contact: {units: si}\n", sets=[setting]))
 
 
-def test_settings_of_one_block_leave_the_config_that_they_change_untouched() -> None:
+def test_settings_do_not_modify_the_original_config() -> None:
     """Also those within a block that an earlier setting brought."""
     tree = load(None).tree
     damping, stiffness = (parse_setting(f"contact.{text}") for text in ("damping=7", "stiffness=8"))
@@ -158,7 +158,7 @@ def test_settings_of_one_block_leave_the_config_that_they_change_untouched() -> 
     assert plain(tree) == plain(load(None).tree)
 
 
-def test_the_time_for_settings_grows_as_their_number() -> None:
+def test_time_for_settings_is_linear_in_their_number() -> None:
     """Eight times as many settings take far less than 64 times as long."""
     took = []
     for count in (2_000, 16_000):
@@ -169,13 +169,13 @@ def test_the_time_for_settings_grows_as_their_number() -> None:
     assert took[1] < 24.0 * took[0]
 
 
-def test_bad_strides_are_refused() -> None:
+def test_invalid_strides_are_rejected() -> None:
     with pytest.raises(ConfigError, match="--strides 0: strides: 0 is out of bounds"):
         load(strides=0)
 
 
 @settings(deadline=None)
 @given(st.text(max_size=40))
-def test_any_setting_is_taken_or_refused(text: str) -> None:
+def test_any_setting_loads_or_raises_config_error(text: str) -> None:
     with suppress(ConfigError):
         assert isinstance(load(None, [text]).config, Config)

@@ -24,7 +24,7 @@ Loaded = Callable[..., LoadedConfig]
 Refused = Callable[..., str]
 
 
-def test_without_a_path_it_is_the_paper() -> None:
+def test_paper_config_is_the_default() -> None:
     paper = load()
     assert paper.config == Config(contact=Contact(), source=paper.config.source)
     assert paper.config.source is not None
@@ -32,11 +32,11 @@ def test_without_a_path_it_is_the_paper() -> None:
     assert (paper.run_name, paper.warnings, paper.source) == ("paper", (), "built-in paper.yaml")
 
 
-def test_a_built_in_config_can_be_named() -> None:
+def test_built_in_config_can_be_loaded_by_name() -> None:
     assert load(Path("rigid-only")).config.contact is None
 
 
-def test_a_file_is_preferred_to_a_built_in_config_of_that_name(
+def test_file_takes_precedence_over_a_built_in_config(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write("slope_deg: 2\n", "paper")
@@ -44,11 +44,11 @@ def test_a_file_is_preferred_to_a_built_in_config_of_that_name(
     assert load(Path("paper")).config.slope_rad == math.radians(2)
 
 
-def test_a_config_without_a_name_is_named_after_its_file(loaded: Loaded) -> None:
+def test_config_without_a_name_is_named_after_its_file(loaded: Loaded) -> None:
     assert loaded("slope_deg: 2\n").run_name == "mine"
 
 
-def test_a_file_name_that_is_no_safe_run_name_is_made_one_and_told(write: Write) -> None:
+def test_unsafe_file_name_is_replaced_with_a_warning(write: Write) -> None:
     loaded = load(write("slope_deg: 2\n", "my config.yaml"))
     assert loaded.run_name == "my-config"
     assert any("my-config" in warning for warning in loaded.warnings)
@@ -69,14 +69,14 @@ def packages_loaded_by(statements: str) -> set[str]:
     return set(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split())
 
 
-def test_loading_imports_nothing_but_what_reads_and_types_a_config() -> None:
+def test_loading_a_config_imports_few_modules() -> None:
     needed = packages_loaded_by("import ruamel.yaml, pydantic; type('A', (pydantic.BaseModel,), {})")
     loaded = packages_loaded_by("from walkerlab.config.loader import load; load()")
     assert "pydantic" in needed
     assert loaded <= {"walkerlab", *needed}
 
 
-def test_a_theta_1_that_is_slightly_off_is_moved_so_that_both_feet_stand_on_the_slope(loaded: Loaded) -> None:
+def test_theta_1_slightly_off_is_moved_until_both_feet_touch(loaded: Loaded) -> None:
     result = loaded("slope_deg: 2\nstart: [-0.245, 0.17, -0.6, -0.8]\n")
     assert list(result.config.start) == pytest.approx([-2 * math.radians(2) - 0.17, 0.17, -0.6, -0.8], abs=1e-15)
     assert len(result.warnings) == 1
@@ -84,7 +84,7 @@ def test_a_theta_1_that_is_slightly_off_is_moved_so_that_both_feet_stand_on_the_
 
 
 @pytest.mark.parametrize("slope_deg", [1, 2, 5])
-def test_a_theta_1_of_null_is_computed_for_every_slope(loaded: Loaded, slope_deg: float) -> None:
+def test_null_theta_1_is_computed_from_the_slope(loaded: Loaded, slope_deg: float) -> None:
     result = loaded("start: [null, 0.17, -0.6, -0.8]\n", [f"slope_deg={slope_deg}"])
     swing = -2 * math.radians(slope_deg) - 0.17
     assert list(result.config.start) == pytest.approx([swing, 0.17, -0.6, -0.8], abs=1e-15)
@@ -92,7 +92,7 @@ def test_a_theta_1_of_null_is_computed_for_every_slope(loaded: Loaded, slope_deg
 
 
 @pytest.mark.parametrize("theta_1", [0, 6.1, -0.25, -0.229])
-def test_a_theta_1_that_is_far_off_is_refused_with_both_remedies(write: Write, theta_1: float) -> None:
+def test_theta_1_far_off_is_rejected_with_two_remedies(write: Write, theta_1: float) -> None:
     path = write(f"slope_deg: 2\nstart: [{theta_1}, 0.17, -0.6, -0.8]\n")
     with pytest.raises(ConfigError, match=r"mine\.yaml:2:8: start: theta_1 is .* but must be -0\.23981") as caught:
         load(path)
@@ -100,7 +100,7 @@ def test_a_theta_1_that_is_far_off_is_refused_with_both_remedies(write: Write, t
     assert f"{{instant: mid-step, state: [{theta_1}, 0.17, -0.6, -0.8]}}" in caught.value.advice
 
 
-def test_a_start_in_mid_step_stays_as_it_is_and_is_written_and_read_again(loaded: Loaded) -> None:
+def test_mid_step_start_survives_a_round_trip_unchanged(loaded: Loaded) -> None:
     config = loaded("slope_rad: 0.0525\nstart: {instant: mid-step, state: [0, 0, 2.0, -0.4]}\n").config
     assert state_of(config.start) == (0.0, 0.0, 2.0, -0.4)
     assert loaded(to_yaml(config)).config == config
@@ -117,16 +117,16 @@ def test_a_start_in_mid_step_stays_as_it_is_and_is_written_and_read_again(loaded
         ("[-0.2, null, -0.6, -0.8]", "null is not a number"),
     ],
 )
-def test_a_start_that_is_neither_a_state_nor_in_mid_step_is_refused(refused: Refused, start: str, said: str) -> None:
+def test_start_of_another_form_is_rejected(refused: Refused, start: str, said: str) -> None:
     assert said in refused(f"start: {start}\n")
 
 
-def test_only_values_that_follow_from_others_can_be_computed(refused: Refused) -> None:
+def test_only_dependent_start_values_may_be_null(refused: Refused) -> None:
     message = refused("extends: torso\nslope_deg: 1\nstart: [null, null, null, -0.6, -0.8, null]\n")
     assert "value 2 is null, but only theta_1 and theta_torso and dtheta_torso can be computed here" in message
 
 
-def test_what_follows_others_in_a_start_follows_them_at_their_rates_and_this_is_said(loaded: Loaded) -> None:
+def test_dependent_start_values_and_rates_are_adjusted_with_a_warning(loaded: Loaded) -> None:
     swing = -2 * math.radians(1) - 0.17
     right = [swing, 0.17, -math.radians(1), -0.6, -0.8, -0.7]
     result = loaded("extends: torso\nslope_deg: 1\nstart: [-0.2, 0.17, -0.017, -0.6, -0.8, -0.702]\n")
@@ -140,7 +140,7 @@ def test_what_follows_others_in_a_start_follows_them_at_their_rates_and_this_is_
     assert computed.warnings == ()
 
 
-def test_a_start_with_knees_has_its_swing_leg_straight_and_this_is_said(loaded: Loaded, refused: Refused) -> None:
+def test_swing_knee_is_straightened_at_the_start_with_a_warning(loaded: Loaded, refused: Refused) -> None:
     result = loaded("extends: kneed\nstart: [null, 0.19, -0.285, -0.05, -1.1, -0.3]\n")
     assert result.config.start[2] == result.config.start[0]
     assert result.config.start[5] == -0.3  # the knee is free
@@ -150,7 +150,7 @@ def test_a_start_with_knees_has_its_swing_leg_straight_and_this_is_said(loaded: 
     )
 
 
-def test_in_mid_step_a_knee_may_be_bent_but_not_beyond_straight(loaded: Loaded, refused: Refused) -> None:
+def test_mid_step_knee_may_flex_but_not_hyperextend(loaded: Loaded, refused: Refused) -> None:
     bent = "extends: kneed\nstart: {instant: mid-step, state: [0.1, -0.1, -0.4, 1.0, -1.1, 1.0]}\n"
     assert state_of(loaded(bent).config.start)[2] == -0.4
     assert "knees do not bend beyond straight" in refused(bent.replace("-0.4", "0.4"))
@@ -172,26 +172,26 @@ PARTS = """walker:
 """
 
 
-def test_a_coupled_part_follows_by_its_weights_in_a_start(loaded: Loaded) -> None:
+def test_start_angle_of_a_coupled_part_is_a_weighted_mean(loaded: Loaded) -> None:
     start = loaded(PARTS + "start: [-0.2, 0.2, null, -0.4, -0.8, null]\n").config.start
     assert list(start) == pytest.approx([-0.2, 0.2, 0.1, -0.4, -0.8, -0.7], abs=1e-15)
 
 
 @pytest.mark.parametrize("terrain", ["plane", "after-mid-swing"])
-def test_a_pitch_where_there_are_no_pads_is_doubted(loaded: Loaded, terrain: str) -> None:
+def test_pad_pitch_without_pads_raises_a_warning(loaded: Loaded, terrain: str) -> None:
     (doubt,) = loaded(f"contact: {{terrain: {terrain}, pad_pitch: 0.4}}\n").warnings
     assert f"contact.pad_pitch has no effect on {terrain}" in doubt
     assert loaded("contact: {terrain: checkerboard, pad_pitch: 0.4}\n").warnings == ()
 
 
-def test_legs_as_long_as_towers_are_doubted(loaded: Loaded) -> None:
+def test_absurdly_long_legs_raise_a_warning(loaded: Loaded) -> None:
     (said,) = loaded("walker: {leg_length_m: 1000, foot_to_mass_m: 500}\n").warnings
     assert said.endswith("mine.yaml:1:10: walker.leg_length_m is 1000 m; lengths are in m, not in mm")
     (said,) = loaded("extends: kneed\nwalker:\n  thigh:\n    length_m: 500\n").warnings
     assert said.endswith("mine.yaml:4:5: walker.thigh.length_m is 500 m; lengths are in m, not in mm")
 
 
-def test_gravity_in_centimetres_is_doubted(loaded: Loaded) -> None:
+def test_gravity_in_centimetres_raises_a_warning(loaded: Loaded) -> None:
     (said,) = loaded("gravity_m_s2: 981\n").warnings
     assert said.endswith("mine.yaml:1:1: gravity_m_s2 is 981; it is in m/s^2 (9.81 on earth), not in cm/s^2")
     for gravity in (1.0, 1.62, 9.81, 24.8):
@@ -209,20 +209,18 @@ def test_gravity_in_centimetres_is_doubted(loaded: Loaded) -> None:
         ("walker: {type: quadruped}\n", "walkerlab's walkers have two legs"),
     ],
 )
-def test_what_walkerlab_is_not_for_is_refused_with_the_reason_and_no_guess(
-    refused: Refused, text: str, why: str
-) -> None:
+def test_keys_beyond_scope_are_rejected_with_the_reason(refused: Refused, text: str, why: str) -> None:
     message = refused(text)
     assert f"; {why}" in message
     assert "did you mean" not in message
 
 
-def test_no_key_and_no_built_in_config_sounds_as_if_it_were_beyond_scope() -> None:
+def test_no_existing_key_or_config_counts_as_beyond_scope() -> None:
     names = {part for key in keys() for part in key.key.split(".")}
     assert [name for name in (*names, *builtin_names()) if beyond_scope(name)] == []
 
 
-def test_the_place_of_an_error_in_a_question_is_that_of_its_key(loaded: Loaded) -> None:
+def test_error_in_a_question_block_points_to_its_key(loaded: Loaded) -> None:
     config = loaded("robustness:\n  to: [walker.hip_mass_kg, foo]\n")
     error = config.placed(ConfigError("robustness.to: foo is no key", "advice", ("robustness", "to", 1)))
     assert error.message.endswith("mine.yaml:2:28: robustness.to: foo is no key")
@@ -234,9 +232,7 @@ def test_the_place_of_an_error_in_a_question_is_that_of_its_key(loaded: Loaded) 
 @pytest.mark.parametrize(
     ("name", "terrain"), [("kneed", "plane"), ("parts", "plane"), ("round-feet", "after-mid-swing")]
 )
-def test_the_contact_block_that_is_advised_is_the_papers_by_mass_and_can_be_added(
-    loaded: Loaded, name: str, terrain: str
-) -> None:
+def test_suggested_contact_block_is_scaled_by_mass_and_loads(loaded: Loaded, name: str, terrain: str) -> None:
     without = loaded(f"extends: {name}\ncontact: null\n").config
     contact = loaded(f"extends: {name}\n{contact_to_add(without.walker)}\n").config.contact
     built_in = load(Path(name)).config.contact
@@ -246,11 +242,11 @@ def test_the_contact_block_that_is_advised_is_the_papers_by_mass_and_can_be_adde
     assert (contact.stiffness, contact.damping) == pytest.approx((built_in.stiffness, built_in.damping), rel=5e-3)
 
 
-def test_the_papers_own_start_stands_on_its_slope_and_nothing_is_said(loaded: Loaded) -> None:
+def test_start_of_the_paper_raises_no_warning(loaded: Loaded) -> None:
     assert loaded("start: [-0.2022, 0.1674, -0.60, -0.84]\n").warnings == ()
 
 
-def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
+def test_resolving_a_start_twice_changes_nothing(loaded: Loaded) -> None:
     once = loaded("slope_deg: 3\nstart: [null, 0.3, 0, 0]\n").config
     state = list(once.start)
     assert loaded(f"slope_rad: {once.slope_rad!r}\nstart: {state}\n").config.start == once.start
@@ -332,42 +328,40 @@ def test_a_resolved_start_resolves_to_itself(loaded: Loaded) -> None:
         ("1: 2\n", r"1: unknown key \(2\)"),
     ],
 )
-def test_a_bad_file_is_refused_with_place_value_and_what_is_allowed(refused: Refused, text: str, expected: str) -> None:
+def test_bad_file_is_rejected_with_position_value_and_allowed_range(refused: Refused, text: str, expected: str) -> None:
     assert re.search(expected, refused(text))
 
 
-def test_a_leg_with_its_mass_at_the_hip_is_refused_for_what_it_is(refused: Refused) -> None:
+def test_leg_with_its_mass_at_the_hip_is_rejected_as_massless(refused: Refused) -> None:
     message = refused("walker: {leg_length_m: 0.8, foot_to_mass_m: 0.8, leg_inertia_kg_m2: 0.1}\n")
     assert "1:45: walker.foot_to_mass_m: 0.8 equals leg_length_m, so b = 0" in message
     assert "the swing leg is massless" in message
 
 
-def test_all_problems_are_reported_together_in_the_order_of_the_file(refused: Refused) -> None:
+def test_all_problems_are_reported_in_file_order(refused: Refused) -> None:
     lines = refused(
         "strides: 0\nwalker:\n  foo: 1\n  leg_mass_kg: x\nslope_deg: 95\ncontact: {damping: -1}\n"
     ).splitlines()
     assert [line.split(":")[1] for line in lines] == ["1", "3", "4", "5", "6"]
 
 
-def test_a_flood_of_problems_is_cut(refused: Refused) -> None:
+def test_long_list_of_problems_is_truncated(refused: Refused) -> None:
     lines = refused("".join(f"k{index}: 1\n" for index in range(1000))).splitlines()
     assert len(lines) == 21
 
 
-def test_what_a_file_says_cannot_steer_the_terminal(refused: Refused) -> None:
+def test_control_characters_of_a_file_do_not_reach_the_terminal(refused: Refused) -> None:
     assert "\x1b" not in refused('"a\\e[31m": 1\n')
 
 
-def test_the_exit_code_is_3_and_the_advice_names_a_command(write: Write) -> None:
+def test_config_error_exits_3_and_suggests_a_command(write: Write) -> None:
     with pytest.raises(ConfigError) as caught:
         load(write("foo: 1\n"))
     assert caught.value.exit_code == 3
     assert "walkerlab schema" in caught.value.advice
 
 
-def test_a_method_of_an_extra_that_is_not_installed_says_what_to_install(
-    refused: Refused, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_method_of_a_missing_extra_says_what_to_install(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(schema, "find_spec", lambda name: None)
     message = refused("solver: {contact: {method: cvode-bdf}}\n")
     assert message.startswith("mine.yaml:1:")
@@ -375,7 +369,7 @@ def test_a_method_of_an_extra_that_is_not_installed_says_what_to_install(
     assert message.endswith("pip install scikit-sundae")
 
 
-def test_a_walker_of_another_type_than_inherited_is_told_which_keys_it_has_not(refused: Refused) -> None:
+def test_changing_the_inherited_type_lists_missing_keys(refused: Refused) -> None:
     message = refused("extends: paper\n", ["walker.type=kneed"])
     assert message.startswith("--set walker.type=kneed: walker.type: kneed has no leg_length_m, foot_to_mass_m, ")
     assert "(of type compass), given at built-in paper.yaml:" in message
@@ -386,14 +380,14 @@ def test_a_walker_of_another_type_than_inherited_is_told_which_keys_it_has_not(r
     assert "`-c round-feet`" in message
 
 
-def test_a_key_of_another_type_is_told_with_those_of_its_own(refused: Refused) -> None:
+def test_key_of_another_walker_type_lists_the_allowed_keys(refused: Refused) -> None:
     message = refused("walker: {type: kneed, leg_length_m: 1.0}\n")
     assert "1:23: walker.type is kneed, which has no leg_length_m (of type compass); allowed: type, thigh" in message
     message = refused("extends: paper\n", ["walker.thigh.length_m=0.4"])
     assert message.startswith("--set walker.thigh.length_m=0.4: walker.type is compass, which has no thigh (of type ")
 
 
-def test_a_leg_length_that_the_parts_have_not_is_refused_with_the_one_they_have(refused: Refused) -> None:
+def test_leg_length_that_contradicts_the_parts_is_rejected(refused: Refused) -> None:
     message = refused("extends: parts\n", ["walker.leg_length_m=1.2"])
     assert "--set walker.leg_length_m=1.2: walker.leg_length_m: 1.2 disagrees with the parts" in message
     assert "it is 1 m" in message
@@ -410,22 +404,22 @@ def test_a_leg_length_that_the_parts_have_not_is_refused_with_the_one_they_have(
         ("walker.leg_mass_kg=5000", "walker.leg_mass_kg is 5000 kg on legs of 1 m; masses are in kg, not in g"),
     ],
 )
-def test_a_number_that_is_perhaps_in_another_unit_is_told_and_taken_as_it_is(setting: str, said: str) -> None:
+def test_value_perhaps_in_another_unit_raises_a_warning(setting: str, said: str) -> None:
     assert load(sets=[setting]).warnings == (f"--set {setting}: {said}",)
 
 
-def test_a_steep_slope_in_degrees_and_heavy_walkers_of_their_size_are_taken_without_a_word() -> None:
+def test_steep_slopes_and_heavy_walkers_raise_no_warning() -> None:
     assert load(sets=["slope_deg=45"]).warnings == ()
     large = ("walker.leg_length_m=10", "walker.foot_to_mass_m=5", "walker.leg_mass_kg=5000")
     assert load(sets=large).warnings == ()
 
 
-def test_masses_of_parts_are_told_too() -> None:
+def test_suspicious_masses_of_parts_raise_a_warning() -> None:
     (warning,) = load(sets=["walker.torso={mass_kg: 5000, above_hip_m: 0.3}"]).warnings
     assert "walker.torso.mass_kg is 5000 kg" in warning
 
 
-def test_a_number_of_an_inner_block_is_told_where_it_is_written(loaded: Loaded) -> None:
+def test_warning_points_to_the_line_of_an_inner_block(loaded: Loaded) -> None:
     (warning,) = loaded("extends: kneed\nwalker:\n  shank:\n    mass_kg: 5000\n").warnings
     assert "mine.yaml:4:5: walker.shank.mass_kg is 5000 kg" in warning
 
@@ -440,9 +434,7 @@ def test_a_number_of_an_inner_block_is_told_where_it_is_written(loaded: Loaded) 
         ("parent: thigh 1,", "parent: tigh 1,", "15:30: walker.hinges.1.parent: tigh 1 is not a body"),
     ],
 )
-def test_a_part_on_a_body_that_is_not_there_is_refused_where_it_stands(
-    line: str, wrong: str, said: str, tmp_path: Path
-) -> None:
+def test_part_on_a_missing_body_is_rejected_at_its_position(line: str, wrong: str, said: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     text = (BUILTIN_FOLDER / "parts.yaml").read_text()
     assert line in text

@@ -54,17 +54,17 @@ def fate(text: str) -> str:
         ("9" * 5000, math.inf),
     ],
 )
-def test_a_plain_scalar_means_what_yaml_1_2_says(text: str, value: Any) -> None:
+def test_plain_scalars_follow_yaml_1_2(text: str, value: Any) -> None:
     assert value_of(text) == value
     assert type(value_of(text)) is type(value)
 
 
 @pytest.mark.parametrize("text", ["-0", "-0.0", "-0e5"])
-def test_there_is_no_negative_zero_so_that_equal_configs_have_equal_keys(text: str) -> None:
+def test_negative_zero_is_read_as_zero(text: str) -> None:
     assert str(value_of(text)) in ("0", "0.0")
 
 
-def test_nan_is_a_number_until_the_schema_refuses_it() -> None:
+def test_nan_is_read_as_a_number() -> None:
     value = value_of(".nan")
     assert isinstance(value, float)
     assert math.isnan(value)
@@ -72,11 +72,11 @@ def test_nan_is_a_number_until_the_schema_refuses_it() -> None:
 
 @settings(deadline=None)
 @given(st.floats(allow_nan=False, allow_infinity=False))
-def test_a_number_as_python_prints_it_is_read_back(number: float) -> None:
+def test_floats_survive_a_round_trip_through_repr(number: float) -> None:
     assert value_of(repr(number)) == number
 
 
-def test_a_quoted_scalar_is_a_text() -> None:
+def test_quoted_scalar_is_a_string() -> None:
     root = read("a: '1'\nb: \"no\"\nc: |\n  x\n", "f.yaml")
     assert root is not None
     assert plain(root) == {"a": "1", "b": "no", "c": "x\n"}
@@ -92,14 +92,14 @@ def test_every_key_and_value_knows_its_line_and_column() -> None:
     assert str(inner.entries["b"].position) == "f.yaml:3:6"
 
 
-def test_a_text_inside_a_longer_one_counts_columns_from_there() -> None:
+def test_columns_of_an_embedded_text_are_counted_from_its_start() -> None:
     root = read("[1, x]", "--set start=[1, x]", column=7)
     assert root is not None
     assert root.position.column == 7
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "---\n"])
-def test_a_text_without_content_is_nothing(text: str) -> None:
+def test_empty_text_has_no_content(text: str) -> None:
     root = read(text, "f.yaml")
     assert root is None or plain(root) is None
 
@@ -122,7 +122,7 @@ def test_a_text_without_content_is_nothing(text: str) -> None:
         ("a: \ud800\n", "f.yaml:1:4", "\\ud800 cannot be in a config"),
     ],
 )
-def test_what_is_no_plain_tree_is_refused_where_it_stands(text: str, place: str, reason: str) -> None:
+def test_unsupported_yaml_is_rejected_at_its_position(text: str, place: str, reason: str) -> None:
     message = refusal(text)
     assert message.startswith(f"{place}: ")
     assert reason in message
@@ -132,7 +132,7 @@ def test_every_duplicate_key_is_reported() -> None:
     assert refusal("a: 1\na: 2\nb: 1\nb: 2\n").count("duplicate key") == 2
 
 
-def test_a_tower_of_aliases_is_refused_before_it_is_built() -> None:
+def test_nested_aliases_are_rejected_before_expansion() -> None:
     bomb = "a: &a [1, 1]\n" + "".join(
         f"{new}: &{new} [*{old}, *{old}]\n" for old, new in zip("abcdefg", "bcdefgh", strict=True)
     )
@@ -140,27 +140,27 @@ def test_a_tower_of_aliases_is_refused_before_it_is_built() -> None:
 
 
 @pytest.mark.parametrize("opening", ["[", "{a: ", "- ", "? "])
-def test_deep_nesting_is_refused_without_recursion(opening: str) -> None:
+def test_deep_nesting_is_rejected_without_recursion(opening: str) -> None:
     message = refusal(opening * 5000)
     assert f"nested deeper than {MAX_DEPTH} levels" in message or "a key must be a word" in message
 
 
-def test_a_text_longer_than_any_config_is_refused_unread() -> None:
+def test_oversized_text_is_rejected_unread() -> None:
     assert "not a config" in refusal("a" * (MAX_CHARACTERS + 1))
 
 
 @settings(deadline=None)
 @given(st.text(max_size=200))
-def test_any_text_is_read_or_refused(text: str) -> None:
+def test_any_text_is_read_or_raises_config_error(text: str) -> None:
     assert fate(text) in ("read", "refused with its place")
 
 
 @settings(deadline=None)
 @given(st.text(alphabet="[]{}:,-?&*!|>'\"%@`# \n\t~ab1.", max_size=60))
-def test_any_punctuation_is_read_or_refused(text: str) -> None:
+def test_any_punctuation_is_read_or_raises_config_error(text: str) -> None:
     assert fate(text) in ("read", "refused with its place")
 
 
-def test_a_tab_is_told_in_words() -> None:
+def test_tab_gets_an_explanation() -> None:
     with pytest.raises(ConfigError, match=r"^mine\.yaml:2:1: a tab: YAML is indented by spaces"):
         read("walker:\n\ttype: compass\n", "mine.yaml")

@@ -14,7 +14,7 @@ from walkerlab.config.schema import METHODS, Config
 from walkerlab.errors import ConfigError
 
 
-def test_every_key_is_in_the_reference_and_so_are_the_two_of_files() -> None:
+def test_reference_lists_every_key() -> None:
     listed = [row.key for row in keys()]
     of_config = [path for path, _ in (*leaves(Config), *leaves_of_other_kinds(Config))]
     assert {".".join(path) for path in of_config} | {"extends", "slope_deg"} == set(listed)
@@ -22,7 +22,7 @@ def test_every_key_is_in_the_reference_and_so_are_the_two_of_files() -> None:
     assert len(listed) == len(set(listed))
 
 
-def test_a_key_that_every_type_of_walker_has_is_listed_once() -> None:
+def test_key_shared_by_all_walker_types_is_listed_once() -> None:
     assert [row.key.rpartition(".")[2] for row in select_keys("walker.hip")] == [*Hip.model_fields]
     assert [row.key for row in select_keys("walker.foot_centre_ahead_m")] == [
         "walker(straight-legs).foot_centre_ahead_m", "walker(kneed).foot_centre_ahead_m",
@@ -30,7 +30,7 @@ def test_a_key_that_every_type_of_walker_has_is_listed_once() -> None:
     assert [row.key for row in select_keys("walker(kneed).hip.torque_N_m")] == ["walker(kneed).hip.torque_N_m"]
 
 
-def test_keys_that_hold_the_word_are_suggested() -> None:
+def test_keys_that_contain_the_word_are_suggested() -> None:
     with pytest.raises(ConfigError) as error:
         select_keys("mass")
     suggested = re.findall(r"walker[.a-z_]+mass_kg", error.value.message)
@@ -45,7 +45,7 @@ def test_each_row_has_type_bounds_default_meaning_and_source() -> None:
         assert all((row.type, row.bounds, row.default, row.meaning, row.source)), row
 
 
-def test_bounds_and_units_are_spelled_out() -> None:
+def test_reference_states_bounds_and_units() -> None:
     rows = {row.key: row for row in keys()}
     length = rows["walker.leg_length_m"]
     assert (length.unit, length.bounds, length.default) == ("m", "from 0.001 to 1000", "1")
@@ -54,7 +54,7 @@ def test_bounds_and_units_are_spelled_out() -> None:
     assert rows["solver.rigid.method"].bounds == ", ".join(METHODS)
 
 
-def test_the_table_lists_each_key_once() -> None:
+def test_table_lists_each_key_once() -> None:
     text = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "refresh_docs.py"))["config_keys"](None)
     table = [line for line in text.splitlines() if line.startswith("|")]
     assert {line.count("|") for line in table} == {table[0].count("|")}
@@ -64,7 +64,7 @@ def test_the_table_lists_each_key_once() -> None:
     assert [row.key for row in keys() if not {row.key, "walker" + row.key.partition(")")[2]} & set(listed)] == []
 
 
-def test_the_json_schema_describes_files_and_is_json() -> None:
+def test_json_schema_describes_config_files() -> None:
     schema = json.loads(json.dumps(as_json_schema(), allow_nan=False))
     assert set(schema["properties"]) == {*Config.model_fields, "extends", "slope_deg"}
     assert schema["additionalProperties"] is False

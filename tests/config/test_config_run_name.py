@@ -31,27 +31,27 @@ def name_of(*sets: str, path: Path | None = None, strides: int | None = None) ->
         (["strides=9", "slope_deg=3"], "paper@slope_deg=3,strides=9"),
     ],
 )
-def test_the_change_is_readable(sets: list[str], name: str) -> None:
+def test_run_name_shows_the_change(sets: list[str], name: str) -> None:
     assert name_of(*sets) == name
 
 
-def test_what_changes_nothing_runs_in_the_configs_own_folder() -> None:
+def test_setting_without_effect_keeps_the_run_name() -> None:
     assert name_of("slope_rad=0.0174", "strides=5", "contact.stiffness=100000") == "paper"
     assert name_of(strides=5) == "paper"
 
 
-def test_one_experiment_has_one_folder_however_it_was_typed() -> None:
+def test_equivalent_settings_share_a_run_name() -> None:
     assert name_of("strides=3") == name_of(strides=3) == name_of("strides=8", "strides=3")
     assert name_of("contact.stiffness=1e6", "strides=3") == name_of("strides=3", "contact.stiffness=1.0e+6")
 
 
-def test_bringing_in_a_block_is_a_change_even_with_all_its_defaults() -> None:
+def test_adding_a_block_of_defaults_changes_the_run_name() -> None:
     rigid = Path("rigid-only")
     assert name_of("contact={}", path=rigid) == "rigid-only@contact=added"
     assert load(rigid, ["contact.damping=5"]).changes == ("contact=added", "contact.damping=5")
 
 
-def test_a_name_of_more_than_40_characters_has_its_first_key_and_a_digest_instead_of_a_cut_word() -> None:
+def test_long_run_name_is_its_first_key_and_a_digest() -> None:
     longest = "paper@walker.leg_mass_kg=6.25,strides=90"
     assert name_of("walker.leg_mass_kg=6.25", "strides=90") == longest
     assert len(longest) == 40
@@ -61,18 +61,18 @@ def test_a_name_of_more_than_40_characters_has_its_first_key_and_a_digest_instea
     assert first != second
 
 
-def test_a_long_name_says_which_stage_was_asked_something_else() -> None:
+def test_long_run_name_keeps_the_changed_stage() -> None:
     asked = ("design.maximise=speed_m_s", "design.over={slope_deg: [1, 3]}")
     assert re.fullmatch(r"paper@design-[0-9a-f]{8}", name_of("gravity_m_s2=1.62", *asked))
 
 
-def test_every_change_is_listed_however_short_the_name_is() -> None:
+def test_every_change_is_listed_even_if_the_name_is_short() -> None:
     changed = load(None, ["walker.hip_mass_kg=12.5", "slope_deg=3"], strides=9)
     assert changed.changes == ("walker.hip_mass_kg=12.5", "slope_deg=3", "strides=9")
     assert load().changes == ()
 
 
-def test_what_a_folder_cannot_be_called_is_left_out_of_its_name() -> None:
+def test_invalid_characters_are_removed_from_run_names() -> None:
     assert re.fullmatch(r"paper@sweep-[0-9a-f]{8}", name_of("sweep={sample: a/b}"))
 
 
@@ -83,7 +83,7 @@ def test_what_a_folder_cannot_be_called_is_left_out_of_its_name() -> None:
     strides=st.integers(1, 10_000),
     start=st.tuples(st.floats(-0.5, 0.5), st.floats(-1e3, 1e3)),
 )
-def test_a_run_name_is_one_safe_path_component(
+def test_run_name_is_a_safe_path_component(
     slope: float, stiffness: float, strides: int, start: tuple[float, float]
 ) -> None:
     name = name_of(
@@ -97,7 +97,7 @@ def test_a_run_name_is_one_safe_path_component(
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
-def test_a_short_number_reads_back_as_itself(number: float) -> None:
+def test_shortened_number_reads_back_unchanged(number: float) -> None:
     assert float(short_number(number)) == number
     assert len(short_number(number)) <= len(repr(number))
     assert "+" not in short_number(number)
@@ -105,6 +105,6 @@ def test_a_short_number_reads_back_as_itself(number: float) -> None:
 
 @settings(deadline=None)
 @given(st.floats(-89.0, 89.0), st.floats(-89.0, 89.0))
-def test_different_slopes_never_share_a_folder(one: float, other: float) -> None:
+def test_different_slopes_have_different_run_names(one: float, other: float) -> None:
     first, second = load(None, [f"slope_deg={one!r}"]), load(None, [f"slope_deg={other!r}"])
     assert first.run_name != second.run_name or first.config == second.config

@@ -24,7 +24,7 @@ def admits(block: type[Block], **values: Any) -> bool:
     return True
 
 
-def test_the_defaults_are_the_papers() -> None:
+def test_defaults_are_the_values_of_the_paper() -> None:
     config = Config()
     walker = config.walker
     assert (walker.leg_length_m, walker.leg_mass_kg, walker.hip_mass_kg) == (1.0, 5.0, 10.0)
@@ -34,7 +34,7 @@ def test_the_defaults_are_the_papers() -> None:
     assert config.outputs == ("states", "energies", "forces")
 
 
-def test_each_model_has_its_own_solver_defaults_even_in_a_partial_block() -> None:
+def test_partial_solver_block_keeps_the_defaults_of_each_model() -> None:
     solver = Config.model_validate({"solver": {"rigid": {"rtol": 1e-6}, "contact": {"atol": 1e-6}}}).solver
     assert (solver.rigid.method, solver.rigid.rtol, solver.rigid.atol) == ("dop853", 1e-6, 1e-12)
     assert (solver.contact.method, solver.contact.rtol, solver.contact.atol) == ("radau5", 1e-7, 1e-6)
@@ -48,7 +48,7 @@ def test_every_method_is_allowed_for_both_models(method: str, monkeypatch: pytes
     assert Config.model_validate({"solver": solver}).solver.rigid.method == method
 
 
-def test_a_config_cannot_be_changed_and_can_be_a_key() -> None:
+def test_config_is_immutable_and_hashable() -> None:
     config = Config(contact=Contact())
     with pytest.raises(ValidationError):
         config.strides = 6  # type: ignore[misc]
@@ -104,7 +104,7 @@ def test_every_key_has_a_meaning_a_source_and_a_unit_if_it_is_a_number(field: An
         (SolverSettings, {"rtol": 0.1}),
     ],
 )
-def test_the_extremes_are_admitted(block: type[Block], values: dict[str, Any]) -> None:
+def test_values_at_the_bounds_are_accepted(block: type[Block], values: dict[str, Any]) -> None:
     assert admits(block, **values)
 
 
@@ -153,25 +153,25 @@ def test_the_extremes_are_admitted(block: type[Block], values: dict[str, Any]) -
         (SolverSettings, {"method": "euler"}),
     ],
 )
-def test_what_lies_beyond_the_bounds_is_refused(block: type[Block], values: dict[str, Any]) -> None:
+def test_values_beyond_the_bounds_are_rejected(block: type[Block], values: dict[str, Any]) -> None:
     assert not admits(block, **values)
 
 
 @pytest.mark.parametrize("value", [True, "1", None, [1.0], math.nan, math.inf, -math.inf, 10**400])
-def test_a_number_is_a_finite_number_and_nothing_like_one(value: Any) -> None:
+def test_number_must_be_finite_and_not_a_bool_or_string(value: Any) -> None:
     assert not admits(Config, gravity_m_s2=value)
     assert not admits(Config, strides=value)
 
 
-def test_the_mass_sits_in_the_middle_of_a_leg_of_any_length_unless_it_is_told() -> None:
+def test_leg_mass_is_in_the_middle_by_default() -> None:
     assert CompassWalker(leg_length_m=0.3).foot_to_mass_m == 0.15
 
 
-def test_outputs_are_a_set_in_the_order_of_the_schema() -> None:
+def test_outputs_are_sorted_and_unique() -> None:
     assert Config.model_validate({"outputs": ["forces", "states", "forces"]}).outputs == ("states", "forces")
 
 
-def test_adams_numbers_mean_the_same_quantities_in_si() -> None:
+def test_adams_units_convert_to_si() -> None:
     in_si = Contact().in_si()
     assert in_si.stiffness == pytest.approx(3.98107170553e11, rel=1e-11)  # 1e5 * 10**6.6
     assert in_si.damping == 9.0e4
@@ -181,27 +181,27 @@ def test_adams_numbers_mean_the_same_quantities_in_si() -> None:
 
 
 @given(st.floats(1.0, 3.0), st.floats(1e-3, 1e3))
-def test_a_force_in_newton_does_not_depend_on_the_units_of_its_law(exponent: float, penetration_mm: float) -> None:
+def test_contact_force_does_not_depend_on_the_units_of_the_law(exponent: float, penetration_mm: float) -> None:
     law = Contact(exponent=exponent).in_si()
     in_adams_units = 1e5 * penetration_mm**exponent
     assert law.stiffness * (penetration_mm / 1000) ** exponent == pytest.approx(in_adams_units, rel=1e-12)
 
 
 @given(st.floats(1.0, 3.0))
-def test_a_key_left_out_is_the_same_quantity_in_either_units(exponent: float) -> None:
+def test_contact_defaults_are_equal_in_both_unit_systems(exponent: float) -> None:
     adams, si = Contact(exponent=exponent).in_si(), Contact(units="si", exponent=exponent).in_si()
     assert adams.units == si.units == "si"
     for name in ("stiffness", "damping", "full_damping_penetration", "stiction_velocity", "friction_velocity"):
         assert getattr(adams, name) == pytest.approx(getattr(si, name), rel=1e-14)
 
 
-def test_numbers_in_si_are_taken_as_they_are() -> None:
+def test_si_values_are_not_converted() -> None:
     law = Contact(units="si", stiffness=1e5, exponent=1.0, damping=90.0).in_si()
     assert (law.stiffness, law.damping, law.full_damping_penetration) == (1e5, 90.0, 1e-4)
 
 
 @pytest.mark.parametrize(("key", "meant"), [("walker.nonsense", ""), ("walker.slope_rad", "; did you mean slope_rad?")])
-def test_a_key_that_walkers_have_not_is_not_taken_for_a_like_one_of_another_block(key: str, meant: str) -> None:
+def test_unknown_key_suggests_no_unrelated_block(key: str, meant: str) -> None:
     with pytest.raises(ConfigError) as caught:
         load(sets=[f"{key}=1"])
     assert caught.value.message.startswith(f"--set {key}=1: {key}: unknown key (1){meant or '; allowed'}")

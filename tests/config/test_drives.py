@@ -22,7 +22,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("asked", REFUSED)
-def test_what_cannot_drive_a_walker_is_refused_in_words(asked):
+def test_invalid_drives_are_rejected(asked):
     name, *sets = asked
     with pytest.raises(ConfigError, match=REFUSED[asked]):
         load(Path(name), sets)
@@ -38,5 +38,5 @@ def test_walkers_of_every_type_are_driven(name):
 
 
 @pytest.mark.parametrize("number", Hip.model_fields)
-def test_every_number_of_the_hip_is_told_in_words(number):
+def test_every_hip_parameter_has_a_description(number):
     assert len(acting_on(load(Path("paper"), (f"walker.hip.{number}=0.01",)).config)) == 1

@@ -63,7 +63,7 @@ def ball(force, height=0.0, speed=0.0, gravity=0.0):
     return Dataset(HEAD.format("METER") + BALL.format(**locals()) + TAIL.format(gravity))
 
 
-def test_a_pendulum_falls_as_adams_computed_it():
+def test_pendulum_falls_as_adams_computed_it():
     dataset = pendulum()
     solution = dataset.integrate(5.0)
     for time, place in CHRONO.items():
@@ -71,7 +71,7 @@ def test_a_pendulum_falls_as_adams_computed_it():
         assert dataset.place(q, 21)[0] == pytest.approx(place, abs=1e-5)
 
 
-def test_a_pendulums_period_is_the_elliptic_integral():
+def test_period_of_a_pendulum_is_the_elliptic_integral():
     dataset = pendulum()
 
     def lowest(t, q, u):
@@ -86,7 +86,7 @@ def test_a_pendulums_period_is_the_elliptic_integral():
     assert times[1][-1] == pytest.approx(2.0 * quarter, abs=1e-8)
 
 
-def test_a_linear_contact_is_a_half_oscillation():
+def test_linear_contact_lasts_half_an_oscillation():
     k, m, v = 5e3, 2.0, 0.3
     dataset = ball(f"IMPACT(DY(21,1,1), VY(21,1,1,1), 1.0, {k}, 1.0, 0, 0.1)", height=1.0, speed=-v)
 
@@ -99,7 +99,7 @@ def test_a_linear_contact_is_a_half_oscillation():
     assert solution.y_events[0][0][4] == pytest.approx(v, abs=1e-7)
 
 
-def test_a_ball_rests_where_its_weight_is_carried():
+def test_ball_rests_where_the_force_equals_its_weight():
     # k d^2.2 = m g, in millimetres
     text = HEAD.format("MILLIMETER") + BALL.format(
         height=1.0 - (2.0 * 9.80665 / 1e5) ** (1 / 2.2), speed=0.0,
@@ -119,7 +119,7 @@ def test_a_ball_rests_where_its_weight_is_carried():
         ("SIGN(2, -3)", -2.0), ("2**3 - 4*MAX(1, 2)", 0.0), ("COS(PI) + SQRT(4.0E+00)", 1.0),
     ],
 )  # fmt: skip
-def test_expressions_have_their_values(text, value):
+def test_adams_expressions_are_evaluated_correctly(text, value):
     dataset = ball(text)
     assert dataset.value(dataset.variables[1], 0.0, *dataset.start) == pytest.approx(value)
 
@@ -133,13 +133,13 @@ def rate_at_start(text):
     ("wrong", "right"),
     [("FY = VARVAL(1)\\", "FY = VARVAL(1)"), ("VARVAL(1)", "VARVALUE(1)"), ("MARKER/91", "MARKER/21"), ("END\n", "\n")],
 )
-def test_a_damaged_dataset_is_refused(wrong, right):
+def test_damaged_dataset_is_rejected(wrong, right):
     text = HEAD.format("METER") + BALL.format(force="0", height=0, speed=0) + TAIL.format(0)
     with pytest.raises((AssertionError, IndexError)):
         rate_at_start(text.replace(wrong, right))
 
 
-def test_a_coupler_keeps_a_body_on_the_bisector():
+def test_coupler_keeps_a_body_on_the_bisector():
     parts = "".join(
         f"PART/{n}\n, QG = 0, 0, 0\n, REULER = {turn}, 0, 0\n, WX = 0, WY = 0, WZ = {spin}\n, VX = {vx}\n, VY = {vy}\n"
         f", MASS = {n}\n, CM = {n}1\n, IP = 1, 1, {0.1 * n}\nMARKER/{n}1\n, PART = {n}\n, QP = 0, -0.5, 0\n"

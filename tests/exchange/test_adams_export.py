@@ -84,7 +84,7 @@ def random_states(export, count=5):
 
 
 @pytest.mark.parametrize("seed", range(len(WALKERS)), ids=WALKERS)
-def test_masses_and_gravity_are_ours(seed):
+def test_exported_masses_and_gravity_equal_the_models(seed):
     walker = random_walker(seed)
     dataset, export = without_forces(dataset_of("functions", *walker)), export_of(*walker)
     for q, _ in random_states(export):
@@ -102,7 +102,7 @@ def test_masses_and_gravity_are_ours(seed):
 
 @pytest.mark.parametrize("law", ["contact.full_damping_penetration=20", "contact.exponent=1.0"])
 @pytest.mark.parametrize("seed", range(len(WALKERS)), ids=WALKERS)
-def test_forces_of_ground_hip_and_push_off_are_ours(seed, law):
+def test_exported_forces_equal_the_models(seed, law):
     walker = (*random_walker(seed), law)
     dataset, export = dataset_of("functions", *walker), export_of(*walker)
     without = without_forces(dataset_of("functions", *walker))
@@ -123,7 +123,7 @@ def test_forces_of_ground_hip_and_push_off_are_ours(seed, law):
 
 
 @pytest.mark.parametrize("seed", range(3), ids=WALKERS[:3])
-def test_the_model_as_written_walks_our_walk(seed):
+def test_exported_model_reproduces_the_walk(seed):
     walker = random_walker(seed)
     dataset, export = dataset_of("functions", *walker), export_of(*walker)
     assert export.walk.steps >= 3
@@ -181,7 +181,7 @@ def test_no_constraint_is_redundant():
     assert np.abs(g @ torso.start[1]).max() < 1e-9
 
 
-def test_contact_statements_have_the_dialogs_numbers_and_two_lanes():
+def test_contact_statements_have_adams_parameters_and_two_lanes():
     dataset = dataset_of("contact", "paper")
     shapes = {s.id: s for s in dataset.of("GRAPHICS")}
     corners = {s.id: s.numbers("QP", (0.0, 0.0, 0.0)) for s in dataset.of("MARKER")}
@@ -205,7 +205,7 @@ def test_contact_statements_have_the_dialogs_numbers_and_two_lanes():
     assert len(lanes) == len(set(lanes)) == 17
 
 
-def test_results_come_back_under_our_names():
+def test_adams_result_names_match_recording_columns():
     from walkerlab.exchange.columns import Recording, matches
 
     text = next(iter(files_of("adm", "contact", "torso", PADS).files.values()))
@@ -222,7 +222,7 @@ def test_results_come_back_under_our_names():
     assert found["torso_velocity"] == "walker.torso_velocity"
 
 
-def test_a_pinned_first_step_is_run_and_released_by_the_commands():
+def test_commands_run_a_pinned_first_step_and_release_it():
     exported = files_of("adm", "functions", "paper", "contact.stance=pinned")
     dataset, commands = (text.splitlines() for text in exported.files.values())
     first = export_of("paper", "contact.stance=pinned").touches_s[0]
@@ -233,7 +233,7 @@ def test_a_pinned_first_step_is_run_and_released_by_the_commands():
     assert export_of("paper").pinned is False
 
 
-def test_the_head_says_where_the_model_is_from_and_what_it_lacks():
+def test_header_states_origin_and_omissions_of_the_model():
     exported = files_of("adm", "functions", "level")
     text = next(iter(exported.files.values()))
     assert text.startswith("walkerlab model of level\n! Written by walkerlab ")
@@ -263,14 +263,14 @@ def test_bodies_keep_readable_names(tmp_path):
         ("functions", ("paper", "ground.roughness_m=0.0005"), "Uneven ground", "--law contact"),
     ],
 )
-def test_what_would_change_the_walk_is_refused(law, walker, why, instead):
+def test_unsupported_features_are_rejected(law, walker, why, instead):
     with pytest.raises(ConfigError) as caught:
         export_model(*with_gait(*walker), "adm", law)
     assert why in caught.value.message
     assert instead in caught.value.advice
 
 
-def test_uneven_pads_are_boxes_at_their_heights():
+def test_uneven_pads_are_exported_as_boxes():
     sets = ("ground.heights_m=[0.001,-0.002]", "strides=2")
     dataset = dataset_of("contact", "paper", *sets)
     tops = {s.label: s.numbers("QP")[1] + 50.0 for s in dataset.of("MARKER") if s.label.startswith("pad_")}

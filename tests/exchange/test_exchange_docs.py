@@ -25,7 +25,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["paper.adm", "paper.acf", "paper.cmd", "paper.xml"])
-def test_downloads_are_todays_models(folder, name):
+def test_downloads_equal_freshly_exported_models(folder, name):
     """Up to rounding, and but for the line with the version."""
     texts = [
         re.sub(r".*Written by walkerlab.*", "", path.read_text()) for path in (DOCS / "downloads" / name, folder / name)
@@ -35,7 +35,7 @@ def test_downloads_are_todays_models(folder, name):
     np.testing.assert_allclose(*(np.array(NUMBER.findall(text), float) for text in texts), rtol=1e-7, atol=1e-9)
 
 
-def test_the_walker_walks_in_plain_mujoco_and_as_an_environment(folder, monkeypatch):
+def test_walker_walks_in_plain_mujoco_and_in_gymnasium(folder, monkeypatch):
     pytest.importorskip("mujoco")
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(folder)

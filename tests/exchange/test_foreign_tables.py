@@ -98,7 +98,7 @@ def test_decimal_commas_are_read(name, tmp_path):
 
 
 @pytest.mark.parametrize("cell", ["1.000,0", "1,000.0", "1.000.0", "0,1,2"])
-def test_a_cell_that_is_no_number_is_quoted_as_it_stands_in_the_file(cell, tmp_path):
+def test_cell_that_is_not_a_number_is_quoted(cell, tmp_path):
     rows = [*with_commas()[:2], [with_commas()[2][0], cell, "0,1"], *with_commas()[3:]]
     with pytest.raises(ConfigError, match=rf"line 4: '{re.escape(cell)}' is not a number"):
         read(tmp_path, "walk.csv", table(rows, delimiter=";"))
@@ -110,7 +110,7 @@ def test_decimal_commas_between_commas_get_advice(tmp_path):
     assert "decimal commas need semicolons, tabs or quotes" in caught.value.advice
 
 
-def test_a_comma_that_may_separate_thousands_is_refused(tmp_path):
+def test_comma_that_may_separate_thousands_is_rejected(tmp_path):
     """1,200 is one and a fifth in some countries and twelve hundred in others."""
     rows = [[f"{k}.5", f"{k + 1},200", "0.1"] for k in range(6)]
     with pytest.raises(ConfigError, match="line 2: '1,200' has a comma, but other numbers have points"):
@@ -120,7 +120,7 @@ def test_a_comma_that_may_separate_thousands_is_refused(tmp_path):
     assert walk.quantities["angle 1"][0] == 1.2
 
 
-def test_points_and_commas_in_one_column_are_refused(tmp_path):
+def test_mixed_decimal_marks_in_one_column_are_rejected(tmp_path):
     rows = [*ROWS[:3], *with_commas(ROWS[3:])]
     with pytest.raises(ConfigError, match="has a comma, but other numbers have points"):
         read(tmp_path, "walk.csv", table(rows, delimiter=";"))
@@ -142,12 +142,12 @@ UNUSED_COLUMNS = {
 
 
 @pytest.mark.parametrize("kind", UNUSED_COLUMNS)
-def test_a_column_that_is_not_asked_for_does_not_refuse_the_file(kind, tmp_path):
+def test_bad_value_in_an_unused_column_is_ignored(kind, tmp_path):
     name, cells = UNUSED_COLUMNS[kind]
     assert holds_the_walk(read(tmp_path, "walk.txt", table(with_column(cells), (*HEADER, name), "\t")))
 
 
-def test_a_quantity_that_is_taken_along_is_left_out_with_the_reason(tmp_path):
+def test_unreadable_optional_quantity_is_omitted_with_the_reason(tmp_path):
     text = table(with_column(["1", "", "1", "1", "1", "1"]), (*HEADER, "kinetic_J (J)"))
     walk = read(tmp_path, "walk.csv", text)
     assert "kinetic_J" not in walk.quantities
@@ -157,14 +157,14 @@ def test_a_quantity_that_is_taken_along_is_left_out_with_the_reason(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["spare", ""])
-def test_labels_may_be_repeated_or_empty_where_they_are_not_used(name, tmp_path):
+def test_unused_labels_may_be_repeated_or_empty(name, tmp_path):
     rows = with_column(["2"] * 6, with_column(["1"] * 6))
     assert holds_the_walk(read(tmp_path, "walk.csv", table(rows, (*HEADER, name, name))))
     within = [[row[0], *row[3:], *row[1:3]] for row in rows]
     assert holds_the_walk(read(tmp_path, "walk.mot", opensim(within, ("time", name, name, "angle_1", "angle_2"))))
 
 
-def test_an_index_without_a_name_can_be_the_time(tmp_path):
+def test_index_without_a_name_can_be_the_time(tmp_path):
     """The index of a data frame has an empty header cell."""
     text = table(header=("", *HEADER[1:]))
     with pytest.raises(ConfigError, match="no time column; the first columns are column 1, angle 1"):
@@ -176,18 +176,18 @@ def test_an_index_without_a_name_can_be_the_time(tmp_path):
 
 @pytest.mark.parametrize("units", [("s", "rad", "rad"), ("[s]", "[rad]", "[rad]"), ("Seconds", "radians", "Radians")])
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-def test_a_row_of_units_is_read(units, delimiter, tmp_path):
+def test_row_of_units_is_read(units, delimiter, tmp_path):
     text = table(header=("time", "angle 1", "angle 2"), delimiter=delimiter, below=[units], above=["Walk of today"])
     assert holds_the_walk(read(tmp_path, "walk.txt", text))
 
 
-def test_a_row_of_units_may_have_unknown_units_and_gaps(tmp_path):
+def test_row_of_units_may_have_unknown_units_and_gaps(tmp_path):
     rows = with_column(["7"] * 6, with_column(["1"] * 6))
     text = table(rows, ("time", "angle 1", "angle 2", "load", "n"), below=[("s", "rad", "rad", "%", "")])
     assert holds_the_walk(read(tmp_path, "walk.csv", text))
 
 
-def test_rows_of_delimiters_alone_are_no_rows(tmp_path):
+def test_rows_of_delimiters_alone_are_skipped(tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.csv", table([*ROWS, ["", "", ""]]) + ",,\n"))
 
 
@@ -202,7 +202,7 @@ def test_rows_of_delimiters_alone_are_no_rows(tmp_path):
         ("Time Stamp [s]", {}, {}),
     ],
 )
-def test_the_time_column_can_be_named_as_the_file_names_it(header, columns, units, tmp_path):
+def test_time_column_can_be_chosen_by_its_name(header, columns, units, tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.csv", table(header=(header, *HEADER[1:])), columns, units))
 
 
@@ -216,7 +216,7 @@ def test_times_in_micro_and_nanoseconds_are_read(header, scale, tmp_path):
     assert parse_units(["us"]) == {"time": "us"}
 
 
-def test_a_unit_that_contradicts_the_file_is_an_error(tmp_path):
+def test_unit_that_contradicts_the_file_is_an_error(tmp_path):
     for units in ({"angle": "deg"}, {"angle 1": "deg"}):
         with pytest.raises(ConfigError, match=r"states that 'angle 1' .* is in rad, but --units that it is in deg"):
             read(tmp_path, "walk.csv", table(), units=units)
@@ -230,7 +230,7 @@ def test_a_unit_that_contradicts_the_file_is_an_error(tmp_path):
 @pytest.mark.parametrize(
     ("units", "near"), [({"angel": "rad"}, "'angle'"), ({"angle 3": "rad"}, "'angle "), ({"x": "m"}, "Kinds")]
 )
-def test_a_unit_of_an_unknown_thing_is_an_error(units, near, tmp_path):
+def test_unit_for_an_unknown_quantity_is_an_error(units, near, tmp_path):
     with pytest.raises(ConfigError, match="is neither a kind, a quantity nor a column of") as caught:
         read(tmp_path, "walk.csv", table(), units=units)
     assert near in caught.value.advice
@@ -252,21 +252,21 @@ PLANAR = {
 
 
 @pytest.mark.parametrize("style", PLANAR)
-def test_markers_in_a_plane_give_the_angles_of_lines(style, tmp_path):
+def test_planar_markers_give_line_angles(style, tmp_path):
     names = [pattern.format(marker) for marker in ("HIP", "F1", "F2") for pattern in PLANAR[style]]
     places = positions()[:, [0, 1, 3, 4, 6, 7]] / 1000.0
     rows = [[row[0], *(f"{place:.12f}" for place in each)] for row, each in zip(ROWS, places, strict=True)]
     assert holds_the_walk(read(tmp_path, "walk.csv", table(rows, ("time (s)", *names)), LINES))
 
 
-def test_a_marker_with_two_columns_for_one_coordinate_is_refused(tmp_path):
+def test_marker_with_a_repeated_coordinate_is_rejected(tmp_path):
     names = "HIP.x", "HIP X", "HIP.y", "F1.x", "F1.y", "F2.x", "F2.y"
     rows = [[row[0], *"1234567"] for row in ROWS]
     with pytest.raises(ConfigError, match=r"HIP\.x and HIP X could each be a coordinate of HIP"):
         read(tmp_path, "walk.csv", table(rows, ("time (s)", *names)), LINES)
 
 
-def test_a_line_between_markers_in_different_units_is_scaled(tmp_path):
+def test_line_between_markers_in_different_units_is_scaled(tmp_path):
     names = "HIP.x (m)", "HIP.y (m)", "F1.x (mm)", "F1.y (mm)", "F2.x (mm)", "F2.y (mm)"
     places = positions()[:, [0, 1, 3, 4, 6, 7]] / [1000.0, 1000.0, 1.0, 1.0, 1.0, 1.0]
     rows = [[row[0], *(f"{place:.12f}" for place in each)] for row, each in zip(ROWS, places, strict=True)]
@@ -278,12 +278,12 @@ def with_marker(place, values=7.0):
 
 
 @pytest.mark.parametrize("place", range(4))
-def test_a_marker_without_a_name_does_not_shift_the_others(place, tmp_path):
+def test_unnamed_marker_does_not_shift_the_others(place, tmp_path):
     names = [*("HIP", "F1", "F2")[:place], "", *("HIP", "F1", "F2")[place:]]
     assert holds_the_walk(read(tmp_path, "walk.trc", trc(names, with_marker(place)), LINES))
 
 
-def test_markers_without_a_name_of_their_own_may_repeat_one(tmp_path):
+def test_markers_with_placeholder_names_may_repeat(tmp_path):
     values = np.insert(with_marker(1), [3] * 3, 8.0, axis=1)
     assert holds_the_walk(read(tmp_path, "walk.trc", trc(("HIP", "*12", "*12", "F1", "F2"), values), LINES))
     with pytest.raises(ConfigError, match="2 columns have this name"):
@@ -291,18 +291,18 @@ def test_markers_without_a_name_of_their_own_may_repeat_one(tmp_path):
 
 
 @pytest.mark.parametrize("count", [2, 4])
-def test_a_header_with_another_number_of_markers_is_refused(count, tmp_path):
+def test_wrong_marker_count_in_the_header_is_rejected(count, tmp_path):
     with pytest.raises(ConfigError, match=f"coordinates of 3, and its NumMarkers is {count}"):
         read(tmp_path, "walk.trc", trc(count=count), LINES)
 
 
-def test_values_beyond_the_last_marker_are_refused(tmp_path):
+def test_values_beyond_the_last_marker_are_rejected(tmp_path):
     text = trc(values=with_marker(3))
     with pytest.raises(ConfigError, match="14 values where the header names 11 columns"):
         read(tmp_path, "walk.trc", text, LINES)
 
 
-def test_an_empty_unit_in_the_header_of_markers_shifts_nothing(tmp_path):
+def test_empty_marker_unit_in_the_header_is_ignored(tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.trc", trc(units=""), LINES))
     with pytest.raises(ConfigError, match=r"states no unit for 'HIP\.x'"):
         read(tmp_path, "walk.trc", trc(units=""), {**LINES, "hip_along_m": "HIP.x"})
@@ -326,7 +326,7 @@ def test_gaps_at_both_ends_are_cut(tmp_path):
 # OpenSim
 
 
-def test_labels_with_blanks_are_split_at_tabs(tmp_path):
+def test_labels_with_spaces_are_split_at_tabs(tmp_path):
     text = opensim(labels=("time", "right thigh", "left thigh"))
     assert holds_the_walk(read(tmp_path, "walk.mot", text, {"angle 1": "right thigh", "angle 2": "left thigh"}))
 
@@ -344,12 +344,12 @@ def test_labels_with_blanks_are_split_at_tabs(tmp_path):
         ("walk.sto", "version=1\ninDegrees=yes\n", "deg"),
     ],
 )
-def test_angles_have_the_unit_in_which_opensim_reads_them(name, settings, unit, tmp_path):
+def test_motion_file_angles_default_to_the_unit_opensim_assumes(name, settings, unit, tmp_path):
     walk = read(tmp_path, name, opensim(settings=settings))
     assert walk.both_legs("angle") == pytest.approx(ANGLES if unit == "rad" else np.radians(ANGLES), abs=1e-8)
 
 
-def test_a_motion_without_version_that_denies_degrees_needs_a_unit(tmp_path):
+def test_motion_file_without_version_and_degrees_needs_a_unit(tmp_path):
     """OpenSim reads it in degrees, whatever it says."""
     text = opensim(settings="inDegrees=no\n")
     with pytest.raises(ConfigError, match="states no unit for 'angle_1'"):
@@ -371,13 +371,13 @@ def test_a_motion_without_version_that_denies_degrees_needs_a_unit(tmp_path):
         ("scorer,net,net\nbodyparts,hip,hip\ncoords,x,y\n0,1,2\n1,2,3\n", "DeepLabCut"),
     ],
 )
-def test_a_table_that_needs_another_export_says_of_which_program_it_is(beginning, program, tmp_path):
+def test_unsupported_table_names_its_program(beginning, program, tmp_path):
     with pytest.raises(ConfigError, match=f"is a table of {program}") as caught:
         read(tmp_path, "walk.csv", beginning)
     assert re.search(r"\.c3d|time \(s\)", caught.value.advice)
 
 
-def test_a_qualisys_table_with_column_headers_is_read(tmp_path):
+def test_qualisys_table_with_column_headers_is_read(tmp_path):
     names = [f"{marker} {axis}" for marker in ("HIP", "F1", "F2") for axis in "XYZ"]
     above = ["NO_OF_FRAMES\t6", "NO_OF_CAMERAS\t8", "NO_OF_MARKERS\t3", "FREQUENCY\t10", "MARKER_NAMES\tHIP\tF1\tF2"]
     rows = [[str(n), row[0], *map(str, each)] for n, (row, each) in enumerate(zip(ROWS, positions(), strict=True), 1)]
@@ -385,7 +385,7 @@ def test_a_qualisys_table_with_column_headers_is_read(tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.tsv", text, LINES, {"time": "s"}))
 
 
-def test_a_table_that_counts_frames_is_told_that_it_needs_times(tmp_path):
+def test_table_of_frame_numbers_asks_for_times(tmp_path):
     with pytest.raises(ConfigError, match="no time column") as caught:
         read(tmp_path, "walk.csv", table(header=("frame_idx", *HEADER[1:])))
     assert "counts frames" in caught.value.advice
@@ -401,12 +401,12 @@ def test_a_table_that_counts_frames_is_told_that_it_needs_times(tmp_path):
         (table(header=("time", "angle_1", "angle_2"), delimiter=" "), "separates its columns by blanks"),
     ],
 )
-def test_a_file_without_a_table_says_what_is_the_matter(text, message, tmp_path):
+def test_file_without_a_table_gets_an_explanation(text, message, tmp_path):
     with pytest.raises(ConfigError, match=message):
         read(tmp_path, "walk.txt", text)
 
 
-def test_a_table_of_two_tracks_says_how_to_export_it(tmp_path):
+def test_table_of_two_tracks_advises_another_export(tmp_path):
     text = "mass_A\t\t\tmass_B\nt\tx\ty\tt\tx\ty\n0.0\t1.0\t2.0\t0.0\t1.5\t2.5\n0.1\t1.1\t2.1\t0.1\t1.6\t2.6\n"
     with pytest.raises(ConfigError, match="Tracker with several tracks") as caught:
         read(tmp_path, "walk.txt", text)
@@ -447,7 +447,7 @@ def test_results_of_adams_are_read_in_any_encoding(declared, encoding, tmp_path)
 
 
 @pytest.mark.parametrize("tag", ["Entity", "Data", "Step", "Component"])
-def test_deeply_nested_results_are_refused_at_once(tag, tmp_path):
+def test_deeply_nested_results_are_rejected_quickly(tag, tmp_path):
     depth = 100_000
     path = tmp_path / "deep.res"
     path.write_text(f"<Results>{f'<{tag}>' * depth}{f'</{tag}>' * depth}</Results>", encoding="utf-8")
@@ -458,7 +458,7 @@ def test_deeply_nested_results_are_refused_at_once(tag, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".trc"])
-def test_the_time_to_read_grows_as_the_number_of_columns(suffix, tmp_path):
+def test_time_to_read_is_linear_in_the_number_of_columns(suffix, tmp_path):
     """Ten times as many columns take far less than a hundred times as long."""
     took = []
     for count in (1_000, 10_000):
@@ -478,25 +478,25 @@ def test_the_time_to_read_grows_as_the_number_of_columns(suffix, tmp_path):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 @pytest.mark.parametrize("name", ["walk.csv", "walk.res", "walk.c3d"])
-def test_a_named_pipe_is_refused(name, tmp_path):
+def test_named_pipe_is_rejected(name, tmp_path):
     os.mkfifo(tmp_path / name)
     with pytest.raises(ConfigError, match="is a pipe or a device, not a file"):
         read_recording(tmp_path / name)
 
 
-def test_a_path_that_is_too_long_is_cut_in_the_message(tmp_path):
+def test_overlong_path_is_shortened_in_the_message(tmp_path):
     with pytest.raises(ConfigError, match=r"a\.\.\. cannot be read") as caught:
         read_recording(tmp_path / ("a" * 5_000 + ".csv"))
     assert len(caught.value.message) < 500
 
 
-def test_links_in_a_circle_are_refused(tmp_path):
+def test_circular_links_are_rejected(tmp_path):
     (tmp_path / "walk.csv").symlink_to(tmp_path / "walk.csv")
     with pytest.raises(ConfigError, match="cannot be read"):
         read_recording(tmp_path / "walk.csv")
 
 
-def test_a_file_of_markers_asks_for_those_of_a_leg(tmp_path):
+def test_file_of_markers_asks_which_ones_form_a_leg(tmp_path):
     path = tmp_path / "markers.csv"
     path.write_text("time (s),PELVIS.x,PELVIS.y,HEEL.x,HEEL.y\n0,0,1,0,0\n0.01,0,1,0,0\n", encoding="utf-8")
     with pytest.raises(ConfigError, match="has no column for 'angle 1', but markers: PELVIS, HEEL") as refused:

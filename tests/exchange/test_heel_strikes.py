@@ -67,7 +67,7 @@ def all_steps_are_right(summary, period=1e-5, length=1e-5):
 
 @pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0, 1000.0])
 @pytest.mark.parametrize("cut_ms", [5, 10, 15, 20, 25])
-def test_a_recording_that_begins_shortly_after_a_heel_strike_begins_at_the_next(cut_ms, fps, tmp_path):
+def test_recording_that_starts_after_a_heel_strike_begins_at_the_next_one(cut_ms, fps, tmp_path):
     summary = read(tmp_path, *sampled(begin=1e-3 * cut_ms, fps=fps))
     assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=2e-5)
     assert all_steps_are_right(summary, period=3e-5, length=3e-5)
@@ -85,7 +85,7 @@ def test_noise_does_not_make_the_first_sample_a_heel_strike(cut_ms, fps, tmp_pat
 
 @pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0, 1000.0])
 @pytest.mark.parametrize("noise", [0.0, 2e-4])
-def test_a_recording_that_begins_on_a_heel_strike_keeps_its_first_step(noise, fps, tmp_path):
+def test_recording_that_begins_on_a_heel_strike_keeps_its_first_step(noise, fps, tmp_path):
     summary = read(tmp_path, *sampled(fps=fps, noise=noise, seed=1))
     assert summary["first_heel_strike_s"] == 0.0
     assert summary["steps"] == 7
@@ -94,7 +94,7 @@ def test_a_recording_that_begins_on_a_heel_strike_keeps_its_first_step(noise, fp
 
 @pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0])
 @pytest.mark.parametrize("after_ms", [-20, -10, -5, -2, 0, 2, 5, 10, 25])
-def test_a_heel_strike_near_the_end_is_right_or_left_out(after_ms, fps, tmp_path):
+def test_heel_strike_near_the_end_is_correct_or_omitted(after_ms, fps, tmp_path):
     end = 4.0 * PERIOD_S + 1e-3 * after_ms
     count = int((end - 0.3) * fps)
     time = end - np.arange(count, -1, -1) / fps
@@ -103,14 +103,14 @@ def test_a_heel_strike_near_the_end_is_right_or_left_out(after_ms, fps, tmp_path
     assert summary["steps"] >= (3 if after_ms >= 0 else 2)
 
 
-def test_a_recording_that_begins_just_before_a_heel_strike_begins_on_it(tmp_path):
+def test_recording_that_begins_just_before_a_heel_strike_begins_on_it(tmp_path):
     summary = read(tmp_path, *sampled(begin=PERIOD_S - 5e-3))
     assert summary["first_heel_strike_s"] == pytest.approx(PERIOD_S, abs=1e-5)
     assert all_steps_are_right(summary)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
-def test_standing_before_the_walk_is_no_step(noise, tmp_path):
+def test_standing_before_the_walk_is_not_a_step(noise, tmp_path):
     time, angle = sampled(begin=0.0, noise=noise)
     still = angle[0] + noise * np.random.default_rng(5).standard_normal((75, 2))
     summary = read(tmp_path, np.append(np.arange(75) / 100.0, 0.75 + time), np.concatenate((still, angle)))
@@ -118,7 +118,7 @@ def test_standing_before_the_walk_is_no_step(noise, tmp_path):
     assert summary["steps"] >= 6
 
 
-def test_an_outlier_far_from_a_heel_strike_changes_nothing_and_is_named(tmp_path):
+def test_outlier_far_from_a_heel_strike_is_reported_and_harmless(tmp_path):
     time, angle = sampled()
     angle[250, 1] = 0.0
     summary = read(tmp_path, time, angle)
@@ -126,7 +126,7 @@ def test_an_outlier_far_from_a_heel_strike_changes_nothing_and_is_named(tmp_path
     assert summary["doubts"] == ["Angle 2 is off its course at sample 251 (time 2.5 s), which is left out."]
 
 
-def test_three_flipped_samples_are_named_and_left_out(tmp_path):
+def test_three_flipped_samples_are_reported_and_omitted(tmp_path):
     time, angle = sampled()
     angle[290:293, 0] *= -1.0
     summary = read(tmp_path, time, angle)
@@ -136,7 +136,7 @@ def test_three_flipped_samples_are_named_and_left_out(tmp_path):
     ]
 
 
-def test_swapped_legs_are_named_and_swapped_back(tmp_path):
+def test_swapped_legs_are_reported_and_corrected(tmp_path):
     time, angle = sampled()
     angle[180:190] = angle[180:190, ::-1]
     summary = read(tmp_path, time, angle)
@@ -146,7 +146,7 @@ def test_swapped_legs_are_named_and_swapped_back(tmp_path):
     ]
 
 
-def test_legs_that_are_swapped_as_they_pass_are_swapped_back(tmp_path):
+def test_legs_swapped_while_passing_are_corrected(tmp_path):
     """From then on the same leg would seem to strike twice in a row."""
     time, angle = sampled(fps=1000.0)
     rows = time > 4.0 * PERIOD_S
@@ -160,7 +160,7 @@ def test_legs_that_are_swapped_as_they_pass_are_swapped_back(tmp_path):
 
 @pytest.mark.parametrize("at_s", [0.3, 1.0, 1.8, 2.31])
 @pytest.mark.parametrize("fps", [60.0, 100.0, 240.0])
-def test_legs_that_are_swapped_near_each_other_are_swapped_back(at_s, fps, tmp_path):
+def test_legs_swapped_while_close_together_are_corrected(at_s, fps, tmp_path):
     """One of both exchanges may not be visible, because the legs pass each other."""
     time, angle = sampled(fps=fps, noise=3e-4)
     first = int(at_s * fps)
@@ -175,7 +175,7 @@ def test_legs_that_are_swapped_near_each_other_are_swapped_back(at_s, fps, tmp_p
 @pytest.mark.parametrize("fps", [50.0, 100.0, 240.0])
 @pytest.mark.parametrize("size", [-0.05, 0.05, 0.1])
 @pytest.mark.parametrize("at_s", [1.5, 4.0 * PERIOD_S])
-def test_a_sensor_that_slips_is_named_and_the_longest_part_is_kept(at_s, size, fps, tmp_path):
+def test_slipping_sensor_is_reported_and_the_longest_part_kept(at_s, size, fps, tmp_path):
     time, angle = sampled(fps=fps, noise=2e-4)
     time, angle = time[time > 0.1], angle[time > 0.1]
     first = int(np.searchsorted(time, at_s))
@@ -194,7 +194,7 @@ def test_a_sensor_that_slips_is_named_and_the_longest_part_is_kept(at_s, size, f
 @pytest.mark.parametrize("size", [0.005, 0.02, -0.05])
 @pytest.mark.parametrize("beside", [-3, -1, 0, 2])
 @pytest.mark.parametrize("leg", [0, 1])
-def test_a_glitch_at_a_heel_strike_is_named_and_left_out(leg, beside, size, tmp_path):
+def test_glitch_at_a_heel_strike_is_reported_and_omitted(leg, beside, size, tmp_path):
     time, angle = sampled(noise=2e-4)
     row = int(np.searchsorted(time, 3.0 * PERIOD_S)) + beside
     angle[row, leg] += size
@@ -205,7 +205,7 @@ def test_a_glitch_at_a_heel_strike_is_named_and_left_out(leg, beside, size, tmp_
 
 
 @pytest.mark.parametrize("rows", [[250], [120, 320], [300, 301, 302]])
-def test_large_outliers_are_named_and_left_out(rows, tmp_path):
+def test_large_outliers_are_reported_and_omitted(rows, tmp_path):
     time, angle = sampled(noise=5e-4)
     angle[rows, 1] += 0.4
     summary = read(tmp_path, time, angle)
@@ -214,7 +214,7 @@ def test_large_outliers_are_named_and_left_out(rows, tmp_path):
     assert all(f"{time[row]:.6g} " in doubt for row in (rows[0], rows[-1]))
 
 
-def test_angles_from_the_upward_vertical_are_unwrapped_and_named(tmp_path):
+def test_angles_from_the_upward_vertical_are_unwrapped_and_reported(tmp_path):
     time, angle = sampled()
     wrapped = np.degrees((angle + 2.0 * math.pi) % (2.0 * math.pi) - math.pi)
     summary = read(tmp_path, time, wrapped, "time (s),angle 1 (deg),angle 2 (deg)")
@@ -232,7 +232,7 @@ def test_angles_from_zero_to_a_full_turn_are_unwrapped(tmp_path):
     assert summary["doubts"] == []
 
 
-def test_a_leg_that_lies_level_is_refused(tmp_path):
+def test_horizontal_leg_is_rejected(tmp_path):
     time, angle = sampled()
     with pytest.raises(ConfigError, match=r"angle 2 lies around -9\d degrees from the vertical"):
         read(tmp_path, time, angle - [0.0, 0.5 * math.pi])
@@ -241,7 +241,7 @@ def test_a_leg_that_lies_level_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("signs", "words"), [([1, -1], "angle 2"), ([-1, 1], "angle 1"), ([-1, -1], "angle 1 and angle 2")]
 )
-def test_reversed_signs_are_named(signs, words, tmp_path):
+def test_reversed_signs_are_reported(signs, words, tmp_path):
     time, angle = sampled()
     summary = read(tmp_path, time, angle * signs)
     assert all_steps_are_right(summary)
@@ -249,7 +249,7 @@ def test_reversed_signs_are_named(signs, words, tmp_path):
     assert summary["doubts"] == [f"Heel strikes are found with the sign of {words} reversed."]
 
 
-def test_the_way_back_is_named_and_left_out(tmp_path):
+def test_return_walk_is_reported_and_omitted(tmp_path):
     both = np.concatenate((sampled(end=7.2 * PERIOD_S)[1], -sampled(end=5.0 * PERIOD_S)[1]))
     summary = read(tmp_path, np.arange(len(both)) / 100.0, both)
     assert summary["steps"] == 7
@@ -257,14 +257,14 @@ def test_the_way_back_is_named_and_left_out(tmp_path):
     assert any("The walk turns round at time" in doubt for doubt in summary["doubts"])
 
 
-def test_an_offset_of_one_sensor_is_named(tmp_path):
+def test_offset_of_one_sensor_is_reported(tmp_path):
     summary = read(tmp_path, *(sampled()[0], sampled()[1] + [0.02, 0.0]))
     offset = re.search(r"before the feet are level; angle 1 is (\S+) degrees too large", summary["doubts"][0])
     assert float(offset[1]) == pytest.approx(math.degrees(0.02), abs=0.1)
 
 
 @pytest.mark.parametrize("offset", [0.005, 0.02, -0.03])
-def test_opposite_offsets_are_named_where_lengths_alternate(offset, tmp_path):
+def test_opposite_offsets_are_reported_if_step_lengths_alternate(offset, tmp_path):
     time, angle = sampled(noise=2e-4)
     summary = read(tmp_path, time, angle + np.array([offset, -offset]))
     (doubt,) = summary["doubts"]
@@ -274,27 +274,27 @@ def test_opposite_offsets_are_named_where_lengths_alternate(offset, tmp_path):
 
 
 @pytest.mark.parametrize("distort", [lambda angle: angle * [0.95, 1.0], lambda angle: np.round(angle, 2)])
-def test_a_gain_and_coarse_digits_are_not_taken_for_a_tilt(distort, tmp_path):
+def test_gain_error_and_coarse_rounding_are_not_reported_as_tilt_alone(distort, tmp_path):
     time, angle = sampled(noise=2e-4, seed=2)
     (doubt,) = read(tmp_path, time, distort(angle))["doubts"]
     assert "a wrong gain, a tilt or coarse digits may be behind it" in doubt
 
 
 @pytest.mark.parametrize("noise", [0.1, 0.2, 0.3])
-def test_steps_found_in_noise_are_refused(noise, tmp_path):
+def test_steps_found_in_noise_are_rejected(noise, tmp_path):
     time, angle = sampled()
     noisy = angle + noise * np.random.default_rng(4).standard_normal(angle.shape)
     with pytest.raises(ConfigError, match="would be noise"):
         read(tmp_path, time, noisy)
 
 
-def test_steps_far_shorter_than_a_leg_swings_are_refused(tmp_path):
+def test_steps_far_shorter_than_a_leg_swing_are_rejected(tmp_path):
     time, angle = sampled()
     with pytest.raises(ConfigError, match=r"steps of 0\.1\d* s are not credible, because a leg of this walker swings"):
         read(tmp_path, 0.15 * time, angle)
 
 
-def test_angles_from_the_floor_are_named_as_a_tilt(tmp_path):
+def test_angles_measured_from_the_floor_are_reported_as_a_tilt(tmp_path):
     time, angle = sampled(fps=60.0, noise=2e-4)
     summary = read(tmp_path, time, angle + SLOPE)
     tilt = re.search(r"a tilt explains it, with both angles (\S+) degrees too large", summary["doubts"][0])
@@ -303,11 +303,11 @@ def test_angles_from_the_floor_are_named_as_a_tilt(tmp_path):
 
 @pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0])
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
-def test_angles_without_offset_raise_no_doubts(noise, fps, tmp_path):
+def test_angles_without_offset_raise_no_warnings(noise, fps, tmp_path):
     assert read(tmp_path, *sampled(begin=0.3, fps=fps, noise=noise))["doubts"] == []
 
 
-def test_legs_too_far_apart_are_refused_until_the_unit_is_stated(tmp_path):
+def test_implausibly_large_angles_are_rejected_until_a_unit_is_stated(tmp_path):
     time, angle = sampled()
     wide = 5.0 * (angle + SLOPE)
     rows = "\n".join(f"{t:.9f}\t{a:.12g}\t{b:.12g}" for t, (a, b) in zip(time, wide, strict=True))
@@ -318,7 +318,7 @@ def test_legs_too_far_apart_are_refused_until_the_unit_is_stated(tmp_path):
     assert walkerlab.read_walk(path, units={"angle": "rad"}, slope_deg=0.0).summary["steps"] == 7
 
 
-def test_angles_so_small_that_their_unit_may_be_wrong_raise_a_doubt(tmp_path):
+def test_implausibly_small_angles_raise_a_warning(tmp_path):
     """Radians that the header calls degrees, measured from the slope's normal."""
     time, angle = sampled()
     header = "time (s),angle 1 (deg),angle 2 (deg)"
@@ -366,7 +366,7 @@ def read_places(folder, places, fps=100.0, **options):
 
 
 @pytest.mark.parametrize("belt_m_s", [0.0, 0.5279, 0.53, 0.56])
-def test_markers_on_floor_and_treadmill_walk_where_the_feet_go(belt_m_s, tmp_path):
+def test_walking_direction_follows_the_feet_on_floor_and_treadmill(belt_m_s, tmp_path):
     """On a treadmill the hip drifts forwards, backwards or only sideways."""
     summary = read_places(tmp_path, places_of(sampled()[1], belt_m_s))
     assert summary["steps"] == 7
@@ -375,7 +375,7 @@ def test_markers_on_floor_and_treadmill_walk_where_the_feet_go(belt_m_s, tmp_pat
 
 
 @pytest.mark.parametrize("degrees", [30.0, 90.0, 200.0])
-def test_a_walk_may_cross_the_floor_in_any_direction(degrees, tmp_path):
+def test_walk_may_cross_the_floor_in_any_direction(degrees, tmp_path):
     turn = math.radians(degrees)
     around = np.array([[math.cos(turn), 0.0, math.sin(turn)], [0.0, 1.0, 0.0], [-math.sin(turn), 0.0, math.cos(turn)]])
     summary = read_places(tmp_path, places_of(sampled()[1], 0.53) @ around)
@@ -383,7 +383,7 @@ def test_a_walk_may_cross_the_floor_in_any_direction(degrees, tmp_path):
     assert all_steps_are_right(summary)
 
 
-def test_a_stated_direction_is_taken(tmp_path):
+def test_stated_walking_direction_is_used(tmp_path):
     places = places_of(sampled()[1], 0.53)
     assert all_steps_are_right(read_places(tmp_path, places, walks="right"))
     for direction in ("left", "away"):
@@ -392,7 +392,7 @@ def test_a_stated_direction_is_taken(tmp_path):
     assert all_steps_are_right(read_places(tmp_path, places[:, :, [2, 1, 0]] * [1.0, 1.0, -1.0], walks="away"))
 
 
-def test_a_walk_there_and_back_is_cut_where_the_hip_turns(tmp_path):
+def test_walk_there_and_back_is_cut_where_the_hip_turns(tmp_path):
     there = places_of(sampled(end=7.2 * PERIOD_S)[1])
     back = there * [-1.0, 1.0, 1.0] + (there[-1, 0] + there[0, 0]) * [1.0, 0.0, 0.0]
     summary = read_places(tmp_path, np.concatenate((there, back[:400])))
@@ -401,7 +401,7 @@ def test_a_walk_there_and_back_is_cut_where_the_hip_turns(tmp_path):
     assert "The walk turns round at time 5.06 s" in summary["doubts"][0]
 
 
-def test_a_marker_that_was_not_seen_is_a_gap_and_a_foot_at_the_origin_is_not(tmp_path):
+def test_missing_marker_is_a_gap_but_a_foot_at_the_origin_is_not(tmp_path):
     places = places_of(sampled()[1])
     places -= places[20, 2]
     assert np.abs(places[:70, 2]).max() < 1e-9
@@ -415,7 +415,7 @@ def test_a_marker_that_was_not_seen_is_a_gap_and_a_foot_at_the_origin_is_not(tmp
         read_places(tmp_path, places)
 
 
-def test_a_jump_of_a_legs_length_is_named(tmp_path):
+def test_jump_of_leg_length_is_reported(tmp_path):
     places = places_of(sampled()[1])
     places[250, 1, 1] += 0.1
     summary = read_places(tmp_path, places)
@@ -429,7 +429,7 @@ def test_a_jump_of_a_legs_length_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("first", [30, 100, 180, 250])
-def test_feet_that_are_swapped_apart_sideways_are_swapped_back(first, tmp_path):
+def test_swapped_feet_with_sideways_distance_are_corrected(first, tmp_path):
     places = places_of(sampled()[1])
     places[first : first + 10, [1, 2]] = places[first : first + 10, [2, 1]]
     summary = read_places(tmp_path, places)
@@ -437,7 +437,7 @@ def test_feet_that_are_swapped_apart_sideways_are_swapped_back(first, tmp_path):
     assert f"The legs are swapped at samples {first + 1} to {first + 10}" in summary["doubts"][0]
 
 
-def test_running_is_named(tmp_path):
+def test_running_is_reported(tmp_path):
     """A runner's hip is lowest as the legs pass each other."""
     places = places_of(sampled()[1])
     spread = np.abs(places[:, 1, 0] - places[:, 2, 0])
@@ -454,7 +454,7 @@ def kneed_walk():
 
 
 @pytest.mark.parametrize(("name", "count"), [("angle", 0), ("shank_angle", 2)])
-def test_shank_angles_of_a_kneed_walker_are_named(name, count):
+def test_shank_angles_of_a_kneed_walker_are_reported(name, count):
     trajectory, config = kneed_walk()
     rising = np.append(True, np.diff(trajectory["time"]) > 1e-9)
     angle = {f"angle {leg}": trajectory[name][rising, leg - 1] for leg in (1, 2)}

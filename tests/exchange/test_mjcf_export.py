@@ -105,25 +105,25 @@ def normal_force(model, foot, depth, weight):
 
 
 @pytest.mark.parametrize("foot", [1, 2])
-def test_each_foot_carries_the_walker_at_the_depth_of_our_law(weighed, foot):
+def test_static_penetration_of_a_foot_equals_that_of_the_contact_law(weighed, foot):
     scene = export_of(*weighed).scene
     weight = scene.ours.mass * scene.ours.gravity_down
     depth = contact_target(scene).penetration
     assert normal_force(model_of(*weighed), foot, depth, weight) == pytest.approx(weight, rel=1e-6)
 
 
-def test_inverse_weights_are_those_that_mujoco_computes(weighed):
+def test_inverse_weights_equal_those_computed_by_mujoco(weighed):
     compiled, weights = model_of(*weighed), inverse_weights(export_of(*weighed).model)
     assert weights.bodies == pytest.approx(compiled.body_invweight0[1:, 0], rel=1e-9)
     assert weights.joints == pytest.approx(compiled.dof_invweight0[2:], rel=1e-9)
 
 
-def test_inverse_weights_of_the_papers_legs_follow_from_their_masses():
+def test_inverse_weights_of_the_paper_legs_follow_from_their_masses():
     assert inverse_weights(export_of("paper").model).bodies == pytest.approx([7.0 / 180.0, 1.0 / 12.0], rel=1e-12)
 
 
 @pytest.mark.parametrize("walker", [*WALKERS, ("level",)], ids=lambda walker: walker[0])
-def test_a_model_compiles_without_a_word_and_is_the_same_when_saved(walker, tmp_path, capfd):
+def test_model_compiles_without_warnings_and_survives_saving(walker, tmp_path, capfd):
     model = model_of(*walker)
     first, second = tmp_path / "first.xml", tmp_path / "second.xml"
     mujoco.mj_saveLastXML(str(first), model)
@@ -137,7 +137,7 @@ def test_a_model_compiles_without_a_word_and_is_the_same_when_saved(walker, tmp_
 
 
 @pytest.mark.parametrize("walker", WALKERS, ids=lambda walker: walker[0])
-def test_plain_steps_walk_ten_steps_on_the_pads(walker):
+def test_plain_simulation_takes_ten_steps_on_the_pads(walker):
     export = export_of(*walker)
     assert export.walk.steps == STEPS
     touches = walked(model_of(*walker), STEPS)
@@ -148,13 +148,13 @@ def test_plain_steps_walk_ten_steps_on_the_pads(walker):
     assert lengths == pytest.approx(export.walk.lengths_m[-4:], rel=0.005)
 
 
-def test_the_papers_walker_takes_our_steps():
+def test_paper_walker_takes_the_same_steps_in_mujoco():
     """The last step of our contact model takes .7110 s and .3608 m."""
     touches = walked(model_of("paper"), STEPS)
     assert np.diff(touches, axis=0)[-1] == pytest.approx([0.7111, 0.3604], abs=1e-4)
 
 
-def test_the_start_is_that_of_our_walk():
+def test_mujoco_walk_starts_from_the_same_state():
     export, model = export_of(*TORSO), model_of(*TORSO)
     data = at_start(model)
     angles = np.array(export.scene.start[2:5]) + export.scene.ours.slope
@@ -169,7 +169,7 @@ def test_the_start_is_that_of_our_walk():
     assert (velocity @ data.qvel)[[0, 2]] == pytest.approx(export.scene.start[5:7], abs=1e-12)
 
 
-def test_the_torso_stays_on_the_bisector():
+def test_torso_stays_on_the_bisector():
     model = model_of(*TORSO)
     data = at_start(model)
     for _ in range(5000):
@@ -177,7 +177,7 @@ def test_the_torso_stays_on_the_bisector():
     assert data.joint("hinge of torso").qpos[0] == pytest.approx(0.5 * data.joint("hip").qpos[0], abs=2e-4)
 
 
-def test_a_hip_spring_and_damper_are_joint_properties():
+def test_hip_spring_and_damper_are_joint_properties():
     model = model_of("paper", "walker.hip.spring_N_m_per_rad=1", "walker.hip.damping_N_m_s_per_rad=0.02")
     hip = model.joint("hip")
     assert (float(hip.stiffness[0]), float(model.dof_damping[hip.dofadr[0]])) == (1.0, 0.02)
@@ -207,7 +207,7 @@ def walk_of(folder, *walker, slope="gravity"):
     return script.Walk(mujoco.MjModel.from_xml_string(text))
 
 
-def test_a_driven_walker_walks_with_the_script_beside_it(tmp_path, capsys):
+def test_driven_walker_walks_with_the_exported_script(tmp_path, capsys):
     files = files_of("mjcf", "contact", "level").files
     assert list(files) == ["level.xml", "level.py"]
     steps = 5
@@ -223,7 +223,7 @@ def test_a_driven_walker_walks_with_the_script_beside_it(tmp_path, capsys):
     assert "mujoco" in sys.modules
 
 
-def test_a_walker_that_falls_has_fewer_steps_than_it_was_asked_for(tmp_path, capsys):
+def test_walker_that_falls_takes_fewer_steps_than_requested(tmp_path, capsys):
     files = files_of("mjcf", "contact", "level").files
     script = script_in(tmp_path, "level", files)
     script.Walk.drive = lambda walk, swing: None
@@ -235,14 +235,14 @@ def test_a_walker_that_falls_has_fewer_steps_than_it_was_asked_for(tmp_path, cap
 @pytest.mark.parametrize(
     ("walker", "steps"), [(KNEED, 2), (ROUND_KNEED, 2), (LEVEL_KNEED, 3), (STOPPED, 2), (AT_TOUCH, 2)]
 )
-def test_a_kneed_walker_takes_our_steps_with_its_script(walker, steps, tmp_path):
+def test_kneed_walker_takes_the_same_steps_with_the_exported_script(walker, steps, tmp_path):
     walk = export_of(*walker).walk
     periods, lengths = steps_of(walk_of(tmp_path, *walker), steps)
     assert periods == pytest.approx(walk.periods_s[:steps], rel=0.01)
     assert lengths == pytest.approx(walk.lengths_m[:steps], rel=0.01)
 
 
-def test_the_script_decides_by_the_state(tmp_path):
+def test_exported_script_reacts_to_the_state_and_not_to_time(tmp_path):
     """Started with rates 1.02 times the gait's, knees lock and touches come at other times than ours."""
     walk = walk_of(tmp_path, *KNEED)
     walk.data.qvel *= 1.02
@@ -251,7 +251,7 @@ def test_the_script_decides_by_the_state(tmp_path):
     assert abs(periods[0] - export_of(*KNEED).walk.periods_s[0]) > 0.001
 
 
-def test_a_locked_knee_stays_straight_under_load(tmp_path):
+def test_locked_knee_stays_straight_under_load(tmp_path):
     walk, bends = walk_of(tmp_path, *KNEED), []
     while walk.data.time < 0.3:
         mujoco.mj_step(walk.model, walk.data)
@@ -260,7 +260,7 @@ def test_a_locked_knee_stays_straight_under_load(tmp_path):
 
 
 @pytest.mark.parametrize("walker", [KNEED, KNEED_TORSO], ids=["kneed", "torso"])
-def test_a_lock_is_our_plastic_impact(walker, tmp_path):
+def test_knee_lock_is_the_same_plastic_impact(walker, tmp_path):
     """Velocities after the lock are those of `lock_knee`, to the time step in which the knee became straight."""
     export, walk = export_of(*walker), walk_of(tmp_path, *walker)
     data, lock = walk.data, walk.lock
@@ -282,7 +282,7 @@ def test_a_lock_is_our_plastic_impact(walker, tmp_path):
     assert np.abs(after - before).max() > 1.0
 
 
-def test_a_stop_pushes_a_knee_back_with_our_law():
+def test_knee_stop_has_the_same_force_law():
     """MuJoCo scales a limit by `dof_invweight0`; the torque at a given extension and rate is that of our stop."""
     export, model = export_of(*STOPPED), model_of(*STOPPED)
     data = mujoco.MjData(model)
@@ -298,7 +298,7 @@ def test_a_stop_pushes_a_knee_back_with_our_law():
     assert data.qfrc_constraint[knee.dofadr] == pytest.approx(expected, rel=0.01)
 
 
-def test_a_reset_to_the_keyframe_begins_the_same_walk_again(tmp_path):
+def test_reset_to_the_keyframe_restarts_the_same_walk(tmp_path):
     walk = walk_of(tmp_path, *KNEED)
     first = np.array(steps_of(walk, 1))
     mujoco.mj_resetDataKeyframe(walk.model, walk.data, 0)
@@ -309,7 +309,7 @@ def test_a_reset_to_the_keyframe_begins_the_same_walk_again(tmp_path):
 
 
 @pytest.mark.parametrize(("walker", "steps"), [(("paper",), 2), (("level",), 2), (KNEED, 1)])
-def test_a_tilted_ground_is_the_same_walk_as_tilted_gravity(walker, steps, tmp_path):
+def test_tilted_ground_and_tilted_gravity_give_the_same_walk(walker, steps, tmp_path):
     walks = [walk_of(tmp_path, *walker, slope=slope) for slope in ("gravity", "geometry")]
     gravity, ground = (walk.model.opt.gravity for walk in walks)
     assert ground == pytest.approx([0.0, 0.0, -np.linalg.norm(gravity)], abs=1e-15)
@@ -331,7 +331,7 @@ RADII = (0.0, 0.001, 0.02, 0.1, 0.3)
 
 @pytest.mark.parametrize("radius", RADII)
 @pytest.mark.parametrize("walker", [("round-feet", PADS), KNEED], ids=["compass", "kneed"])
-def test_no_foot_or_leg_can_touch_what_is_not_its_own_ground(walker, radius):
+def test_legs_touch_only_the_ground_of_their_lane(walker, radius):
     """Programs that ignore collision bits and pairs let every shape collide with every other."""
     name, *sets = walker
     config = load(Path(name), (*sets, f"walker.foot_radius_m={radius}")).config
@@ -365,7 +365,7 @@ def test_no_foot_or_leg_can_touch_what_is_not_its_own_ground(walker, radius):
 
 
 @pytest.mark.parametrize("arguments", [["2"], ["level.xml", "2"]])
-def test_the_script_of_a_driven_walker_finds_the_model_next_to_it(tmp_path, arguments):
+def test_script_of_a_driven_walker_finds_the_model_in_its_folder(tmp_path, arguments):
     for name, text in files_of("mjcf", "contact", "level").files.items():
         (tmp_path / name).write_text(text)
     done = subprocess.run([sys.executable, "level.py", *arguments], cwd=tmp_path, capture_output=True, text=True)
@@ -382,7 +382,7 @@ def test_the_script_of_a_driven_walker_finds_the_model_next_to_it(tmp_path, argu
         (("round-feet",), "only after mid-swing", "checkerboard"),
     ],
 )
-def test_what_would_change_the_walk_is_refused(walker, why, instead):
+def test_unsupported_features_are_rejected(walker, why, instead):
     with pytest.raises(ConfigError) as caught:
         export_model(*with_gait(*walker), "mjcf")
     assert why in caught.value.message

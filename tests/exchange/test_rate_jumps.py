@@ -58,7 +58,7 @@ def test_smooth_angles_have_few_jumps():
     assert len(sums) <= MOST_FOUND
 
 
-def test_heel_strikes_are_found_at_another_sum_of_the_angles():
+def test_heel_strikes_are_found_with_offset_angles():
     walker, time, angle = recorded("paper")
     columns = {TIME: time, "angle 1": angle[:, 0] + 0.05, "angle 2": angle[:, 1] + 0.05}
     units = {TIME: "s", "angle 1": "rad", "angle 2": "rad"}

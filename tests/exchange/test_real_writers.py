@@ -40,7 +40,7 @@ def write_with_ezc3d(path, markers, units=("mm",), residuals=None):
 
 
 @pytest.mark.parametrize("units", [("mm",), ()])
-def test_blank_and_repeated_labels_of_a_c3d_file_do_not_matter(units, tmp_path):
+def test_blank_and_repeated_c3d_labels_do_not_matter(units, tmp_path):
     path = tmp_path / "walk.c3d"
     spare = [("", 0.0 * HIP), ("*1", HIP), ("", HIP)]
     write_with_ezc3d(path, [*spare, *MARKERS.items(), ("*1", 2.0 * HIP)], units)
@@ -50,7 +50,7 @@ def test_blank_and_repeated_labels_of_a_c3d_file_do_not_matter(units, tmp_path):
 
 
 @pytest.mark.parametrize("count", [254, 256, 600])
-def test_more_labels_than_a_parameter_holds_go_on_in_the_next(count, tmp_path):
+def test_c3d_labels_continue_in_the_next_parameter(count, tmp_path):
     path = tmp_path / "walk.c3d"
     write_with_ezc3d(path, [*((f"M{n}", 0.0 * HIP) for n in range(count)), *MARKERS.items()])
     recording = read_recording(path)
@@ -63,7 +63,7 @@ def gaps_of(path):
     return np.flatnonzero(np.isnan(read_recording(path).columns["F2.x"])).tolist()
 
 
-def test_a_negative_residual_of_ezc3d_is_a_gap(tmp_path):
+def test_negative_residual_written_by_ezc3d_is_a_gap(tmp_path):
     """Also where a position stands in the gap."""
     path = tmp_path / "walk.c3d"
     residuals = np.zeros((1, 3, TIMES.size))
@@ -75,7 +75,7 @@ def test_a_negative_residual_of_ezc3d_is_a_gap(tmp_path):
 
 
 @pytest.mark.parametrize("scale", [-1.0, 0.1])
-def test_a_negative_residual_of_the_package_c3d_is_a_gap(scale, tmp_path):
+def test_negative_residual_written_by_c3d_is_a_gap(scale, tmp_path):
     """Stored as floating-point numbers or, with a positive scale, as integers."""
     pytest.importorskip("ezc3d", reason="ezc3d, which reads C3D, is not installed")
     c3d = pytest.importorskip("c3d", reason="c3d is not installed")
@@ -106,7 +106,7 @@ def frame(index=None):
 
 
 @pytest.mark.parametrize("style", [{}, {"sep": ";", "decimal": ","}, {"sep": "\t", "decimal": ","}, {"decimal": ","}])
-def test_a_data_frame_is_read_with_its_counting_index(style, tmp_path):
+def test_data_frame_with_a_default_index_is_read(style, tmp_path):
     path = tmp_path / "walk.csv"
     table = frame()
     table.insert(0, "time (s)", TIMES)
@@ -114,7 +114,7 @@ def test_a_data_frame_is_read_with_its_counting_index(style, tmp_path):
     assert walk_of(path).both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
 
 
-def test_a_data_frame_with_the_time_as_index_is_read(tmp_path):
+def test_data_frame_with_the_time_as_index_is_read(tmp_path):
     """As kineticstoolkit's to_dataframe() makes it; its header begins with an empty cell."""
     path = tmp_path / "walk.csv"
     frame(TIMES).to_csv(path)
@@ -134,7 +134,7 @@ def opensim():
     return module
 
 
-def test_a_table_of_opensim_is_read_with_blanks_in_its_labels(tmp_path):
+def test_opensim_table_with_spaces_in_its_labels_is_read(tmp_path):
     osim = opensim()
     table = osim.TimeSeriesTable()
     table.setColumnLabels(["right leg", "left leg"])
@@ -149,7 +149,7 @@ def test_a_table_of_opensim_is_read_with_blanks_in_its_labels(tmp_path):
         table.removeTableMetaDataKey("inDegrees")
 
 
-def test_markers_of_opensim_are_read_and_missing_ones_are_gaps(tmp_path):
+def test_missing_opensim_markers_are_gaps(tmp_path):
     osim = opensim()
     table = osim.TimeSeriesTableVec3()
     table.setColumnLabels(list(MARKERS))
@@ -175,7 +175,7 @@ HEADERS = ["datacolumns 3\ndatarows 2\n", "nRows=2\nnColumns=3\n", *(
 
 @pytest.mark.parametrize("name", ["walk.mot", "walk.sto"])
 @pytest.mark.parametrize("header", HEADERS)
-def test_angles_are_in_degrees_where_opensim_says_so(name, header, tmp_path):
+def test_opensim_angles_in_degrees_are_converted(name, header, tmp_path):
     osim = opensim()
     path = tmp_path / name
     path.write_text(f"name walk\n{header}endheader\ntime\ta\tb\n0\t1\t2\n1\t3\t4\n", encoding="utf-8")

@@ -81,7 +81,7 @@ def read(path, columns=(), units=()):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_the_same_walk_is_read_from_every_format(name, tmp_path):
+def test_same_walk_is_read_from_every_format(name, tmp_path):
     units = {} if name == "own.csv" else {"angle": "rad", "time": "s"} if name == "table.txt" else {"time": "s"}
     walk = as_walk(read_recording(written(tmp_path, name, FILES[name])), {}, units)
     assert walk.time_s == pytest.approx(TIMES, abs=1e-12)
@@ -89,13 +89,13 @@ def test_the_same_walk_is_read_from_every_format(name, tmp_path):
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-def test_a_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
+def test_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
     rows = "".join(f"{line.replace(',', delimiter)}{delimiter}\n" for line in OWN.splitlines())
     walk = as_walk(read_recording(written(tmp_path, "own.csv", f"Walk of today\n{rows}\n")), {}, {})
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
 
-def test_the_unit_of_one_component_of_results_holds_for_it_alone(tmp_path):
+def test_unit_of_one_component_applies_to_it_alone(tmp_path):
     """Also where that component is the time."""
     text = RES.replace('"TIME" unitsValue="sec"', '"TIME" unitsValue="millisecond"')
     walk = as_walk(read_recording(written(tmp_path, "walk.res", text)), {}, {})
@@ -103,7 +103,7 @@ def test_the_unit_of_one_component_of_results_holds_for_it_alone(tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
 
-def test_results_begin_with_the_initial_conditions_of_the_simulation(tmp_path):
+def test_adams_results_begin_with_the_initial_conditions(tmp_path):
     """ADAMS writes the state at time 0 into a block of its own; a static solution at the same time replaces it."""
     initial = '<Data name="initialConditions_001" id="9"><Step type="initialConditions">-0.1\n0.5 0.6</Step></Data>'
     path = written(tmp_path, "walk.res", RES.replace('<Data name="dynamic_001"', f'{initial}<Data name="dynamic_001"'))
@@ -115,19 +115,19 @@ def test_results_begin_with_the_initial_conditions_of_the_simulation(tmp_path):
 
 
 @pytest.mark.parametrize("names", ["T,time", "T,t", "T,sensor.time", "time,t", "t,sensor.time"])
-def test_a_column_whose_name_may_be_a_temperature_is_the_time_only_if_no_other_can_be(names, tmp_path):
+def test_column_t_is_time_only_if_no_other_column_fits(names, tmp_path):
     first, second = ([20.0, 20.0], [0.0, 1.0]) if names.startswith("T,") else ([0.0, 1.0], [20.0, 20.0])
     rows = "\n".join(f"{x},{y}" for x, y in zip(first, second, strict=True))
     recording = read_recording(written(tmp_path, "walk.csv", f"{names}\n{rows}\n"))
     assert recording.columns[recording.time_name].tolist() == [0.0, 1.0]
 
 
-def test_a_table_in_degrees_says_so_in_its_header(tmp_path):
+def test_header_can_state_degrees(tmp_path):
     walk = as_walk(read_recording(written(tmp_path, "walk.mot", MOT)), {}, {})
     assert walk.both_legs("angle") == pytest.approx(np.radians(ANGLES), abs=1e-12)
 
 
-def test_markers_give_the_angles_of_lines_between_them(tmp_path):
+def test_angles_are_computed_from_pairs_of_markers(tmp_path):
     path = written(tmp_path, "walk.trc", marker_file(TIMES, markers()))
     walk = as_walk(read_recording(path), {"angle 1": "HIP>FOOT1", "angle 2": "HIP > FOOT2", "hip_along_m": "HIP.x"}, {})
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
@@ -141,7 +141,7 @@ def test_markers_may_be_recorded_with_z_upwards_and_walking_backwards(tmp_path):
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
 
 
-def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_path):
+def test_gap_is_an_error_only_in_a_used_column(tmp_path):
     places = markers()
     text = marker_file(TIMES, places).replace(repr(float(places[2, 2, 0])), "")
     recording = read_recording(written(tmp_path, "walk.trc", text))
@@ -183,18 +183,18 @@ def test_a_gap_in_a_column_that_is_used_is_an_error_and_elsewhere_is_not(tmp_pat
         ("walk.trc", "\n".join(marker_file(TIMES, markers()).splitlines()[:5]), "no markers"),
     ],
 )
-def test_a_damaged_file_says_what_is_wrong(name, text, message, tmp_path):
+def test_damaged_file_is_rejected_with_the_reason(name, text, message, tmp_path):
     with pytest.raises(ConfigError, match=message) as caught:
         read(written(tmp_path, name, text), MARKERS if name.endswith(".trc") else {}, {"time": "s"})
     assert caught.value.advice
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_missing_file_is_named(tmp_path):
     with pytest.raises(ConfigError, match=r"walk\.csv cannot be read"):
         read_recording(tmp_path / "walk.csv")
 
 
-def test_bytes_that_are_no_text_are_refused(tmp_path):
+def test_binary_file_is_rejected(tmp_path):
     path = tmp_path / "walk.csv"
     path.write_bytes(b"PK\3\4\0\0" * 30)
     with pytest.raises(ConfigError, match="not a text"):
@@ -210,7 +210,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path):
         ({"hip_along_m": "angle 1"}, {}, "stated for 'hip_along_m', is not a known unit", "length"),
     ],
 )
-def test_a_column_or_unit_that_is_not_known_is_named(columns, units, message, advice, tmp_path):
+def test_unknown_column_or_unit_is_named(columns, units, message, advice, tmp_path):
     recording = read_recording(
         written(tmp_path, "walk.csv", OWN.replace(",angle 2 (rad)", ",angle 2 (gon)") if "angle" in units else OWN)
     )
@@ -219,7 +219,7 @@ def test_a_column_or_unit_that_is_not_known_is_named(columns, units, message, ad
     assert advice in caught.value.advice
 
 
-def test_a_missing_unit_is_asked_for(tmp_path):
+def test_missing_unit_is_requested(tmp_path):
     recording = read_recording(written(tmp_path, "walk.csv", OWN.replace("angle 2 (rad)", "angle 2")))
     with pytest.raises(ConfigError, match="states no unit for 'angle 2'") as caught:
         as_walk(recording, {}, {})
@@ -227,7 +227,7 @@ def test_a_missing_unit_is_asked_for(tmp_path):
     assert as_walk(recording, {}, parse_units(["rad"])).both_legs("angle") == pytest.approx(ANGLES)
 
 
-def test_two_columns_of_one_name_are_asked_about(tmp_path):
+def test_ambiguous_column_is_rejected_with_the_candidates(tmp_path):
     text = ADAMS_TABLE.replace("leg_2.angle", "leg_2.angle\t.walker.Second.leg_2.angle").replace("\n", "\t0\n")
     recording = read_recording(
         written(
@@ -241,7 +241,7 @@ def test_two_columns_of_one_name_are_asked_about(tmp_path):
         as_walk(recording, {}, {"angle": "rad", "time": "s"})
 
 
-def test_options_are_pairs():
+def test_column_and_unit_options_are_parsed_as_pairs():
     assert parse_pairs("--columns", ["a=b,c = d", "e=f"]) == {"a": "b", "c": "d", "e": "f"}
     assert parse_units(["deg,mm", "time=ms"]) == {"angle": "deg", "length": "mm", "time": "ms"}
     for wrong in ("a", "=b", "a="):
@@ -251,7 +251,7 @@ def test_options_are_pairs():
         parse_units(["furlong"])
 
 
-def test_a_recording_keeps_columns_that_no_walker_has(tmp_path):
+def test_recording_keeps_unknown_columns(tmp_path):
     recording = read_recording(written(tmp_path, "degrees.csv", DEGREES))
     assert set(recording.columns) == {"t", "Angle 1", "angle_2", "note"}
     assert np.isnan(recording.columns["note"]).all()

@@ -24,7 +24,7 @@ def cut_off(toy, monkeypatch, after, **options):
     monkeypatch.delenv("TOY_STONES")
 
 
-def test_only_full_runs_it(toy):
+def test_campaign_runs_only_with_full(toy):
     assert actions(toy.execute("survey")) == {"survey": "run"}
     report = toy.execute("survey", full=True)
     assert actions(report) == {"survey": "reuse", "census": "run"}
@@ -32,7 +32,7 @@ def test_only_full_runs_it(toy):
     assert report.summary["census"]["stones"] == [0.1 * number for number in range(4)]
 
 
-def test_what_is_there_is_neither_lost_nor_made_anew(toy):
+def test_existing_campaign_is_kept(toy):
     toy.execute("survey", full=True)
     before = (toy.runs / "paper" / "census.h5").stat().st_mtime_ns
     assert actions(toy.execute("survey", full=True)) == {"survey": "reuse", "census": "reuse"}
@@ -42,7 +42,7 @@ def test_what_is_there_is_neither_lost_nor_made_anew(toy):
     assert "census" in (toy.runs / "paper" / "report.html").read_text().partition("]")[0]
 
 
-def test_a_page_without_it_says_how_to_make_it_and_is_made_anew_once_it_is_there(toy):
+def test_page_without_the_campaign_says_how_to_run_it(toy):
     toy.execute("page")
     assert (
         "<p>census: it was not requested; `walkerlab survey --full` computes it</p>"
@@ -52,7 +52,7 @@ def test_a_page_without_it_says_how_to_make_it_and_is_made_anew_once_it_is_there
     assert actions(toy.execute("page"))["page"] == "run"
 
 
-def test_nothing_is_stale_without_it(toy):
+def test_other_results_are_current_without_it(toy):
     toy.execute("page")
     assert states(toy)["census"] == "not run"
     toy.execute("survey", full=True)
@@ -61,7 +61,7 @@ def test_nothing_is_stale_without_it(toy):
     assert states(toy)["census"] == "outdated"
 
 
-def test_it_goes_on_where_it_was_cut_off_and_comes_to_the_same(toy, monkeypatch):
+def test_interrupted_campaign_resumes_with_the_same_result(toy, monkeypatch):
     cut_off(toy, monkeypatch, after=3)
     journal = toy.runs / "paper" / "census.parts"
     assert journal.read_bytes().count(b"\n") == 1 + 3
@@ -74,7 +74,7 @@ def test_it_goes_on_where_it_was_cut_off_and_comes_to_the_same(toy, monkeypatch)
     assert read(toy.runs / "paper" / "census.h5").digest() == undisturbed.digest()
 
 
-def test_parts_of_another_key_are_of_no_use(toy, monkeypatch):
+def test_campaign_parts_of_another_key_are_ignored(toy, monkeypatch):
     cut_off(toy, monkeypatch, after=3)
     toy.edit("census", "0.1 * number", "0.2 * number")
     monkeypatch.setenv("TOY_STONES", "3")
@@ -82,11 +82,11 @@ def test_parts_of_another_key_are_of_no_use(toy, monkeypatch):
         toy.execute("census")
 
 
-def test_force_begins_anew(toy, monkeypatch):
+def test_force_restarts_the_campaign(toy, monkeypatch):
     cut_off(toy, monkeypatch, after=3)
     cut_off(toy, monkeypatch, after=2, force=True)
     assert (toy.runs / "paper" / "census.parts").read_bytes().count(b"\n") == 1 + 2
 
 
-def test_a_preview_tells_of_it(toy):
+def test_preview_lists_the_campaign(toy):
     assert actions(toy.preview("survey", full=True)) == {"survey": "run", "census": "run"}

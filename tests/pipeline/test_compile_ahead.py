@@ -39,7 +39,7 @@ assert sorted(files_in_use) == ahead, files_in_use.difference(ahead)
     [["paper"], ["paper", "contact.stance=pinned"], ["kneed"], ["torso"], ["simplest"], ["kuo", "outputs=[]"]],
     ids=" ".join,
 )
-def test_what_is_compiled_ahead_is_all_that_the_walks_call(arguments):
+def test_precompilation_covers_every_kernel_of_the_walks(arguments):
     process = subprocess.run([sys.executable, "-c", AHEAD_THEN_RUN, *arguments], capture_output=True, text=True)
     assert process.returncode == 0, process.stderr
 
@@ -56,7 +56,7 @@ print(len(gaits), *(f"{gait.period:.10f}" for gait in gaits))
 """
 
 
-def test_without_a_compiler_the_same_gaits_are_found():
+def test_same_gaits_are_found_without_a_compiler():
     def gaits(**changes):
         command = [sys.executable, "-c", INTERPRETED]
         return subprocess.check_output(command, env={**os.environ, **changes}, text=True)
@@ -64,7 +64,7 @@ def test_without_a_compiler_the_same_gaits_are_found():
     assert gaits(NUMBA_DISABLE_JIT="1") == gaits()
 
 
-def test_wheels_are_tagged_for_systems_that_indexes_accept():
+def test_wheels_have_platform_tags_that_indexes_accept():
     pytest.importorskip("hatchling")
     tags = pytest.importorskip("packaging.tags")
     spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "scripts" / "hatch_build.py")

@@ -10,7 +10,7 @@ DESIGN = {
 }  # fmt: skip
 
 
-def test_a_design_from_python_writes_its_config_once(tmp_path):
+def test_design_from_python_writes_its_config_once(tmp_path):
     first, again = (walkerlab.run("design", config="slope-3deg", set=DESIGN, runs=tmp_path).summary for _ in range(2))
     path = Path(first["config"])
     assert path.parent == Path(first["run_dir"])

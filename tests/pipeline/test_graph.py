@@ -32,14 +32,14 @@ def needed(target, *sets, config=None):
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_inputs_stand_earlier_in_the_table(name):
+def test_inputs_come_earlier_in_the_table(name):
     config = load(Path(name)).config
     inputs = {stage.name: {*stage.inputs(config), *stage.if_current} for stage in PIPELINE.stages}
     assert {stage: later for stage in NAMES if (later := inputs[stage] - set(NAMES[: NAMES.index(stage)]))} == {}
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_what_a_stage_reads_is_in_the_config(name):
+def test_keys_that_a_stage_reads_exist_in_the_config(name):
     config = load(Path(name)).config
     for stage in PIPELINE.stages:
         slice_of(config, stage.takes)
@@ -47,7 +47,7 @@ def test_what_a_stage_reads_is_in_the_config(name):
 
 
 @pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
-def test_the_table_names_what_the_stage_itself_says_that_it_takes(stage):
+def test_table_names_the_config_type_in_the_signature_of_the_stage(stage):
     module = importlib.import_module(stage.module)
     named = {Config if takes is None else takes for takes in (stage.takes, stage.takes_of_scene or stage.takes)}
     first = next(iter(inspect.signature(module.run, eval_str=True).parameters.values())).annotation
@@ -56,7 +56,7 @@ def test_the_table_names_what_the_stage_itself_says_that_it_takes(stage):
 
 @pytest.mark.parametrize("config", ["paper", "kneed"])
 @pytest.mark.parametrize("stage", PIPELINE.stages, ids=NAMES)
-def test_a_stage_is_given_what_its_key_is_made_of_and_nothing_else(stage, config):
+def test_stage_receives_exactly_the_config_values_of_its_key(stage, config):
     loaded = load(Path(config)).config
     takes = stage.takes_under(loaded)
     assert shown(only(loaded, takes)) == (set(Config.model_fields) if takes is None else set(dotted_keys(takes)))
@@ -69,7 +69,7 @@ def shown(given):
 
 
 @pytest.mark.parametrize("stage", ["stability", "stability-maps"])
-def test_a_change_of_the_paper_config_changes_the_keys_of_the_cases_that_stand_on_it(tmp_path, monkeypatch, stage):
+def test_changing_the_paper_config_changes_the_keys_of_its_cases(tmp_path, monkeypatch, stage):
     config = load(Path("rigid-only")).config
     before = Keys().identity(PIPELINE[stage], config, {}).config_slice
     text = (BUILTIN_FOLDER / "paper.yaml").read_text()
@@ -79,7 +79,7 @@ def test_a_change_of_the_paper_config_changes_the_keys_of_the_cases_that_stand_o
     assert list(differences("", before, after)) == ["paper.walker.hip_mass_kg 10.0 -> 11.0"]
 
 
-def test_the_papers_cases_are_judged_for_the_papers_own_walker_alone():
+def test_cases_of_the_paper_apply_only_to_its_walker():
     stability = PIPELINE["stability"]
     takes = {name: stability.takes_under(load(Path(name)).config) for name in ("paper", "simplest", "torso", "kneed")}
     assert takes.pop("paper") is CompassCasesConfig
@@ -88,7 +88,7 @@ def test_the_papers_cases_are_judged_for_the_papers_own_walker_alone():
     assert stability.takes_under(load(sets=["walker.hip_mass_kg=9"]).config) is SceneCasesConfig
 
 
-def test_a_walk_that_was_not_taken_again_is_not_taken_for_one_with_a_numerical_error():
+def test_walk_without_error_estimate_has_another_key():
     config, keys = load().config, Keys()
     once, twice = (keys.identity(PIPELINE["simulate"], config, {}, again).key for again in (False, True))
     assert once != twice
@@ -96,56 +96,56 @@ def test_a_walk_that_was_not_taken_again_is_not_taken_for_one_with_a_numerical_e
     assert len(gaits) == 1  # a stage without walks says the same either way
 
 
-def test_the_fixed_stages_are_there_in_order():
+def test_documented_stages_exist_in_order():
     fixed = ["fixedpoint", "simulate", "contact-sim", "compare", "plot", "report"]
     assert [name for name in NAMES if name in fixed] == fixed
 
 
-def test_the_report_is_the_last_stage_which_the_command_line_opens_and_checks():
+def test_report_is_the_last_stage():
     assert PIPELINE.stages[-1].name == "report"
 
 
-def test_every_block_that_no_model_reads_is_a_question():
+def test_every_block_that_no_model_reads_belongs_to_a_stage():
     blocks = {name for name, field in Config.model_fields.items() if block_of(field) is not None}
     assert blocks - set(keys_of(ContactConfig)) - {"ground", "solver", "source"} == set(QUESTIONS)
 
 
-def test_a_stage_needs_its_inputs_and_theirs():
+def test_stage_needs_direct_and_indirect_inputs():
     assert needed("fixedpoint") == ["fixedpoint"]
     assert needed("simulate") == ["fixedpoint", "simulate"]
     assert needed("compare") == ["fixedpoint", "simulate", "contact-sim", "compare"]
     assert needed("report")[-1] == "report"
 
 
-def test_a_given_start_needs_no_gait():
+def test_given_start_needs_no_gait():
     assert needed("simulate", EXPLICIT) == ["simulate"]
     assert needed("contact-sim", EXPLICIT, "contact.pad_pitch=0.37") == ["contact-sim"]
 
 
-def test_pads_at_the_rigid_step_length_need_the_gait_whatever_the_start():
+def test_pads_at_the_rigid_step_length_always_need_the_gait():
     assert needed("contact-sim", EXPLICIT, "contact.pad_pitch=rigid") == ["fixedpoint", "contact-sim"]
 
 
 @pytest.mark.parametrize("terrain", ["plane", "after-mid-swing"])
-def test_a_given_start_needs_no_gait_on_ground_without_pads(terrain):
+def test_given_start_needs_no_gait_on_ground_without_pads(terrain):
     assert needed("contact-sim", EXPLICIT, f"contact.terrain={terrain}") == ["contact-sim"]
 
 
-def test_two_stages_of_one_name_are_refused():
+def test_stages_of_equal_name_are_rejected():
     with pytest.raises(ValueError, match="the same name"):
         Graph(Stage("a", "m", "", object), Stage("a", "n", "", object))
 
 
-def test_a_graph_without_an_import_path_cannot_be_sent_to_another_process():
+def test_graph_without_an_import_path_cannot_be_pickled():
     with pytest.raises(TypeError, match="import path"):
         pickle.dumps(Graph(Stage("a", "m", "", object)))
 
 
-def test_results_of_names_them_whatever_the_config():
+def test_results_of_ignores_the_config():
     assert results_of("a", "b")(load().config) == ("a", "b")
 
 
-def test_the_table_is_read_without_loading_config_or_arrays():
+def test_table_imports_neither_config_nor_arrays():
     heavy = "'numpy', 'h5py', 'scipy', 'numba', 'pydantic', 'ruamel'"
     code = f"import sys, walkerlab.pipeline.graph; print([name for name in ({heavy}) if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -163,12 +163,12 @@ def made_of():
 
 
 @pytest.mark.parametrize("stage", EVIDENCE)
-def test_an_edited_stage_of_evidence_renews_its_own_key_alone(made_of, stage):
+def test_editing_an_evidence_stage_changes_only_its_key(made_of, stage):
     assert {name for name in set(made_of) - DRAW if PIPELINE[stage].module in made_of[name]} == {stage}
 
 
 @pytest.mark.parametrize("stage", [stage.name for stage in PIPELINE.stages if not stage.draws])
-def test_no_result_is_made_with_the_registry_of_stages_figures_or_sections(made_of, stage):
+def test_results_do_not_depend_on_the_registries(made_of, stage):
     registries = {"walkerlab.pipeline.graph", "walkerlab.views.figures.registry", "walkerlab.views.report.registry"}
     registries |= {f"walkerlab{code.partition(':')[0]}" for code in walkerlab.EXTENSIONS.values()}
     assert not registries & made_of[stage]
@@ -190,7 +190,7 @@ COMPASS = ["equations=as-printed", "slope_deg=1"]
         ("contact-sim", "paper", ["contact.terrain=plane"], set()),
     ],
 )
-def test_the_law_of_the_study_counts_only_for_the_equations_as_printed(made_of, stage, config, sets, used):
+def test_law_of_the_study_affects_only_the_printed_equations(made_of, stage, config, sets, used):
     assert "walkerlab.evidence.paper.law" not in made_of[stage]
     loaded = load(Path(config), sets).config
     own = Keys().identity(PIPELINE[stage], loaded, {}).config_slice

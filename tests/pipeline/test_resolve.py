@@ -16,7 +16,7 @@ from walkerlab.pipeline.resolve import resolve
         ("child: thigh 1", "child: shank 1", "are not hinged together"),
     ],
 )
-def test_parts_that_make_no_walker_are_refused_with_their_place(tmp_path, old, new, said):
+def test_parts_that_form_no_walker_are_rejected_with_position(tmp_path, old, new, said):
     whole = builtin_config("parts").path.read_text()
     assert old in whole
     file = tmp_path / "mine.yaml"

@@ -24,7 +24,7 @@ def reasons(report):
     return {done.stage.name: done.reason for done in report.steps}
 
 
-def test_a_stage_runs_what_it_needs_first_and_stores_it(toy):
+def test_stage_runs_and_stores_its_inputs_first(toy):
     report = toy.execute("roll")
     assert actions(report) == {"drop": "run", "roll": "run"}
     assert not report.reused
@@ -33,7 +33,7 @@ def test_a_stage_runs_what_it_needs_first_and_stores_it(toy):
     assert read(toy.runs / "paper" / "drop.h5").summary["period_s"] == pytest.approx((2 / 9.81) ** 0.5)
 
 
-def test_what_is_up_to_date_is_reused_untouched(toy):
+def test_current_results_are_reused(toy):
     first = toy.execute("page")
     before = {path: path.stat().st_mtime_ns for path in (toy.runs / "paper").rglob("*") if path.is_file()}
     second = toy.execute("page")
@@ -43,7 +43,7 @@ def test_what_is_up_to_date_is_reused_untouched(toy):
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
-def test_only_what_a_change_concerns_runs_again(toy):
+def test_change_reruns_only_the_affected_stages(toy):
     toy.execute("page", config="paper")
     config, folder = toy.loaded("strides=7")
     again = execute(config, "page", type(folder)(folder.runs_dir, "paper"), graph=toy.graph)
@@ -59,14 +59,14 @@ def test_only_what_a_change_concerns_runs_again(toy):
     assert reasons(again)["picture"] == "input roll changed"
 
 
-def test_an_experiment_does_not_overwrite_the_run_beside_it(toy):
+def test_experiment_does_not_overwrite_another_run(toy):
     toy.execute("roll")
     before = (toy.runs / "paper" / "roll.h5").read_bytes()
     assert toy.execute("roll", "strides=7").run_dir == toy.runs / "paper@strides=7"
     assert (toy.runs / "paper" / "roll.h5").read_bytes() == before
 
 
-def test_changed_code_runs_again_with_what_depends_on_it(toy):
+def test_changed_code_reruns_its_stage_and_dependents(toy):
     toy.execute("page")
     toy.edit("physics", "math.sqrt(2 *", "math.sqrt(2.0 *")
     assert {step.stage.name: step.reason for step in toy.plan("page") if step.action == "run"} == {
@@ -84,14 +84,14 @@ def test_changed_code_of_another_stage_does_not_matter(toy):
     assert toy.execute("roll").reused
 
 
-def test_force_runs_everything_that_is_needed(toy):
+def test_force_reruns_everything_needed(toy):
     toy.execute("roll")
     report = toy.execute("roll", force=True)
     assert actions(report) == {"drop": "run", "roll": "run"}
     assert set(reasons(report).values()) == {"--force"}
 
 
-def test_forced_numbers_are_the_same_and_drawings_are_made_anew(toy):
+def test_forced_rerun_gives_equal_results_and_redraws(toy):
     toy.execute("page")
     digest = read(toy.runs / "paper" / "roll.h5").digest()
     toy.execute("roll", force=True)
@@ -101,14 +101,14 @@ def test_forced_numbers_are_the_same_and_drawings_are_made_anew(toy):
     assert reasons(report)["picture"] == "input drop was recomputed"
 
 
-def test_a_lost_input_is_made_again_and_results_that_agree_with_it_are_reused(toy):
+def test_lost_input_is_recomputed_and_matching_results_reused(toy):
     toy.execute("roll")
     (toy.runs / "paper" / "drop.h5").unlink()
     assert actions(toy.execute("roll")) == {"drop": "run", "roll": "reuse"}
 
 
 @pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: data[::-1]])
-def test_a_damaged_artifact_is_made_anew_with_a_warning(toy, listener, damage):
+def test_damaged_artifact_is_recomputed_with_a_warning(toy, listener, damage):
     toy.execute("roll")
     path = toy.runs / "paper" / "drop.h5"
     sound = read(path).digest()
@@ -121,7 +121,7 @@ def test_a_damaged_artifact_is_made_anew_with_a_warning(toy, listener, damage):
     assert read(path).digest() == sound
 
 
-def test_a_drawing_that_was_altered_is_drawn_again(toy):
+def test_altered_drawing_is_redrawn(toy):
     toy.execute("page")
     figure = toy.runs / "paper" / "figures" / "figure-01.svg"
     drawn = figure.read_bytes()
@@ -133,7 +133,7 @@ def test_a_drawing_that_was_altered_is_drawn_again(toy):
     assert (toy.runs / "paper" / "report.html").exists()
 
 
-def test_a_drawing_takes_what_happens_to_be_current(toy):
+def test_drawing_uses_whatever_results_are_current(toy):
     figure = toy.runs / "paper" / "figures" / "figure-01.svg"
     report = toy.execute("picture")
     assert "survey" not in actions(report)
@@ -147,7 +147,7 @@ def test_a_drawing_takes_what_happens_to_be_current(toy):
     assert toy.execute("picture").reused
 
 
-def test_without_contact_block_the_stage_refuses_and_drawings_leave_it_out(toy):
+def test_without_a_contact_block_its_stage_fails_and_drawings_omit_it(toy):
     with pytest.raises(ConfigError, match="contact block"):
         toy.execute("bounce", config="rigid-only")
     report = toy.execute("page", config="rigid-only")
@@ -157,14 +157,14 @@ def test_without_contact_block_the_stage_refuses_and_drawings_leave_it_out(toy):
     assert not (report.run_dir / "bounce.h5").exists()
 
 
-def test_a_walker_that_can_have_no_contact_is_not_advised_to_add_some(toy):
+def test_walker_without_possible_contact_is_not_advised_to_add_it(toy):
     with pytest.raises(ConfigError, match="next to no mass") as refused:
         toy.execute("bounce", config="simplest")
     assert refused.value.exit_code == 3
     assert "Add" not in refused.value.advice
 
 
-def test_no_answer_is_kept_with_what_was_found_and_told_again(toy):
+def test_missing_answer_is_stored_and_reported_again(toy):
     first = toy.execute("drop", STEEP)
     again = toy.execute("drop", STEEP)
     for report in (first, again):
@@ -177,7 +177,7 @@ def test_no_answer_is_kept_with_what_was_found_and_told_again(toy):
     assert read(first.artifact)["fall"]["height"][0] == 1.0
 
 
-def test_what_needs_an_answer_does_without(toy):
+def test_stages_after_a_missing_answer_run_without_it(toy):
     report = toy.execute("roll", STEEP)
     assert actions(report) == {"drop": "run", "roll": "leave out"}
     assert report.artifact is None
@@ -185,13 +185,13 @@ def test_what_needs_an_answer_does_without(toy):
     assert report.no_answer.message == "drop: the slope is too steep"
 
 
-def test_a_slope_without_an_answer_is_walked_from_a_given_start(toy):
+def test_slope_without_an_answer_is_simulated_from_a_given_start(toy):
     report = toy.execute("roll", STEEP, EXPLICIT)
     assert actions(report) == {"roll": "run"}
     assert report.no_answer is None
 
 
-def test_a_page_about_a_slope_without_an_answer_is_made_and_says_so(toy):
+def test_page_without_an_answer_is_written_and_says_so(toy):
     report = toy.execute("page", STEEP)
     assert report.artifact is not None
     assert report.no_answer is not None
@@ -200,7 +200,7 @@ def test_a_page_about_a_slope_without_an_answer_is_made_and_says_so(toy):
     assert toy.execute("page", STEEP).reused
 
 
-def test_a_whole_result_that_says_it_has_no_answer_is_shown_and_told(toy):
+def test_complete_result_without_an_answer_is_shown(toy):
     toy.edit("roll", '"steps": 2', '"no_answer": {"message": "one fell", "advice": "see"}, "steps": 2')
     report = toy.execute("roll")
     assert (report.no_answer.message, report.no_answer.exit_code) == ("one fell", 4)
@@ -210,7 +210,7 @@ def test_a_whole_result_that_says_it_has_no_answer_is_shown_and_told(toy):
     assert "roll" not in [entry.what for entry in page.left_out]
 
 
-def test_a_page_is_made_anew_when_the_reason_for_a_gap_changes(toy):
+def test_page_is_rewritten_when_the_reason_for_an_omission_changes(toy):
     toy.execute("page", STEEP)
     toy.edit("drop", "too steep", "far too steep")
     for name in ("toy.drop", "toy"):
@@ -219,11 +219,11 @@ def test_a_page_is_made_anew_when_the_reason_for_a_gap_changes(toy):
     assert "far too steep" in (report.run_dir / "report.html").read_text()
 
 
-def test_what_a_stage_leaves_out_itself_is_told(toy):
+def test_omissions_of_a_stage_are_reported(toy):
     assert [(entry.what, entry.why) for entry in toy.execute("roll").left_out] == [("forces", "a stone has none")]
 
 
-def test_a_stage_sees_what_it_takes_and_no_more(toy):
+def test_stage_sees_only_its_declared_config(toy):
     config, folder = toy.loaded()
     blind = Graph(Stage("drop", "toy.drop", "", StartConfig))
     with pytest.raises(AttributeError, match="no attribute 'gravity_m_s2'"):
@@ -231,7 +231,7 @@ def test_a_stage_sees_what_it_takes_and_no_more(toy):
     assert not folder.artifact("drop").exists()
 
 
-def test_a_stage_that_fails_half_way_leaves_the_results_before_it(toy):
+def test_failing_stage_keeps_earlier_results(toy):
     toy.execute("drop")
     toy.edit("roll", "period = ", "period = 1 / 0 + ")
     with pytest.raises(ZeroDivisionError):
@@ -239,11 +239,11 @@ def test_a_stage_that_fails_half_way_leaves_the_results_before_it(toy):
     assert actions(toy.execute("drop")) == {"drop": "reuse"}
 
 
-def test_jobs_reach_the_stage_that_has_cells(toy):
+def test_jobs_option_reaches_stages_with_cells(toy):
     assert toy.execute("survey", jobs=3).summary["jobs_wall_s"] == 3.0
 
 
-def test_looking_touches_nothing(toy):
+def test_status_changes_nothing(toy):
     for look in (toy.plan, toy.preview):
         look("page")
         assert not toy.runs.exists()
@@ -259,14 +259,14 @@ def test_looking_touches_nothing(toy):
     assert sorted((path, path.stat().st_mtime_ns) for path in toy.runs.rglob("*")) == before
 
 
-def test_a_reused_result_needs_no_lock_and_no_permission_to_write(toy):
+def test_reusing_a_result_needs_no_lock_or_write_permission(toy):
     folder = toy.execute("page").run_dir
     (folder / ".lock").unlink()
     assert toy.execute("page").reused
     assert not (folder / ".lock").exists()
 
 
-def test_a_result_that_cannot_be_stored_is_told(toy):
+def test_result_that_cannot_be_stored_is_reported(toy):
     toy.runs.write_text("a file stands where the folder belongs")
     with pytest.raises(StorageError, match="could not be stored"):
         toy.execute("drop")
@@ -288,7 +288,7 @@ print(json.dumps({"reused": report.reused}))
 """
 
 
-def test_of_two_processes_one_computes_and_the_other_waits_and_reuses(toy, tmp_path, listener):
+def test_second_process_waits_and_reuses_the_result(toy, tmp_path, listener):
     begun, go_on = tmp_path / "begun", tmp_path / "go-on"
     environment = {**toy.environment, "TOY_BEGUN": str(begun), "TOY_GO_ON": str(go_on)}
     command = [sys.executable, "-c", EXECUTE, toy.runs]
@@ -306,7 +306,7 @@ def test_of_two_processes_one_computes_and_the_other_waits_and_reuses(toy, tmp_p
     assert outputs == [{"reused": False}, {"reused": True}]
 
 
-def test_a_run_that_was_killed_is_taken_up_by_the_next(toy, tmp_path):
+def test_killed_run_is_continued_by_the_next(toy, tmp_path):
     begun = tmp_path / "begun"
     environment = {**toy.environment, "TOY_BEGUN": str(begun), "TOY_GO_ON": str(tmp_path / "never")}
     with subprocess.Popen([sys.executable, "-c", EXECUTE, toy.runs], env=environment) as first:
@@ -316,14 +316,14 @@ def test_a_run_that_was_killed_is_taken_up_by_the_next(toy, tmp_path):
     assert actions(toy.execute("drop", wait=False)) == {"drop": "run"}
 
 
-def test_a_second_run_imports_no_stage(toy):
+def test_second_run_imports_no_stage(toy):
     toy.execute("page")
     code = EXECUTE + "print([name for name in ('toy.drop', 'toy.physics', 'filelock') if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code, toy.runs], env=toy.environment, capture_output=True, text=True)
     assert done.stdout.splitlines() == ['{"reused": true}', "[]"], done.stderr
 
 
-def test_a_result_with_the_same_key_is_taken_over_from_another_run(toy, listener):
+def test_result_of_equal_key_is_reused_from_another_run(toy, listener):
     toy.execute("bounce")
     config, folder = toy.loaded("strides=7")
     assert toy.preview("bounce", "strides=7").reused
@@ -336,7 +336,7 @@ def test_a_result_with_the_same_key_is_taken_over_from_another_run(toy, listener
     assert reasons(toy.execute("roll", "strides=7"))["drop"] == "up to date"
 
 
-def test_a_result_elsewhere_is_copied_where_the_system_has_no_links(toy, monkeypatch):
+def test_result_of_another_run_is_copied_if_links_are_unsupported(toy, monkeypatch):
     toy.execute("drop")
     monkeypatch.setattr(os, "link", lambda *_: (_ for _ in ()).throw(OSError("no links here")))
     report = toy.execute("drop", "strides=7")
@@ -345,7 +345,7 @@ def test_a_result_elsewhere_is_copied_where_the_system_has_no_links(toy, monkeyp
     assert not report.artifact.samefile(toy.runs / "paper" / "drop.h5")
 
 
-def test_a_damaged_result_elsewhere_is_passed_over(toy):
+def test_damaged_result_of_another_run_is_ignored(toy):
     path = toy.execute("drop").artifact
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
@@ -353,7 +353,7 @@ def test_a_damaged_result_elsewhere_is_passed_over(toy):
     assert actions(toy.execute("drop", "strides=7")) == {"drop": "run"}
 
 
-def test_what_is_forced_or_drawn_is_not_taken_over(toy):
+def test_forced_results_and_drawings_are_not_reused_from_other_runs(toy):
     toy.execute("picture")
     report = toy.execute("picture", "strides=7")
     assert actions(report) == {"drop": "reuse", "roll": "run", "bounce": "reuse", "picture": "run"}

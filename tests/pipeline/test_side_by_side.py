@@ -22,7 +22,7 @@ def with_page_early(graph):
 
 
 @pytest.mark.parametrize("sets", [(), (STEEP,)])
-def test_processes_give_what_one_gives_and_none_is_left(toy, tmp_path, sets):
+def test_several_processes_give_the_same_result_and_all_end(toy, tmp_path, sets):
     one = toy.execute("page", *sets)
     files = {name: one.run_dir / f"{name}.h5" for name in NUMBERS}
     digests = {name: read(path).digest() for name, path in files.items() if path.exists()}
@@ -44,7 +44,7 @@ def with_picture_early(graph):
     return Graph(*(replace(stage, early_with=walks) if stage.name == "picture" else stage for stage in stages))
 
 
-def test_figures_are_on_the_page_before_the_long_stages_run(toy, listener):
+def test_figures_are_on_the_page_before_long_stages_run(toy, listener):
     toy.graph = with_picture_early(toy.graph)
     toy.execute("page", reporter=listener)
     walked = next(page for page in listener.pages if "'bounce'" in page)
@@ -54,7 +54,7 @@ def test_figures_are_on_the_page_before_the_long_stages_run(toy, listener):
 
 
 @pytest.mark.parametrize(("jobs", "error"), [(1, KeyboardInterrupt), (2, WorkerDiedError)])
-def test_the_page_of_a_stopped_command_says_so(toy, jobs, error):
+def test_page_of_an_interrupted_command_says_so(toy, jobs, error):
     toy.graph = with_picture_early(toy.graph)
     waits = "\n    while not (folder / 'report.html').exists():\n        time.sleep(0.01)\n    raise KeyboardInterrupt"
     toy.edit("survey", "jobs):", f"jobs, folder):{waits}")
@@ -66,7 +66,7 @@ def test_the_page_of_a_stopped_command_says_so(toy, jobs, error):
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_the_page_is_there_before_the_rest_and_says_what_is_missing(toy, listener, jobs):
+def test_early_page_says_what_is_missing(toy, listener, jobs):
     toy.graph = with_page_early(toy.graph)
     final = toy.execute("page", reporter=listener, jobs=jobs).run_dir / "report.html"
     assert f"picture: {STILL_COMPUTED}" in listener.pages[0]  # which stages side by side are ready is chance
@@ -74,7 +74,7 @@ def test_the_page_is_there_before_the_rest_and_says_what_is_missing(toy, listene
     assert STILL_COMPUTED not in final.read_text()
 
 
-def test_every_stage_tells_its_beginning_its_place_and_its_end(toy, listener):
+def test_every_stage_reports_start_progress_and_end(toy, listener):
     toy.execute("page", reporter=listener, jobs=2)
     stages = [stage for stage, _, _ in listener.begun]
     assert sorted(stages) == ["bounce", "drop", "page", "picture", "roll", "survey"]
@@ -85,14 +85,14 @@ def test_every_stage_tells_its_beginning_its_place_and_its_end(toy, listener):
     assert "dropping" in [label for label, _ in listener.started]
 
 
-def test_a_stage_that_ran_before_tells_how_long_it_took(toy, listener):
+def test_stage_that_ran_before_reports_its_duration(toy, listener):
     toy.execute("drop")
     toy.execute("drop", force=True, reporter=listener)
     ((_, _, expected),) = listener.begun
     assert 0.0 <= expected < 60.0
 
 
-def test_what_measures_times_has_nothing_beside_it(toy, listener):
+def test_stage_that_measures_times_runs_alone(toy, listener):
     survey = replace(toy.graph["survey"], work="times")
     toy.graph = Graph(*(survey if stage.name == "survey" else stage for stage in toy.graph.stages))
     told = []
@@ -105,7 +105,7 @@ def test_what_measures_times_has_nothing_beside_it(toy, listener):
     assert {name.split()[0] for name in told[:place] if name.endswith("begins")} == set(told[:place]) & set(NUMBERS)
 
 
-def test_what_fails_in_a_process_is_told_with_its_traceback(toy):
+def test_failure_in_a_process_is_reported_with_traceback(toy):
     toy.edit("roll", "period = ", "period = 1 / 0 + ")
     with pytest.raises(ZeroDivisionError) as caught:
         toy.execute("page", jobs=2)
@@ -113,13 +113,13 @@ def test_what_fails_in_a_process_is_told_with_its_traceback(toy):
     assert not (toy.runs / "paper" / "roll.h5").exists()
 
 
-def test_a_process_that_was_killed_is_told(toy):
+def test_killed_process_is_reported(toy):
     toy.edit("roll", "period = ", "import os; os.kill(os.getpid(), 9); period = ")
     with pytest.raises(WorkerDiedError, match="SIGKILL"):
         toy.execute("page", jobs=2)
 
 
-def test_a_chain_is_walked_in_one_process(toy):
+def test_chain_of_stages_runs_in_one_process(toy):
     config, _ = toy.loaded()
     chain = [toy.graph[name] for name in ("drop", "roll")]
     assert not any_side_by_side(chain, config)

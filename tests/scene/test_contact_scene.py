@@ -29,7 +29,7 @@ def scene_of(*sets):
 
 @pytest.mark.parametrize("radius", [0.0, 0.001, 0.1])
 @given(theta_2=st.floats(0.05, 0.4), w_1=st.floats(-3.0, 3.0), w_2=st.floats(-3.0, 3.0))
-def test_the_walk_starts_with_the_stance_foot_just_touching_and_rolling(radius, theta_2, w_1, w_2):
+def test_walk_starts_with_the_stance_foot_touching_and_rolling(radius, theta_2, w_1, w_2):
     scene = scene_of(f"walker.foot_radius_m={radius}")
     rigid = (-2 * 0.0174 - theta_2, theta_2, w_1, w_2)
     start = start_state(scene, rigid)
@@ -47,7 +47,7 @@ def test_the_walk_starts_with_the_stance_foot_just_touching_and_rolling(radius, 
     )
 
 
-def test_a_point_foot_starts_as_the_pinned_one():
+def test_point_foot_starts_like_the_pinned_foot():
     """Without a radius rolling and turning about the hinge are one."""
     rigid = (-0.2042, 0.1694, -0.6, -0.86)
     free, pinned = (
@@ -57,14 +57,14 @@ def test_a_point_foot_starts_as_the_pinned_one():
     assert free == pinned
 
 
-def test_the_paper_reads_its_contact_in_adams_units():
+def test_contact_of_the_paper_is_in_adams_units():
     walker = scene_of().walker
     assert walker.normal == pytest.approx((1e5 * 1000**2.2, 2.2, 90e3, 1e-4))
     assert walker.friction == pytest.approx((0.9, 0.7, 0.1, 1.0))
     assert isinstance(walker.friction, Coulomb)
 
 
-def test_static_penetration_and_damping_are_those_of_the_whole_weight_on_one_foot():
+def test_static_penetration_is_for_the_whole_weight_on_one_foot():
     """0.059 mm and over-damped, against the same two numbers worked out in N and mm."""
     scene = scene_of()
     depth_mm = (20.0 * 9.81 / 1e5) ** (1 / 2.2)
@@ -76,14 +76,14 @@ def test_static_penetration_and_damping_are_those_of_the_whole_weight_on_one_foo
     assert foot.damping_ratio > 1.0
 
 
-def test_a_scene_without_friction_has_another_law_not_a_zero():
+def test_frictionless_scene_has_a_law_of_another_type():
     config = load(None, ("contact.friction=none",)).config
     scene = contact_scene(config, STEP)
     assert isinstance(scene.walker.friction, Frictionless)
     assert any("friction" in row["why"] for row in contact_walk_omissions(config))
 
 
-def test_pads_are_laid_by_the_step_that_the_config_asks_for():
+def test_pad_pitch_follows_the_config():
     config = load(None, ()).config
     assert contact_scene(config, STEP).ground.terrain == checkerboard(STEP, (-STEP, 0.0))
     assert scene_of("contact.pad_pitch=0.36").pitch_m == 0.36
@@ -94,7 +94,7 @@ def test_pads_are_laid_by_the_step_that_the_config_asks_for():
     assert scene_of("contact.terrain=after-mid-swing").ground.terrain == after_mid_swing(STEP)
 
 
-def test_a_pinned_first_step_is_a_system_of_two_angles():
+def test_pinned_first_step_has_two_degrees_of_freedom():
     assert not scene_of().pinned
     scene = scene_of("contact.stance=pinned")
     pinned = scene.walker.forms[1, 0]
@@ -104,14 +104,14 @@ def test_a_pinned_first_step_is_a_system_of_two_angles():
 
 @pytest.mark.parametrize("terrain", ["checkerboard", "after-mid-swing", "plane"])
 @pytest.mark.parametrize("heights", ["[]", "[0.001]"])
-def test_a_scene_sent_to_another_process_runs_the_code_that_is_compiled_here(terrain, heights):
+def test_scene_sent_to_another_process_uses_the_same_compiled_code(terrain, heights):
     scene = scene_of(f"contact.terrain={terrain}", f"ground.heights_m={heights}")
     sent = pickle.loads(pickle.dumps(scene))
     assert typeof(sent.ground) == typeof(scene.ground)
     assert typeof(sent.walker) == typeof(scene.walker)
 
 
-def test_a_rigid_walker_sent_to_another_process_runs_the_code_that_is_compiled_here():
+def test_rigid_walker_sent_to_another_process_uses_the_same_compiled_code():
     config = load(None).config
     walker = rigid_walker(config, config.equations)
     sent = pickle.loads(pickle.dumps(walker))

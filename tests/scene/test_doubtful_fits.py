@@ -135,7 +135,7 @@ def values(result):
     return {estimate.key: estimate for estimate in result.estimates}
 
 
-def test_one_quantity_keeps_its_noise_apart_from_the_floor():
+def test_noise_of_one_quantity_is_separated_from_floor_roughness():
     result = identify(MeasuredWalk(np.array(PERIODS)), *WALKER, "slope_deg=2.1", fit={"slope_deg": None})
     slope = values(result)["slope_deg"]
     assert 3e-4 < result.measurement["step_period_s"] < 3e-3
@@ -143,7 +143,7 @@ def test_one_quantity_keeps_its_noise_apart_from_the_floor():
     assert slope.standard_error < 0.05
 
 
-def test_periods_alone_leave_two_parameters_open_and_say_so():
+def test_periods_alone_leave_two_parameters_undetermined():
     fit = {"slope_deg": None, HIP: None}
     result = identify(MeasuredWalk(np.array(OTHER_PERIODS)), *WALKER, "slope_deg=1.9", HIP + "=11", fit=fit)
     assert result.verdict.fit == "fits"
@@ -151,7 +151,7 @@ def test_periods_alone_leave_two_parameters_open_and_say_so():
     assert [estimate.standard_error for estimate in result.estimates] == [None, None]
 
 
-def test_outliers_change_neither_noise_nor_errors_of_a_soft_loss():
+def test_outliers_do_not_change_noise_or_errors_of_a_soft_loss():
     measured = MeasuredWalk(np.array(OUTLYING_PERIODS), np.array(OUTLYING_LENGTHS))
     linear, soft = (
         identify(measured, *WALKER, "slope_deg=2.05", fit={"slope_deg": None}, loss=loss)
@@ -166,7 +166,7 @@ def test_outliers_change_neither_noise_nor_errors_of_a_soft_loss():
     assert soft.rms_residual["step_period_s"] > 3.0 * soft.measurement["step_period_s"]
 
 
-def test_a_soft_loss_agrees_with_the_linear_one_without_outliers():
+def test_soft_loss_agrees_with_the_linear_one_without_outliers():
     fit = {"slope_deg": None, LEG: None}
     linear, soft = (values(identify(measured_steps(), fit=fit, loss=loss)) for loss in ("linear", "soft_l1"))
     for key in fit:
@@ -180,7 +180,7 @@ def test_noise_is_never_below_the_rounding_of_the_file():
     assert result.measurement["step_period_s"] >= 0.01 / np.sqrt(12.0) * (1.0 - 1e-9)
 
 
-def test_a_right_walker_fits():
+def test_correct_walker_fits_without_doubts():
     result = identify(measured_steps(), fit={"slope_deg": None, LEG: None})
     assert result.verdict.fit == "fits"
     assert result.verdict.reasons == ()
@@ -188,7 +188,7 @@ def test_a_right_walker_fits():
         assert abs(values(result)[key].value - truth) < 3.0 * values(result)[key].standard_error
 
 
-def test_a_bound_that_excludes_the_truth_is_pulled_at():
+def test_bound_that_excludes_the_truth_is_reported():
     result = identify(measured_steps(), LEG + "=0.98", fit={"slope_deg": None, LEG: [0.9, 0.99]})
     (pull,) = result.pulls
     free = values(identify(measured_steps(), fit={"slope_deg": None, LEG: None}))[LEG]
@@ -198,7 +198,7 @@ def test_a_bound_that_excludes_the_truth_is_pulled_at():
     assert "against its bound of 0.99" in result.verdict.reasons[0]
 
 
-def test_a_bound_that_the_walk_does_not_press_is_no_doubt():
+def test_bound_without_influence_raises_no_doubt():
     free = values(identify(measured_steps(), fit={"slope_deg": None, LEG: None}))[LEG]
     edge = free.value - 0.5 * free.standard_error
     result = identify(measured_steps(), LEG + "=0.98", fit={"slope_deg": None, LEG: [0.9, edge]})
@@ -231,7 +231,7 @@ def test_the_size_of_one_percent_of_zero_comes_from_the_leg():
     assert fitted_with_sensitivities("walker.hip.torque_N_m")[1] == {}
 
 
-def test_a_wrong_prior_does_not_become_noise():
+def test_wrong_prior_does_not_inflate_the_noise():
     free = identify(measured_steps(), fit={"slope_deg": None, LEG: None})
     wrong = identify(measured_steps(), fit={"slope_deg": None}, prior={LEG: [1.05, 0.003]})
     (pull,) = wrong.pulls
@@ -242,7 +242,7 @@ def test_a_wrong_prior_does_not_become_noise():
     assert wrong.verdict.fit == "fits-but"
 
 
-def test_a_floor_rougher_than_floors_are_is_a_reason_to_doubt():
+def test_implausibly_rough_floor_raises_a_doubt():
     fitted = identify(measured_steps(), fit={"slope_deg": None}).fitted
     leg = fitted.problem.leg_length_m
     reasons = [
@@ -260,7 +260,7 @@ def measured_angles(seed, rate_change, *sets):
     return split_into_steps(times, angles, touches)
 
 
-def test_a_wrong_hip_mass_is_named_and_would_raise_the_likelihood_by_what_a_refit_gains():
+def test_wrong_hip_mass_is_named_with_its_likelihood_gain():
     measured = measured_angles(0, 0.0, "slope_deg=3.5")
     wrong = identify(measured, "slope_deg=3.5", HIP + "=11.2", fit={"slope_deg": None})
     assert wrong.verdict.fit == "fits-but"
@@ -276,7 +276,7 @@ def test_a_wrong_hip_mass_is_named_and_would_raise_the_likelihood_by_what_a_refi
     assert abs(values(right)[HIP].value - 10.0) < 3.0 * values(right)[HIP].standard_error
 
 
-def test_rates_that_change_at_each_strike_are_estimated_with_errors_that_hold():
+def test_rate_jumps_at_strikes_are_estimated_with_valid_errors():
     even, kicked = (identify(measured_angles(3, change), fit={"slope_deg": None, HIP: None}) for change in (0.0, 0.005))
     for result in (even, kicked):
         assert result.verdict.fit == "fits"
@@ -287,7 +287,7 @@ def test_rates_that_change_at_each_strike_are_estimated_with_errors_that_hold():
     assert values(kicked)[HIP].standard_error > 3.0 * values(even)[HIP].standard_error
 
 
-def test_noise_of_successive_angles_that_goes_together_is_seen_in_the_residuals():
+def test_correlated_angle_noise_shows_in_the_residuals():
     measured = measured_angles(3, 0.0)
     drawn = np.random.default_rng(4).normal(0.0, 1e-3, measured.angles_rad.shape)
     drift = np.array([np.convolve(leg, np.ones(30) / 30**0.5, "same") for leg in drawn.T]).T

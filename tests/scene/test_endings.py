@@ -10,13 +10,13 @@ PAPER = load().config
 COUNTS = {"walked": 150, "off-pad": 178, "fell": 32, "no-answer": 7}
 
 
-def test_every_outcome_has_its_words_and_its_colour():
+def test_every_outcome_has_a_description_and_a_colour():
     for told in ("does", "did", "advice", "colour"):
         assert len({getattr(OUTCOME_TEXTS[outcome], told) for outcome in Outcome}) == len(Outcome)
     assert all(OUTCOME_TEXTS[outcome].why for outcome in Outcome if outcome is not Outcome.WALKED)
 
 
-def test_walks_that_pads_end_are_told_from_limits_of_the_walker():
+def test_walks_ended_by_pads_are_distinguished_from_falls():
     pads = Pads((0.15, 0.15), (0.31, 0.36), "rigid")
     first, second = describe_endings(COUNTS, PAPER, contact=True, pads=pads)
     assert (first["outcome"], first["walks"], first["of"], first["ground"]) == ("off-pad", 178, 360, True)
@@ -28,17 +28,17 @@ def test_walks_that_pads_end_are_told_from_limits_of_the_walker():
     assert (second["said"], second["ground"]) == ("32 of 360 walks fell.", False)
 
 
-def test_what_did_not_walk_does_not_count_and_what_walked_did_not_end():
+def test_completed_walks_and_missing_gaits_are_not_endings():
     assert describe_endings({"answered": 3, "no-answer": 1}, PAPER, contact=False) == []
     assert describe_endings({"walked": 3}, PAPER, contact=True) == []
 
 
-def test_legs_with_knees_are_sent_to_a_plane_and_pads_at_their_own_pitch_are_not_advised_again():
+def test_kneed_walkers_are_advised_to_use_a_plane():
     kneed = load(Path("kneed"), ("contact.terrain=checkerboard", "contact.pad_pitch=own")).config
     assert ground_causes("off-pad", kneed, contact=True)[-1] == "Try contact.terrain=plane."
 
 
-def test_the_rigid_model_has_no_ground_that_ends_a_walk():
+def test_rigid_model_has_no_ground_that_ends_a_walk():
     assert ground_causes("lifted-off", PAPER, contact=False) == []
     assert "contact.stiffness" in ground_causes("lifted-off", PAPER, contact=True)[0]
     assert "contact.static_friction" in ground_causes("slid", PAPER, contact=True)[0]

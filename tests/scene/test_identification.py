@@ -37,7 +37,7 @@ def verdict(result):
     return result.models[0].fit
 
 
-def test_regions_hold_the_truth_and_errors_are_as_large_as_the_spread():
+def test_confidence_regions_cover_the_truth_and_errors_match_the_scatter():
     """Of twelve walks more than two lie outside with a probability of 2 %; the script does a thousand."""
     inside, estimates, errors, _ = CAMPAIGN["coverage"](truth(), range(12))
     assert inside.sum() >= 10
@@ -77,7 +77,7 @@ def test_angles_determine_the_hip_mass():
 
 
 @pytest.mark.parametrize("seed", [2, 3])
-def test_steps_that_a_rough_floor_moves_far_from_the_gait_are_no_misfit(seed):
+def test_large_deviations_on_a_rough_floor_are_not_a_misfit(seed):
     """The floor alone moves the simplest walker's angles by 5 % of their size at the same phase of every step."""
     own = truth("angles", "simplest")
     result = own.identify(*own.walk(seed))
@@ -85,7 +85,7 @@ def test_steps_that_a_rough_floor_moves_far_from_the_gait_are_no_misfit(seed):
     assert CAMPAIGN["region_holds"](result, own.values)
 
 
-def test_a_rigid_walk_holds_no_scale_of_mass():
+def test_rigid_walk_does_not_determine_the_mass_scale():
     keys = ("walker.hip_mass_kg", "walker.leg_mass_kg", "walker.leg_inertia_kg_m2")
     measured, _ = truth("angles").walk(2)
     result = identify(measured, "walker.leg_inertia_kg_m2=0.01", keys=keys[:2])
@@ -100,7 +100,7 @@ def test_a_rigid_walk_holds_no_scale_of_mass():
     assert abs(hip.value - 10.0) < 4.0 * hip.standard_error
 
 
-def test_two_exact_steps_name_every_parameter_that_they_leave_open():
+def test_two_exact_steps_name_every_undetermined_parameter():
     own = truth()
     walk = own.walks.disturbed(own.z * 1.01, tuple(own.values), np.zeros(3))
     measured = MeasuredWalk(walk.durations_s, walk.lengths_m)
@@ -110,7 +110,7 @@ def test_two_exact_steps_name_every_parameter_that_they_leave_open():
     assert len(left_open) > 1
 
 
-def test_derivatives_equal_differences_of_other_sizes():
+def test_derivatives_equal_finite_differences_of_other_step_sizes():
     own = truth()
     measured, _ = own.walk(3)
     subject = find_model_gait("rigid", own.config, own.gait, lambda _: None)
@@ -125,7 +125,7 @@ def test_derivatives_equal_differences_of_other_sizes():
             assert J[:, place] == pytest.approx(column, abs=1e-6 * np.abs(J[:, place]).max())
 
 
-def test_a_walk_of_many_steps_is_predicted_whole():
+def test_long_walk_is_predicted_to_its_end():
     own = truth()
     walk = own.walks.disturbed(own.z, tuple(own.values), np.zeros(121))
     assert walk.outcome is Outcome.WALKED
@@ -133,7 +133,7 @@ def test_a_walk_of_many_steps_is_predicted_whole():
 
 
 @pytest.mark.parametrize("name", ["round-feet", "kneed", "paper"])
-def test_tangent_columns_of_a_walk_are_its_difference_quotients(name):
+def test_tangents_of_a_walk_equal_difference_quotients(name):
     own = CAMPAIGN["Truth"](name, CAMPAIGN["WALKERS"][name])
     heights, p, steps = np.random.default_rng(3).normal(0.0, 1e-3, 6) * own.leg, tuple(own.values), 5
     along = np.eye(own.z.size + steps + 1)

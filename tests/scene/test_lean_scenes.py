@@ -90,14 +90,14 @@ def rates_with_point_feet(walker, y):
 
 
 @given(state=states)
-def test_a_point_foot_is_a_ball_of_radius_zero(state):
+def test_point_foot_is_a_ball_of_radius_zero(state):
     walker = walker_with(radius=0.0)
     y = over(walker, *state)
     same_to_rounding(rate_of(on_ground(walker, BOTH), y), rates_with_point_feet(walker, y), stiffest(walker, y))
 
 
 @given(state=states, clearance=st.floats(1e-9, 0.5))
-def test_a_foot_out_of_reach_moves_as_over_no_ground(state, clearance):
+def test_foot_in_the_air_moves_as_without_ground(state, clearance):
     walker = walker_with()
     foot, _, *rest = state
     y = over(walker, foot, clearance, *rest)
@@ -106,7 +106,7 @@ def test_a_foot_out_of_reach_moves_as_over_no_ground(state, clearance):
 
 
 @given(state=states)
-def test_a_leg_without_inertia_is_a_point_mass_on_a_bar_without_mass(state):
+def test_leg_without_inertia_is_a_point_mass_on_a_massless_bar(state):
     """Described in two ways: a body with an inertia of zero, and a particle."""
     legs = compass_assembly(CompassParts(1.0, 0.5, 5.0, 10.0, 0.0, 0.001))
     particles = tuple(Particle(f"mass of {leg.name}", leg.mass_kg, leg.name, leg.centre_m) for leg in legs.bodies)
@@ -120,7 +120,7 @@ def test_a_leg_without_inertia_is_a_point_mass_on_a_bar_without_mass(state):
     same_to_rounding(found, expected, stiffest(one, y))
 
 
-def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
+def test_walk_on_frictionless_ground_equals_that_with_zero_coefficients():
     """The same steps to the last bit, where no step ends at a switching point of the friction law."""
     ends = []
     for law in (NO_FRICTION, Frictionless()):
@@ -132,7 +132,7 @@ def test_a_walk_on_frictionless_ground_is_that_with_coefficients_of_zero():
     assert ends[0] == ends[1]
 
 
-def test_frictionless_ground_has_four_joins_less():
+def test_frictionless_ground_has_four_fewer_switching_points():
     assert switching_count(Coulomb(0.9, 0.7, 0.1, 1.0)) == MATERIAL - FRICTION_SWITCHES == 4
     assert switching_count(Frictionless()) == 0
 
@@ -152,7 +152,7 @@ def walks():
 
 
 @pytest.mark.parametrize("stage", [simulate, contact_sim], ids=lambda stage: stage.__name__)
-def test_outputs_that_are_asked_for_are_those_of_the_full_result(walks, stage):
+def test_requested_outputs_equal_those_of_the_full_result(walks, stage):
     full, *parts = walks[stage].values()
     seen = set()
     for part in parts:
@@ -171,14 +171,14 @@ def test_outputs_that_are_asked_for_are_those_of_the_full_result(walks, stage):
     ids=["simulate", "contact_sim"],
 )
 @pytest.mark.parametrize("output", ["states", "energies", "forces"])
-def test_what_an_output_is_said_to_take_is_what_it_takes(walks, stage, numbers, output):
+def test_stated_size_of_an_output_is_correct(walks, stage, numbers, output):
     group = walks[stage][(output,)]["trajectory"]
     samples = group["time"].size
     columns = [variable.values.size / samples for variable in group.variables.values() if variable.units != "1"]
     assert sum(columns) - 1 == numbers[output]  # the time itself
 
 
-def test_what_a_scene_is_said_to_save_is_what_it_saves():
+def test_stated_savings_of_a_scene_are_correct():
     said = omissions.contact_walk_omissions(
         load(None, ("contact.friction=none", "contact.stance=pinned", "outputs=[]")).config
     )
@@ -199,7 +199,7 @@ def test_what_a_scene_is_said_to_save_is_what_it_saves():
 
 
 @pytest.mark.parametrize("sets", [("outputs=[]", "contact.friction=none"), ("walker.leg_inertia_kg_m2=0.1",)])
-def test_what_would_be_left_out_is_what_is_said_afterwards(tmp_path, sets):
+def test_preview_lists_the_same_omissions_as_the_result(tmp_path, sets):
     """A preview knows it from the config; nothing has run."""
     found = load(None, (*sets, "strides=1", f"start={list(START)}", "contact.pad_pitch=0.3714"))
     folder = RunFolder(tmp_path, found.run_name)
@@ -212,7 +212,7 @@ def test_what_would_be_left_out_is_what_is_said_afterwards(tmp_path, sets):
     ("name", "sets", "angles"),
     [("paper", (), 2), ("torso", (), 3), ("kneed", (), 3), ("kneed", ("walker.knee.lock=compliant",), 4)],
 )
-def test_the_angles_of_a_pinned_step_are_those_that_it_is_integrated_in(name, sets, angles):
+def test_pinned_step_is_integrated_in_its_own_angles(name, sets, angles):
     config = load(Path(name), (*sets, "contact.stance=pinned")).config
     scene = contact_scene(config, 0.4)
     assert scene.walker.forms[1, 2 if scene.walker.kneed else 0].bodies == angles  # the stance knee is locked

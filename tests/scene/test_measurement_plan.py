@@ -38,7 +38,7 @@ def errors(options, measurement, start="at the gait"):
     return next(o for o in options if (o.measurement, o.start) == (measurement, start))
 
 
-def test_expected_errors_are_those_of_a_dense_normal_distribution(config, gait, options):
+def test_expected_errors_equal_a_dense_gaussian_computation(config, gait, options):
     subject = find_model_gait("rigid", config, gait, print)
     walk = walk_of(subject, predict_measured(subject, QUESTION, PLAN)[0], QUESTION)
     noise = {STEP_PERIOD: PLAN.period_noise_s, STEP_LENGTH: PLAN.length_noise_m, LEG_ANGLE: PLAN.angle_noise_rad}
@@ -51,7 +51,7 @@ def test_expected_errors_are_those_of_a_dense_normal_distribution(config, gait, 
     np.testing.assert_allclose(list(errors(options, "periods and lengths").errors.values()), expected, rtol=1e-6)
 
 
-def test_more_steps_and_more_quantities_leave_smaller_errors(options):
+def test_more_steps_and_quantities_reduce_the_errors(options):
     for option in options:
         values = [curve["slope_deg"] for curve in option.curve.values() if curve["slope_deg"] is not None]
         assert values == sorted(values, reverse=True)
@@ -61,14 +61,14 @@ def test_more_steps_and_more_quantities_leave_smaller_errors(options):
     assert all(errors(options, ANGLES).errors[key] < few[key] for key in KEYS)
 
 
-def test_periods_of_a_steady_gait_leave_the_slope_open(options):
+def test_periods_of_a_steady_gait_do_not_determine_the_slope(options):
     periods = errors(options, "periods")
     assert periods.errors["slope_deg"] is None
     assert "slope_deg" in periods.not_identifiable[0].combination
     assert periods.steps_needed == {"slope_deg": None}
 
 
-def test_the_steps_needed_are_the_fewest_that_reach_the_wanted_error(config, gait, options):
+def test_plan_needs_the_fewest_steps_for_the_requested_error(config, gait, options):
     needed = errors(options, ANGLES).steps_needed["slope_deg"]
     plan = PLAN.model_copy(update={"steps": needed})
     enough = plan_measurements(config, gait, QUESTION, plan)
@@ -77,12 +77,12 @@ def test_the_steps_needed_are_the_fewest_that_reach_the_wanted_error(config, gai
     assert errors(fewer, ANGLES).errors["slope_deg"] > 0.01
 
 
-def test_a_value_known_beforehand_determines_what_periods_leave_open(config, gait):
+def test_prior_determines_what_periods_cannot(config, gait):
     weighed = Identify(fit=dict.fromkeys(KEYS), prior={"slope_deg": [3.0, 0.01]})
     error = errors(plan_measurements(config, gait, weighed, PLAN), "periods").errors["slope_deg"]
     assert error == pytest.approx(0.01, rel=0.05)
 
 
-def test_a_start_too_far_from_the_gait_has_no_plan(config, gait):
+def test_start_too_far_from_the_gait_has_no_plan(config, gait):
     with pytest.raises(NoAnswer, match=r"takes only \d+ of 9 steps"):
         plan_measurements(config, gait, QUESTION, PLAN.model_copy(update={"start_change": 0.5}))

@@ -33,7 +33,7 @@ def gait_of(found):
 
 
 @pytest.mark.parametrize("degrees", [2, 3, 4, 5])
-def test_a_kneed_walker_is_told_of_its_steeper_slopes(degrees):
+def test_kneed_walker_without_gait_is_pointed_to_steeper_slopes(degrees):
     one = config(KNEED, f"slope_deg={degrees}", base=Path("kneed"))
     assert gait_of(one) is None
     low, high = (math.degrees(value) for value in find_slopes_with_gaits(one).stable)
@@ -44,7 +44,7 @@ def test_a_kneed_walker_is_told_of_its_steeper_slopes(degrees):
 
 
 @pytest.mark.parametrize("slope", ["slope_deg=40", "slope_rad=0.7"])
-def test_the_command_that_is_told_finds_a_stable_gait(slope):
+def test_suggested_command_finds_a_stable_gait(slope):
     said = suggest_gaits(config(slope), f" --set {slope}")
     command = re.search("`(.*)`", said)[1]
     sets = [word for word in shlex.split(command) if "=" in word]
@@ -53,7 +53,7 @@ def test_the_command_that_is_told_finds_a_stable_gait(slope):
 
 
 @pytest.mark.parametrize("degrees", [1.4, 2.5, 4.0])
-def test_a_kneed_walker_without_a_gait_is_told_to_put_its_feet_ahead(degrees):
+def test_kneed_walker_without_gait_is_advised_to_move_its_feet_ahead(degrees):
     sets = (MCGEER, f"slope_deg={degrees}")
     assert gait_of(config(*sets, base=Path("kneed"))) is None
     advice = suggest_gaits(config(*sets, base=Path("kneed")), " -c mcgeer.yaml")
@@ -62,7 +62,7 @@ def test_a_kneed_walker_without_a_gait_is_told_to_put_its_feet_ahead(degrees):
     assert advice.count("--set") <= 2
 
 
-def test_where_nothing_near_has_a_gait_no_long_command_is_advised():
+def test_no_slow_command_is_suggested_without_a_nearby_gait():
     one = config(MCGEER, "slope_deg=3", "walker.shank.mass_kg=100", "walker.thigh.mass_kg=0.001", base=Path("kneed"))
     advice = suggest_gaits(one)
     assert "walker.foot_centre_ahead_m" in advice
@@ -70,5 +70,5 @@ def test_where_nothing_near_has_a_gait_no_long_command_is_advised():
     assert "--set" not in advice
 
 
-def test_uphill_nothing_is_sought():
+def test_no_nearby_gait_is_searched_uphill():
     assert suggest_gaits(config("slope_deg=0")) == ""

@@ -71,7 +71,7 @@ class Wordless(NamedTuple):
     largest = rising_until = property(lambda self: self.mu)
 
 
-def test_an_incomplete_law_is_told_in_words_when_a_scene_is_made(monkeypatch):
+def test_incomplete_law_is_explained_when_a_scene_is_built(monkeypatch):
     monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
     with pytest.raises(ConfigError) as said:
         contact_scene(load().config, 0.3714)
@@ -82,33 +82,33 @@ def test_an_incomplete_law_is_told_in_words_when_a_scene_is_made(monkeypatch):
 
 
 @pytest.mark.parametrize("stage", ["contact-sim", "report"])
-def test_an_incomplete_law_is_refused_before_anything_runs(stage, monkeypatch, tmp_path):
+def test_incomplete_law_is_rejected_before_anything_runs(stage, monkeypatch, tmp_path):
     monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
     with pytest.raises(ConfigError, match="it lacks sliding_from, with_creep, in_words"):
         execute(load().config, stage, RunFolder(tmp_path, "paper"))
     assert [*tmp_path.rglob("*.h5")] == []
 
 
-def test_a_law_that_counts_its_formulas_must_also_tell_where_they_change(own, monkeypatch):
+def test_law_with_several_formulas_must_define_their_switching_points(own, monkeypatch):
     monkeypatch.setitem(friction.switching_count._bodies, Regularised, lambda law: 2)
     with pytest.raises(ConfigError, match=r"lacks a case @sample_switching\.case\(Regularised\)\.$"):
         contact_scene(load().config, 0.3714)
 
 
-def test_a_law_without_a_body_is_told_in_words_by_compiled_code(own):
+def test_compiled_code_names_a_law_without_a_formula(own):
     wordless = replace(own, walker=own.walker._replace(friction=Wordless(0.5)))
     with pytest.raises(TypeError, match=r"^friction_coefficient has no case for Wordless: "):
         wordless.walk(start_state(own, START), 1, Tolerances("radau5", 1e-7, 1e-9, 1000))
 
 
-def test_every_word_of_the_config_is_a_law():
+def test_every_friction_option_of_the_config_has_a_law():
     assert set(FRICTION_LAWS) == set(get_args(Contact.model_fields["friction"].annotation))
     for word in FRICTION_LAWS:
         assert Contact(friction=word).has_friction == (friction_law(Contact(friction=word)).largest > 0.0)
 
 
 @pytest.mark.parametrize("word", FRICTION_LAWS)
-def test_what_a_law_says_is_what_its_coefficient_does(word):
+def test_stated_properties_of_a_law_match_its_coefficient(word):
     law = friction_law(Contact(friction=word))
     slips = np.linspace(0.0, 3.0, 3001)
     found = [-friction_coefficient(law, slip)[0] for slip in slips]
@@ -122,7 +122,7 @@ def test_what_a_law_says_is_what_its_coefficient_does(word):
         assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
 
 
-def test_the_laws_differ_in_words():
+def test_friction_laws_have_different_descriptions():
     said = [friction_law(Contact(friction=word)).in_words() for word in FRICTION_LAWS]
     assert len(set(said)) == len(said)
     assert said[0] == (
@@ -130,11 +130,11 @@ def test_the_laws_differ_in_words():
     )
 
 
-def test_a_result_names_the_law_that_walked(own):
+def test_result_names_its_friction_law(own):
     assert scene_measures(own)["friction"] == "friction of 0.7 tanh(v / 0.1 m/s)"
 
 
-def test_creep_of_any_law_is_led_towards_the_rigid_limit(own):
+def test_rigid_limit_reduces_the_creep_of_any_law(own):
     stiff = with_rigidity(own.walker, 1.0).friction.v_0
     assert stiff < 0.1
     setting = series_settings(STICTION_SERIES)[-1]
@@ -143,14 +143,14 @@ def test_creep_of_any_law_is_led_towards_the_rigid_limit(own):
     assert trial.walker.friction.v_0 == pytest.approx(0.1 * CREEP_FACTOR)
 
 
-def test_any_law_can_be_too_weak_for_the_slope(own):
+def test_any_law_can_be_too_slippery_for_the_slope(own):
     assert why_no_gait(own.walker) is None
     weak = own.walker._replace(friction=Regularised(0.01, 0.1))
     assert "0.01 is below the slope's 0.0174" in why_no_gait(weak)[0]
     assert "without friction" in why_no_gait(own.walker._replace(friction=Frictionless()))[0]
 
 
-def test_an_unresolved_slip_of_any_law_is_told(own):
+def test_unresolved_slip_of_any_law_is_reported(own):
     said = []
     progress = SimpleNamespace(note=said.append)
     tell_unresolved_slip(1e-9, own, progress)

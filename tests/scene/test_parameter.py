@@ -48,7 +48,7 @@ def numbers_of(config):
             yield ".".join(path)
 
 
-def test_every_number_that_the_walker_has_is_a_parameter_and_no_other_key_is(config):
+def test_parameters_are_exactly_the_numeric_keys_of_the_walker(config):
     own = {*numbers_of(config), "slope_deg"}
     for key in EVERY:
         if key in own:
@@ -60,7 +60,7 @@ def test_every_number_that_the_walker_has_is_a_parameter_and_no_other_key_is(con
             assert caught.value.advice
 
 
-def test_models_are_made_at_a_value_nearby(config):
+def test_models_can_be_built_at_a_nearby_value(config):
     for key in (*numbers_of(config), "slope_deg"):
         parameter = parameter_of(key, config)
         value = parameter.value_in(config)
@@ -77,7 +77,7 @@ def test_models_are_made_at_a_value_nearby(config):
             contact_scene(changed, 0.4, 0.4)
 
 
-def test_at_its_own_value_the_config_is_itself(config):
+def test_config_at_its_current_value_is_unchanged(config):
     for key in (*numbers_of(config), "slope_deg"):
         parameter = parameter_of(key, config)
         again = parameter.config_at(config, parameter.value_in(config))
@@ -101,13 +101,13 @@ def test_at_its_own_value_the_config_is_itself(config):
         ("paper", "contact.terrain", "is not a number"),
     ],
 )
-def test_a_key_that_cannot_be_followed_is_refused_with_the_reason(name, key, said):
+def test_key_without_continuation_is_rejected_with_the_reason(name, key, said):
     with pytest.raises(ConfigError) as caught:
         parameter_of(key, load(Path(name)).config)
     assert f"{key} {said}" in str(caught.value)
 
 
-def test_a_sweep_takes_every_number_that_a_walker_has(config):
+def test_sweep_accepts_every_parameter_of_a_walker(config):
     for key in numbers_of(config):
         value = parameter_of(key, config).value_in(config)
         one = axis(key, f"{value}:{value + 1e-3}:2", f"--over {key}")

@@ -25,7 +25,7 @@ def numbers_of(model: RigidModel):
     return np.concatenate([np.ravel(model[name]) for name in names])
 
 
-def test_the_kneed_walker_described_by_its_parts_is_the_kneed_walker(tmp_path):
+def test_kneed_walker_equals_its_description_by_parts(tmp_path):
     (text,) = re.findall(r"```yaml\n(name: own-parts.*?)```", DOCS.read_text(), re.DOTALL)
     path = tmp_path / "own-parts.yaml"
     path.write_text(text)
@@ -80,7 +80,7 @@ def by_its_parts(radius_m):
 
 
 @pytest.mark.parametrize("radius_m", [0.0, 0.2])
-def test_a_kneed_walker_with_its_feet_ahead_is_the_one_put_together_from_its_parts(radius_m):
+def test_kneed_walker_with_feet_ahead_equals_its_description_by_parts(radius_m):
     own, parts = kneed_with_feet_ahead(radius_m), by_its_parts(radius_m)
     one, other = rigid_walker(own), rigid_walker(parts)
     assert one.lean == pytest.approx(math.atan2(0.03, 1.0 - radius_m), rel=1e-15)
@@ -94,7 +94,7 @@ def test_a_kneed_walker_with_its_feet_ahead_is_the_one_put_together_from_its_par
             np.testing.assert_allclose(number, same, rtol=1e-14, atol=1e-16)
 
 
-def test_a_kneed_walker_with_its_feet_ahead_has_the_gait_found_elsewhere():
+def test_kneed_walker_with_feet_ahead_has_the_published_gait():
     """The numbers are those of independent code for the walker put together from its parts."""
     gait = find_gaits(rigid_walker(kneed_with_feet_ahead(0.2))).gait
     assert gait.period == pytest.approx(0.8295992430, abs=1e-9)
@@ -102,7 +102,7 @@ def test_a_kneed_walker_with_its_feet_ahead_has_the_gait_found_elsewhere():
     assert gait.spectral_radius == pytest.approx(0.3333740739, abs=1e-8)
 
 
-def test_a_start_of_a_walker_with_its_feet_ahead_is_computed_on_the_slope():
+def test_start_with_feet_ahead_is_computed_on_the_slope():
     start = "start=[null, 0.26, null, -0.49, -1.157, -0.49]"
     config = kneed_with_feet_ahead(0.2)
     moved = load(Path("kneed"), ["slope_deg=2.5", "walker.foot_radius_m=0.2", "walker.foot_centre_ahead_m=0.03", start])
@@ -117,7 +117,7 @@ def test_a_start_of_a_walker_with_its_feet_ahead_is_computed_on_the_slope():
     ("name", "mass", "numbers"),
     [("simplest", 1.0, 4), ("round-feet", 2.0, 4), ("kneed", 1.6, 6), ("kneed-round-feet", 1.6, 6), ("torso", 20.0, 6)],
 )
-def test_a_built_in_walker_has_its_mass_and_its_state(name, mass, numbers):
+def test_built_in_walkers_have_the_expected_mass_and_state_size(name, mass, numbers):
     config = load(Path(name)).config
     model = rigid_walker(config, "corrected")
     assert model.mass == pytest.approx(mass, rel=1e-11)
@@ -126,12 +126,12 @@ def test_a_built_in_walker_has_its_mass_and_its_state(name, mass, numbers):
     assert len(assembly_of(config.walker).feet) == 2
 
 
-def test_appendix_a_is_a_plain_compass_only():
+def test_appendix_a_applies_to_a_plain_compass_only():
     assert equation_sets(load().config) == ("corrected", "as-printed")
     assert equation_sets(load(Path("torso")).config) == ("corrected",)
 
 
-def test_equations_as_printed_are_beside_the_corrected_ones_for_the_papers_walker_only():
+def test_only_the_paper_walker_also_gets_the_printed_equations():
     assert equation_sets(load(None, ("slope_deg=3",)).config) == ("corrected", "as-printed")
     assert equation_sets(load(None, ("walker.hip_mass_kg=12",)).config) == ("corrected",)
     assert equation_sets(load(None, ("walker.hip_mass_kg=12", "equations=as-printed")).config) == ("as-printed",)
@@ -149,7 +149,7 @@ def test_equations_as_printed_are_beside_the_corrected_ones_for_the_papers_walke
         ("kneed", "start=[0.1, 0.1, 0.1, 0.1]", "6"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_with_the_reason(config, setting, said):
+def test_impossible_walkers_are_rejected_with_the_reason(config, setting, said):
     with pytest.raises(ConfigError) as refused:
         load(Path(config), [setting])
     assert said in str(refused.value)
@@ -164,7 +164,7 @@ def test_what_cannot_be_meant_is_refused_with_the_reason(config, setting, said):
         ("child: shank 2, child_point_m: [0.0, 0.0], locks: true", "child: thigh 1, child_point_m: [0.0, 0.0]", "loop"),
     ],
 )  # fmt: skip
-def test_parts_that_make_no_walker_are_refused_in_words(tmp_path, old, new, said):
+def test_parts_that_form_no_walker_are_rejected(tmp_path, old, new, said):
     (text,) = re.findall(r"```yaml\n(name: own-parts.*?)```", DOCS.read_text(), re.DOTALL)
     assert old in text
     path = tmp_path / "broken.yaml"

@@ -47,12 +47,12 @@ def rows(reference):
     return [measured(method, rtol, reference) for method in FEW for rtol in LADDER]
 
 
-def test_the_reference_is_known_to_rounding_and_by_two_ways(reference):
+def test_two_methods_agree_on_the_reference_to_rounding(reference):
     assert reference.first.method != reference.second.method
     assert reference.agreement < 1e-13
 
 
-def test_a_walker_that_taylor_series_cannot_walk_is_known_by_two_ways_too():
+def test_reference_without_taylor_series_also_has_two_methods():
     """Neither is then the Taylor method: the closed form is that of a compass."""
     reference = reference_for(replace(TRIAL, compass=None, steps=1))
     assert {reference.first.method, reference.second.method} == {"dop853", "radau5"}
@@ -66,30 +66,30 @@ def test_every_method_converges_to_the_reference(rows):
         assert errors[-1] < 1e-8
 
 
-def test_our_compiled_methods_and_scipys_agree_to_what_the_tolerances_promise(rows):
+def test_compiled_and_scipy_methods_agree_within_tolerance(rows):
     tightest = {row.method: row.error for row in rows if row.tolerance == LADDER[-1]}
     assert max(tightest.values()) < 100 * LADDER[-1]
 
 
-def test_a_script_with_numpy_needs_the_work_of_the_same_method(rows):
+def test_numpy_script_needs_the_same_work_as_the_method(rows):
     work = {row.method: row.rhs_evaluations for row in rows if row.tolerance == 1e-7}
     assert 0.5 * work["scipy-dop853"] < work[USER_SCRIPT] <= work["scipy-dop853"]
 
 
-def test_content_is_the_same_each_time_apart_from_timings(reference, rows):
+def test_content_is_reproducible_apart_from_timings(reference, rows):
     again = measured("dop853", 1e-7, reference)
     first = next(row for row in rows if row.method == "dop853" and row.tolerance == 1e-7)
     timings = {"wall_s": 0.0, "least_wall_s": 0.0, "largest_wall_s": 0.0, "repeats_of_wall_s": 0}
     assert replace(again, **timings) == replace(first, **timings)
 
 
-def test_timings_are_marked_as_such(rows):
+def test_timings_are_marked_as_timings(rows):
     variables = rows_group(rows, labels_of(MethodRow)).variables
     timings = {"wall_s", "least_wall_s", "largest_wall_s", "repeats"}
     assert {name for name, variable in variables.items() if variable.timing} == timings
 
 
-def test_no_method_is_measured_by_its_own_end(rows, reference):
+def test_no_method_is_compared_with_its_own_result(rows, reference):
     assert all(row.against != row.method for row in rows)
     near = Reference(End("dop853", np.zeros(4)), End("radau5", np.full(4, 1e-12)))
     assert near.agreement == 1e-12
@@ -97,7 +97,7 @@ def test_no_method_is_measured_by_its_own_end(rows, reference):
     assert {near.for_method(method).method for method in ("radau5", "scipy-radau")} == {"dop853"}
 
 
-def test_an_error_below_what_the_reference_is_known_to_is_marked():
+def test_error_below_the_uncertainty_of_the_reference_is_marked():
     unsure = Reference(End("heyoka-taylor", np.zeros(4)), End("dop853", np.full(4, 1e-8)))
     ends = {1e-4: 2e-8, 1e-8: 1e-9}
     climbed = Ascent(TRIAL, "radau5", tuple(ends), ())
@@ -105,7 +105,7 @@ def test_an_error_below_what_the_reference_is_known_to_is_marked():
     assert [make_row(climbed, run, unsure).within_reference for run in runs] == [False, True]
 
 
-def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkeypatch):
+def test_exhausted_budget_is_shown_and_stops_tightening(reference, monkeypatch):
     monkeypatch.setattr(ladder, "RUN_BUDGET", 500)
     one = ascend(TRIAL, "radau5", Checkpoint(None, ""))
     rows = [make_row(one, run, reference) for run in one.runs]
@@ -116,7 +116,7 @@ def test_an_exhausted_budget_stays_visible_and_ends_the_ladder(reference, monkey
     assert all("budget-exhausted" in entry["why"] for entry in not_run)
 
 
-def test_a_librarys_series_ends_with_the_run_that_exhausts_its_budget(reference, monkeypatch):
+def test_library_series_stops_at_the_first_exhausted_budget(reference, monkeypatch):
     sizes = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853", Checkpoint(None, "")).runs]
     monkeypatch.setattr(ladder, "LIBRARY_RUN_BUDGET", sizes[2] - 1)
     monkeypatch.setattr(ladder, "LAST_RUN_SIZE", sizes[1] + 1)
@@ -148,7 +148,7 @@ class StopsAfter:
         return counted_run
 
 
-def test_a_stopped_measurement_resumes_with_the_runs_that_it_has_finished(tmp_path):
+def test_interrupted_measurement_resumes_with_its_finished_runs(tmp_path):
     path = tmp_path / "accuracy.parts"
     with pytest.raises(KeyboardInterrupt):
         ascend(StopsAfter(30), "dop853", Checkpoint(path, "key"))
@@ -163,7 +163,7 @@ def test_a_stopped_measurement_resumes_with_the_runs_that_it_has_finished(tmp_pa
         assert run.result.rhs_evaluations == same.result.rhs_evaluations
 
 
-def test_a_stopped_measurement_keeps_its_references(tmp_path):
+def test_interrupted_measurement_keeps_its_references(tmp_path):
     path = tmp_path / "accuracy.parts"
     end = accuracy.resumed_end(TRIAL, "first end", first_end, Checkpoint(path, "key"))
     assert accuracy.resumed_end(TRIAL, "first end", None, Checkpoint(path, "key")).packed() == end.packed()
@@ -186,7 +186,7 @@ class SlowAtFirst:
         return TrialRun("walked", np.zeros(4), 1, 1, 0)
 
 
-def test_compiling_is_not_measured(reference, monkeypatch):
+def test_compilation_is_not_timed(reference, monkeypatch):
     trial = SlowAtFirst()
     monkeypatch.setattr(ladder.time, "perf_counter", lambda: trial.clock)
     ascent = ascend(trial, "dop853", Checkpoint(None, ""))
@@ -210,18 +210,18 @@ MADE = [
 ]
 
 
-def test_the_best_is_the_fastest_that_is_exact_enough():
+def test_best_method_is_the_fastest_that_is_accurate_enough():
     assert best_methods(MADE, "rigid") == {"1e-3": "dop853", "1e-6": "radau5", "1e-9": "dop853"}
     assert best_methods(MADE, "contact") == {}
 
 
-def test_the_conclusion_compares_with_the_best_library():
+def test_conclusion_compares_with_the_best_library():
     said = conclusion(MADE, "rigid")
     assert "at 1e-06, radau5 is fastest with 2e+03 ms, 4 times faster than scipy-bdf" in said
     assert "no method reaches" not in said
 
 
-def test_the_factor_over_a_library_is_told_as_work_of_the_method_times_cost_of_a_right_hand_side():
+def test_speedup_over_a_library_is_split_into_work_and_cost_per_evaluation():
     said = conclusion(MADE, "rigid")
     # 1600 against 800 right-hand sides, 8 s against 2 s: twice as many, each twice as costly
     factors = "a factor of 2 from fewer right-hand sides, and 2 from the total cost of each: 2500 µs against 5000 µs"
@@ -231,12 +231,12 @@ def test_the_factor_over_a_library_is_told_as_work_of_the_method_times_cost_of_a
     assert "0.5 from more right-hand sides, and 8 from the total cost of each" in conclusion(more, "rigid")
 
 
-def test_a_script_with_a_right_hand_side_of_its_own_is_not_the_library_of_the_factor():
+def test_speedup_is_not_computed_against_the_numpy_script():
     script = [made("dop853", 1e-4, 1.0), made(USER_SCRIPT, 1e-4, 5.0), made("scipy-bdf", 1e-4, 8.0)]
     assert "8 times faster than scipy-bdf" in conclusion(script, "rigid")
 
 
-def test_a_reference_says_by_whom_it_is_and_what_it_took(reference):
+def test_reference_states_its_method_and_cost(reference):
     summary = summarise([], [], {"rigid": reference})["reference"]["rigid"]
     assert summary["from_outside"] == (reference.first.method == "heyoka-taylor")
     ours = reference_for(replace(TRIAL, compass=None, steps=1))
@@ -246,7 +246,7 @@ def test_a_reference_says_by_whom_it_is_and_what_it_took(reference):
     assert told["rhs_evaluations"] == ours.first.rhs_evaluations > 100
 
 
-def test_the_summary_has_the_fixed_keys(rows, reference):
+def test_summary_has_the_expected_keys(rows, reference):
     summary = summarise(rows, [], {"rigid": reference})
     assert {"rows", "repeats", "reference", "best"} <= summary.keys()
     fixed = {"scene", "method", "tolerance", "error", "wall_s", "rhs_evaluations", "accepted", "rejected", "outcome"}
@@ -255,12 +255,12 @@ def test_the_summary_has_the_fixed_keys(rows, reference):
     assert {"method", "second_method", "agreement", "state"} <= summary["reference"]["rigid"].keys()
 
 
-def test_a_walk_that_ends_early_has_no_reference():
+def test_walk_that_ends_early_has_no_reference():
     lying = replace(TRIAL, start=(-1.6, 1.6, 0.0, 0.0))
     with pytest.raises((WalkEndsError, ValueError)):
         reference_for(lying)
 
 
-def test_a_walk_that_ends_early_is_said_to_start_off_the_gait():
+def test_early_end_is_explained_by_a_start_off_the_gait():
     entry = accuracy.omitted_scene(RigidTrial(None, None, 1, None), WalkEndsError("the walk ends early (fell)"))
     assert entry["why"] == "started with velocities scaled by 0.98, the walk ends early (fell)"

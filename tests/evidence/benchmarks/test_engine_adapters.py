@@ -43,7 +43,7 @@ def swing(engine, integrator, step_s, tolerance=None, walker=compass):
 
 
 @pytest.mark.parametrize("walker", [compass, kneed])
-def test_swings_converge_to_ours_with_the_order_that_is_promised(engine, walker):
+def test_swings_in_an_engine_converge_at_the_stated_order(engine, walker):
     for name, entry in engine.adapter().INTEGRATORS.items():
         if entry.adapts:
             continue
@@ -51,21 +51,21 @@ def test_swings_converge_to_ours_with_the_order_that_is_promised(engine, walker)
         assert np.log2(coarse / fine) == pytest.approx(entry.order, abs=0.2), name
 
 
-def test_energy_drifts_no_more_than_the_swing_errs(engine):
+def test_energy_drift_is_bounded_by_the_swing_error(engine):
     for name, entry in engine.adapter().INTEGRATORS.items():
         error, drift = swing(engine, name, 1e-3, 1e-8 if entry.adapts else None)
         # at most 25 kg m^2/s^2 per unit of angle or velocity
         assert drift < 25.0 * error + 1e-12, name
 
 
-def test_a_ball_rests_where_the_law_has_it(engine):
+def test_ball_rests_at_the_depth_of_the_law(engine):
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
         assert task.at_rest() == pytest.approx(target.penetration, rel=2e-3), contact
 
 
-def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
+def test_block_creeps_and_slides_according_to_the_law(engine):
     """By the closed forms of its friction; a convex one, which lifts a block that slides, has another."""
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
@@ -78,7 +78,7 @@ def test_a_block_creeps_and_slides_as_the_law_has_it(engine):
 
 
 @pytest.mark.parametrize("locked", [(BENT, BENT), (BENT, LOCKED), (LOCKED, LOCKED)])
-def test_both_feet_of_a_kneed_walker_get_the_same_spring_from_mujoco(locked):
+def test_mujoco_gives_both_feet_of_a_kneed_walker_the_same_spring(locked):
     mujoco = pytest.importorskip("mujoco")
     scene = kneed().with_knees_locked(np.array(locked, np.int8))
     own = tuned("soft", contact_target(scene))
@@ -92,7 +92,7 @@ def test_both_feet_of_a_kneed_walker_get_the_same_spring_from_mujoco(locked):
     assert model.pair_solref[pairs] / scales == pytest.approx(np.array(expected), rel=1e-9)
 
 
-def test_a_knee_locks_in_an_engine_as_in_our_walk(engine):
+def test_knee_locks_in_an_engine_as_in_walkerlab(engine):
     """The engine's own swing with a free knee, the lock, and its own swing with one body less."""
     scene = kneed()
     until = 0.4
@@ -118,7 +118,7 @@ DRIVES = {
 
 
 @pytest.mark.parametrize("drives", DRIVES)
-def test_our_law_in_an_engine_is_our_walk(engine, drives):
+def test_same_contact_law_gives_the_same_walk_in_an_engine(engine, drives):
     """To the first touch and through it: of first order, by a factor that hangs on where in a step the touch falls."""
     scene = compass(*DRIVES[drives])
     until = 0.8
@@ -134,7 +134,7 @@ def test_our_law_in_an_engine_is_our_walk(engine, drives):
     assert errors[1] < 1e-2
 
 
-def test_a_run_is_the_same_each_time(engine):
+def test_runs_are_reproducible(engine):
     scene = compass()
     contact, integrator = next(iter(engine.adapter().CONTACTS.items()))
     own = engine.adapter().tuned(contact, contact_target(scene))
@@ -146,6 +146,6 @@ def test_a_run_is_the_same_each_time(engine):
     assert ends[0].steps == ends[1].steps
 
 
-def test_nothing_of_an_engine_is_imported_by_its_adapter(engine):
+def test_adapter_does_not_import_its_engine(engine):
     module = importlib.import_module(f"walkerlab.evidence.benchmarks.engines.{engine.name}")
     assert not any(getattr(value, "__name__", "").split(".")[0] == engine.module for value in vars(module).values())

@@ -40,7 +40,7 @@ def ours():
 
 
 @pytest.mark.parametrize("name", PHYSICS_ENGINES)
-def test_the_swing_with_a_free_knee_converges_to_the_rigid_models_with_the_order_that_is_promised(name, ours):
+def test_free_knee_swing_converges_to_the_rigid_model_at_the_stated_order(name, ours):
     engine = PHYSICS_ENGINES[name]
     pytest.importorskip(engine.module, reason=f"{name} is not installed: {engine.install_line}")
     foot = KNEED.feet[STANCE]

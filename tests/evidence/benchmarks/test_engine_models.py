@@ -35,12 +35,12 @@ def our_samples(scene, interval_s, steps):
     return result, result.samples
 
 
-def test_coordinates_lead_to_an_engine_and_back(scene):
+def test_engine_coordinates_survive_a_round_trip(scene):
     q, v = scene.from_base(scene.start)
     assert scene.about_centre(q, v) == pytest.approx(scene.start, abs=1e-14)
 
 
-def test_the_whole_mass_goes_over_with_its_centre(scene):
+def test_total_mass_and_its_centre_are_preserved(scene):
     model = scene.model
     assert sum(link.mass_kg for link in model.links) == pytest.approx(20.0)
     hip_leg = model.links[0]
@@ -49,7 +49,7 @@ def test_the_whole_mass_goes_over_with_its_centre(scene):
     assert hip_leg.inertia_kg_m2 == pytest.approx(5.0 * 10.0 / 15.0 * 0.25)
 
 
-def test_locked_thigh_and_shank_are_one_body_and_the_released_ones_two():
+def test_locked_leg_is_one_body_and_released_leg_is_two():
     scene = kneed()
     stance, *swing = scene.model.links
     assert [link.name for link in swing] == ["thigh 1", "shank 1"]
@@ -63,7 +63,7 @@ def test_locked_thigh_and_shank_are_one_body_and_the_released_ones_two():
     assert scene.model.balls[1].centre_m[1] == pytest.approx(-1.0)
 
 
-def test_feet_ahead_of_the_shanks_are_ahead_in_an_engine_too():
+def test_feet_ahead_of_the_shanks_keep_their_offset_in_an_engine():
     config = load(Path("kneed"), ["walker.foot_centre_ahead_m=0.03", "walker.foot_radius_m=0.2"]).config
     gait = answer_in_memory(config, "fixedpoint", MemoryResults()).summary
     scene = supported_scene(config, gait["step_length_m"], tuple(gait["state"]))
@@ -75,7 +75,7 @@ def test_feet_ahead_of_the_shanks_are_ahead_in_an_engine_too():
 
 
 @pytest.mark.parametrize("doing", [(BENT, BENT), (LOCKED, BENT), (LOCKED, LOCKED)])
-def test_coordinates_of_a_kneed_walker_lead_to_an_engine_and_back(doing):
+def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
     scene = kneed().with_knees_locked(np.array(doing, np.int8))
     y = np.array(scene.start)
     for knee in scene.locked:
@@ -107,7 +107,7 @@ def knees_seen(scene):
     return result, rules, changes
 
 
-def test_the_rules_see_knees_lock_and_be_released_as_in_our_own_walk():
+def test_rules_detect_the_same_knee_locks_and_releases_as_the_contact_walk():
     result, rules, changes = knees_seen(kneed())
     # the swing knee locks, the trailing one is released and locks in turn
     assert [places for _, _, places in changes] == [(-1, -1), (-1, 4), (-1, -1)]
@@ -118,14 +118,14 @@ def test_the_rules_see_knees_lock_and_be_released_as_in_our_own_walk():
     assert rules.walk_state.touch_time[:1] == pytest.approx(result.touch_time_s[:1], abs=1e-5)
 
 
-def test_a_knee_that_a_touch_releases_is_free_from_the_next_step_on():
+def test_knee_released_by_a_touch_is_free_from_the_next_solver_step():
     result, _, changes = knees_seen(kneed("walker.knee={release: touch}"))
     time_s, before, after = changes[1]
     assert 0.0 <= time_s - result.touch_time_s[0] < 1e-4
     assert (before, after) == ((-1, -1), (-1, 4))
 
 
-def test_a_knee_that_a_push_holds_is_free_as_it_ends():
+def test_knee_held_during_a_push_is_released_at_its_end():
     push = ("push_off.impulse_N_s=0.05", "push_off.duration_s=0.02")
     for rule in ("touch", "compression"):
         result, _, changes = knees_seen(kneed(*push, f"walker.knee={{release: {rule}}}"))
@@ -137,7 +137,7 @@ def test_a_knee_that_a_push_holds_is_free_as_it_ends():
 DRIVEN = ("push_off.impulse_N_s=1", "walker.hip.spring_N_m_per_rad=2", "walker.hip.torque_N_m=0.3")
 
 
-def test_forces_of_drives_do_the_work_that_our_walk_gives():
+def test_drive_forces_do_the_same_work_as_in_the_contact_walk():
     """In the twentieth of a second after the first touch."""
     scene = compass(*DRIVEN)
     tight = Tolerances("radau5", 1e-9, 1e-11, 10**6)
@@ -156,21 +156,21 @@ def test_forces_of_drives_do_the_work_that_our_walk_gives():
     assert np.trapezoid(powers, samples.time_s[begin : end + 1]) == pytest.approx(given, rel=1e-5)
 
 
-def test_a_torso_and_a_stop_that_gives_are_refused_in_words():
+def test_torso_and_compliant_knee_stop_are_rejected():
     with pytest.raises(ConfigError, match="compliant stop"):
         kneed("walker.knee={lock: compliant}")
     with pytest.raises(ConfigError, match="torso"):
         kneed("walker.torso={mass_kg: 1.0, above_hip_m: 0.1}")
 
 
-def test_a_pinned_walker_hangs_from_its_stance_foot(scene):
+def test_pinned_walker_hangs_from_its_stance_foot(scene):
     model = pinned_model(scene)
     assert model.freedoms == ("turn",)
     assert model.links[0].point_m == scene.assembly.feet[STANCE_FOOT].centre_m
     assert model.chain.tolist() == [[1.0, 1.0], [1.0, 0.0]]
 
 
-def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
+def test_ground_forces_do_the_work_measured_at_the_feet(scene):
     """Generalised forces times velocities equal the contact forces times the velocities of their points."""
     _, samples = our_samples(scene, 0.05, 3)
     for i in range(1, 20):
@@ -190,7 +190,7 @@ def test_forces_of_the_ground_do_the_work_that_the_feet_see(scene):
         assert forces @ v == pytest.approx(power, rel=1e-9, abs=1e-9)
 
 
-def test_the_rules_see_our_own_walk_as_it_was(scene):
+def test_rules_reproduce_touches_and_slip_of_the_contact_walk(scene):
     result, samples = our_samples(scene, 1e-4, 4)
     rules = RuleFollower(scene, 4, *scene.from_base(scene.start))
     for time_s, y in zip(samples.time_s[1:], samples.states[1:], strict=True):
@@ -203,21 +203,21 @@ def test_the_rules_see_our_own_walk_as_it_was(scene):
     assert rules.walk_state.slip[:3] == pytest.approx(result.slip_m[:3], abs=bound)
 
 
-def test_a_walk_whose_numbers_are_lost_is_a_failed_solver(scene):
+def test_walk_with_nan_states_counts_as_solver_failure(scene):
     q, v = scene.from_base(scene.start)
     rules = RuleFollower(scene, 4, q, v)
     rules.follow(1e-3, np.full_like(q, np.nan), v)
     assert rules.outcome is Outcome.SOLVER_FAILED
 
 
-def test_a_walker_whose_hip_is_low_has_fallen(scene):
+def test_walker_with_a_low_hip_has_fallen(scene):
     q, v = scene.from_base(scene.start)
     rules = RuleFollower(scene, 4, q, v)
     rules.follow(1e-3, q - np.array((0.0, 0.6, 0.0, 0.0)), v)
     assert rules.outcome is Outcome.FELL
 
 
-def test_a_touch_between_two_steps_is_that_of_the_cubic():
+def test_touch_time_between_two_solver_steps_comes_from_a_cubic():
     h, touch = 0.1, 0.037
 
     def height(t):
@@ -229,7 +229,7 @@ def test_a_touch_between_two_steps_is_that_of_the_cubic():
     assert h * crossing(height(0.0), velocity(0.0), height(h), velocity(h), h) == pytest.approx(touch, abs=1e-15)
 
 
-def test_the_target_of_tuning_is_the_law_under_the_weight_of_the_walker():
+def test_tuning_targets_the_law_under_the_weight_of_the_walker():
     scene = compass()
     target = contact_target(scene)
     law = scene.ours.normal
@@ -238,5 +238,5 @@ def test_the_target_of_tuning_is_the_law_under_the_weight_of_the_walker():
     assert -friction_coefficient(scene.ours.friction, target.creep_velocity)[0] == pytest.approx(CREEP_LOAD)
 
 
-def test_there_is_nothing_to_tune_on_frictionless_ground():
+def test_frictionless_ground_needs_no_tuning():
     assert contact_target(compass("contact.friction=none")) is None

@@ -18,23 +18,23 @@ def own():
         yield one
 
 
-def test_results_come_back_and_what_an_engine_prints_does_not(own, capfd):
+def test_engine_results_are_returned_without_its_printed_output(own, capfd):
     assert [own.do(Answers(number).run, 30.0) for number in (1, 2)] == [1, 2]
     assert "engines talk" not in capfd.readouterr().out
 
 
-def test_a_crash_is_told_with_its_code_and_the_next_task_runs(own):
+def test_crash_is_reported_with_its_code_and_the_next_task_runs(own):
     lost = own.do(Crashes().run, 30.0)
     assert isinstance(lost, TaskLost)
     assert "-11" in lost.why
     assert own.do(Answers(3).run, 30.0) == 3
 
 
-def test_an_exception_is_told_in_its_words(own):
+def test_exception_is_reported_with_its_message(own):
     assert own.do(Raises().run, 30.0) == TaskLost("RuntimeError: bad model")
 
 
-def test_what_takes_for_ever_is_ended(own, monkeypatch):
+def test_endless_task_is_terminated(own, monkeypatch):
     assert own.do(Answers(1).run, 30.0) == 1
     lost = own.do(Sleeps().run, 0.2)
     assert isinstance(lost, TaskLost)
@@ -43,7 +43,7 @@ def test_what_takes_for_ever_is_ended(own, monkeypatch):
     assert own.do(Answers(2).run, 1.0) == 2
 
 
-def test_who_stops_waiting_ends_what_runs(own):
+def test_abandoned_task_is_terminated(own):
     assert own.do(Answers(1).run, 30.0) == 1
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(own.do, Sleeps().run, 60.0)
@@ -53,7 +53,7 @@ def test_who_stops_waiting_ends_what_runs(own):
         own.do(Answers(2).run, 1.0)
 
 
-def test_a_lost_run_took_no_time_that_anybody_knows():
+def test_failed_run_has_no_run_time_or_error():
     scene = SimpleNamespace(name="compass")
     experiment = EngineExperiment(scene, "engine", "1.0", "own-law")
     row = experiment.row("rule", Stepping("rule", 1e-4), TaskLost("it crashed"))

@@ -22,21 +22,21 @@ from walkerlab.pipeline.store.key import differences
 ABSENT = Engine("absent", "no_such_engine_module")
 
 
-def test_an_engine_that_is_absent_is_told_with_its_install_line(monkeypatch):
+def test_missing_engine_is_reported_with_its_install_command(monkeypatch):
     monkeypatch.setattr(engines, "PHYSICS_ENGINES", {"absent": ABSENT})
     assert engines.missing_engines() == [
         {"what": "engine absent", "why": "not installed: pip install absent"},
     ]
 
 
-def test_without_any_engine_there_is_no_answer_but_the_extra(monkeypatch):
+def test_without_engines_the_advice_is_to_install_the_extra(monkeypatch):
     monkeypatch.setattr(engines, "installed", lambda: ())
     with pytest.raises(NoAnswer) as caught:
         engines.run(load().config, {}, Silent())
     assert "walkerlab[engines]" in caught.value.advice
 
 
-def test_another_version_of_an_engine_makes_another_key(monkeypatch):
+def test_engine_version_changes_the_result_key(monkeypatch):
     config = load().config
     monkeypatch.setattr(registry, "installed", lambda: (ABSENT,))
     monkeypatch.setattr(Engine, "version", "1.0")
@@ -53,14 +53,14 @@ def install(folder, name, version):
 
 
 @pytest.mark.parametrize("installed", [{"robot-core": "4.1"}, {"robot-core": "4.1", "robot": "4.0"}, {"robot": "4.1"}])
-def test_the_version_of_an_engine_is_that_of_its_library(installed, tmp_path, monkeypatch):
+def test_engine_version_is_that_of_its_library(installed, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     for name, version in installed.items():
         install(tmp_path, name, version)
     assert Engine("robot", "robot", "robot-core").version == "4.1"
 
 
-def test_mujoco_may_be_installed_as_its_core_alone(tmp_path, monkeypatch):
+def test_mujoco_core_package_is_sufficient(tmp_path, monkeypatch):
     monkeypatch.setattr("sys.path", [str(tmp_path)])
     install(tmp_path, "mujoco-core", "4.0.1")
     assert PHYSICS_ENGINES["mujoco"].version == "4.0.1"
@@ -84,7 +84,7 @@ class LosesEverything:
     ],
     ids=["crash", "time-out"],
 )
-def test_a_run_that_is_lost_is_a_row_and_what_takes_for_ever_is_not_refined(lost, outcome, rungs):
+def test_failed_run_is_a_row_and_a_timed_out_run_is_not_refined(lost, outcome, rungs):
     scene = supported_scene(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
     engine = replace(ABSENT, name="exudyn")
     runs = EngineOnScene(engine, scene, truth(), LosesEverything(lost)).same_law()
@@ -100,7 +100,7 @@ def test_every_engine_has_an_adapter_with_one_signature():
         assert adapter.CANNOT_EXPRESS
 
 
-def test_ratios_are_of_the_quickest_runs_that_are_exact_enough():
+def test_speed_ratios_use_the_fastest_sufficiently_accurate_runs():
     found = ratios(ROWS)
     # ours 5 ms at 1e-3; mujoco 0.4 s, and its run of 0.1 s is not exact enough
     assert found["1e-3"]["mujoco"] == pytest.approx(0.4 / 0.005)
@@ -108,32 +108,32 @@ def test_ratios_are_of_the_quickest_runs_that_are_exact_enough():
     assert found["1e-5"]["drake"] == pytest.approx(2.0 / 0.006)
 
 
-def test_the_closest_contact_is_judged_at_its_smallest_step():
+def test_closest_contact_is_judged_at_its_smallest_step():
     best = closest(ROWS)
     assert (best["engine"], best["contact"]) == ("drake", "lagged")
     assert best["period_error_s"] == pytest.approx(6e-4)
 
 
-def test_a_contact_that_does_not_walk_to_the_end_is_not_the_closest():
+def test_contact_with_an_unfinished_walk_is_not_the_closest():
     fallen = [replace(one, error=None, outcome="fell") if one.engine == "drake" else one for one in ROWS]
     assert closest(fallen)["engine"] == "mujoco"
 
 
-def test_three_digits_need_every_smaller_step_to_have_them_too():
+def test_three_digits_must_hold_at_every_smaller_step_size():
     steps = three_digits(ROWS, truth())
     assert steps["same-law"] == {"mujoco RK4": 1e-4, "drake runge_kutta3": 2e-4}
     # mujoco's own period is 0.7125 and 0.7126 at the two smallest steps, and 0.675 at the largest
     assert steps["own-law"]["mujoco soft"] == pytest.approx(2.5e-4)
 
 
-def test_a_conclusion_names_the_closest_contact_its_cost_and_its_step():
+def test_conclusion_names_the_closest_contact_with_cost_and_step_size():
     text = content().summary["conclusions"]["compass"]["own-law"]
     assert text.startswith("The contact closest to ADAMS's law is 'lagged' of drake")
     assert "differs by 0.6 ms from" in text
     assert "fell after 3 steps" in text
 
 
-def test_a_period_that_has_settled_is_told_apart_from_one_that_still_changes():
+def test_converged_and_changing_periods_are_distinguished():
     rows = [replace(one, period_s=0.71251) if one.period_s == 0.7125 else one for one in ROWS]
     rows = [replace(one, period_s=0.71252) if one.period_s == 0.7126 else one for one in rows]
     text = content(rows).summary["conclusions"]["compass"]["own-law"]
@@ -142,38 +142,38 @@ def test_a_period_that_has_settled_is_told_apart_from_one_that_still_changes():
     assert "still changes these periods: drake lagged by 4.3 ms." in text
 
 
-def test_what_the_last_halving_divides_the_error_by_is_told():
+def test_error_ratio_of_the_last_halving_is_reported():
     found = content().summary["convergence"]["compass"]["same-law"]
     assert found["mujoco RK4"] == pytest.approx(4e-3 / 6e-4)
     assert "divides the error by: mujoco RK4 6.7" in content().summary["conclusions"]["compass"]["same-law"]
 
 
-def test_the_stored_result_is_the_same_whatever_the_run_times():
+def test_stored_result_does_not_depend_on_run_times():
     slower = [replace(one, wall_s=3.0 * one.wall_s) for one in ROWS]
     assert content(slower).digest() == content().digest()
     other = [replace(one, period_s=one.period_s and one.period_s + 1e-9) for one in ROWS]
     assert content(other).digest() != content().digest()
 
 
-def test_rows_have_the_keys_that_readers_rely_on():
+def test_rows_have_the_documented_keys():
     keys = {"engine", "version", "experiment", "step_s", "error", "wall_s", "period_s", "step_length_m", "outcome"}
     assert all(keys <= set(one) for one in content().summary["rows"])
 
 
-def test_tables_are_stored_whole():
+def test_complete_tables_are_stored():
     stored = content()
     assert stored["rows"].variables["engine"].values.size == len(ROWS)
     assert stored["swings"].variables["order"].values.size == len(SWINGS)
     assert stored["tuning"].variables["target"].values.size == len(TUNING)
 
 
-def test_a_start_of_another_speed_has_the_same_angles():
+def test_start_with_scaled_velocities_has_the_same_angles():
     scene = supported_scene(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
     slower = scene.started(0.95)
     assert slower.start[:4] == scene.start[:4]
     assert slower.start[4:] == pytest.approx([0.95 * x for x in scene.start[4:]])
 
 
-def test_a_row_of_another_start_is_not_among_those_from_the_gait():
+def test_rows_of_scaled_starts_are_excluded_from_those_of_the_gait():
     other = row("drake", "lagged", "own-law", 2.5e-4, 1e-9, 1.0, 0.711, start=0.95)
     assert closest([*ROWS, other])["period_error_s"] == pytest.approx(6e-4)

@@ -34,7 +34,7 @@ def lines_of(axes):
     return [line for line in axes.lines if len(line.get_xdata()) and line.get_marker() not in ("", "None", None)]
 
 
-def test_every_error_there_is_stands_against_its_run_time(results):
+def test_every_finite_error_is_plotted_over_run_time(results):
     with styled():
         left, right = ERRORS.draw(results)[0].axes
     for axes, experiment in ((left, "same-law"), (right, "own-law")):
@@ -43,7 +43,7 @@ def test_every_error_there_is_stands_against_its_run_time(results):
         np.testing.assert_allclose(drawn, sorted(there))
 
 
-def test_periods_stand_between_adams_law_and_the_rigid_gait(results):
+def test_period_axis_includes_the_adams_law_and_the_rigid_gait(results):
     with styled():
         (axes,) = PERIODS.draw(results)[0].axes
     levels = [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "None"]
@@ -59,7 +59,7 @@ def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
     assert {one.engine for one in every} <= set(COLOURS)
 
 
-def test_each_panel_has_its_own_legend_since_its_lines_may_look_like_those_of_the_other(results):
+def test_each_panel_has_its_own_legend(results):
     with styled():
         drawn = ERRORS.draw(results)[0]
     for axes, legend in zip(drawn.axes, drawn.legends, strict=True):
@@ -69,7 +69,7 @@ def test_each_panel_has_its_own_legend_since_its_lines_may_look_like_those_of_th
         assert looks == {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in lines_of(axes)}
 
 
-def test_a_panel_without_a_finished_walk_says_so():
+def test_panel_without_a_finished_walk_says_so():
     unfinished = {"engines": content([row for row in ROWS if row.experiment == "same-law" or row.engine == "exudyn"])}
     with styled():
         for figure, place in ((ERRORS, 1), (PERIODS, 0)):
@@ -78,17 +78,17 @@ def test_a_panel_without_a_finished_walk_says_so():
             assert as_file(drawn, "svg", figure.name, "")
 
 
-def test_captions_say_what_was_concluded_and_what_did_not_walk(results):
+def test_captions_state_conclusions_and_failed_walks(results):
     assert "Run time for an error of" in ERRORS.render(results).caption
     assert "Incomplete walks: mujoco soft at 0.0005 s" in PERIODS.render(results).caption
 
 
-def test_a_run_without_the_stage_has_neither_figure_nor_section():
+def test_figure_and_section_are_omitted_without_the_stage():
     assert ERRORS.why_left_out({}, {}) is not None
     assert section(Results(load().config, {})) is None
 
 
-def test_a_scene_that_was_not_walked_has_no_figure(results):
+def test_scene_without_a_walk_has_no_figure(results):
     reasons = {figure.name: figure.why_left_out(results, {}) for figure in FIGURES if figure.name.startswith("engines")}
     unwalked = "engines: the scene kneed was not walked"
     assert reasons == {
@@ -104,7 +104,7 @@ def test_conclusions_come_first_in_the_section(made):
     assert [item.about for item in made.blocks[1].items] == ["compass, same law", "compass, own contact"]
 
 
-def test_every_run_has_its_row(made):
+def test_every_run_has_a_row(made):
     tables = {block.caption: block for block in made.blocks if isinstance(block, Table)}
     for caption, experiment, more in (
         ("ADAMS's law in each engine's integrators", "same-law", 0),
@@ -114,7 +114,7 @@ def test_every_run_has_its_row(made):
         assert len(rows) == more + sum(row.experiment == experiment for row in ROWS)
 
 
-def test_a_column_is_stored_printed_and_shown_by_the_label_of_its_field(results, made):
+def test_columns_have_the_same_label_in_file_terminal_and_report(results, made):
     label = labels_of(EngineRow)["step_s"]
     steps = [row.step_s for row in ROWS]
     stored = results["engines"]["rows"].variables["step_s"]
@@ -126,7 +126,7 @@ def test_a_column_is_stored_printed_and_shown_by_the_label_of_its_field(results,
     assert shown == pytest.approx([1e6 * row.step_s for row in ROWS if row.experiment == "same-law"])
 
 
-def test_every_number_of_a_run_is_stored_with_its_gaps(results):
+def test_every_value_of_a_run_is_stored_and_missing_ones_are_gaps(results):
     group = results["engines"]["rows"]
     for name in labels_of(EngineRow):
         told = [None if value != value else value for value in group[name].tolist()]
@@ -134,7 +134,7 @@ def test_every_number_of_a_run_is_stored_with_its_gaps(results):
     assert {name for name in group.variables if group.variables[name].timing} == {"wall_s"}
 
 
-def test_the_residual_of_tuning_is_shown(made):
+def test_residual_of_tuning_is_shown(made):
     table = next(block for block in made.blocks if isinstance(block, Table) and block.caption.startswith("Tuning"))
     assert next(iter(table.groups.values()))[0][-1].text == "-4.3 %"
     assert np.isclose(0.67 / 0.7 - 1.0, -0.043, atol=1e-3)

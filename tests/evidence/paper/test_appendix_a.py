@@ -64,7 +64,7 @@ def test_printed_foot_position_is_wrong_in_its_height():
     assert same(wrong[1, 0], 2 * paper.L * (sp.cos(paper.theta_1) - sp.cos(paper.theta_2)))
 
 
-def test_released_equations_hold_the_swing_phase_in_their_first_two_rows(released, swing):
+def test_first_two_rows_of_the_released_equations_are_the_swing_phase(released, swing):
     assert paper.differing(released.D[:2, :2], swing.D) == {}
     assert paper.differing(released.bias[:2, :], swing.bias) == {}
 
@@ -124,7 +124,7 @@ def close(value, expected, scale):
 
 
 @given(walkers, states)
-def test_accelerations_solve_lagranges_equations(numeric, walker, state):
+def test_accelerations_solve_lagrange_equations(numeric, walker, state):
     alpha = accelerations(walker, *state)
     D = numeric["D"](*arguments(walker, state))
     force = numeric["force"](*arguments(walker, state)).ravel()
@@ -143,7 +143,7 @@ def test_energies_are_those_of_the_masses(numeric, walker, state):
 
 
 @given(walkers, states)
-def test_ground_reaction_is_the_rate_of_momentum_and_the_weight(numeric, walker, state):
+def test_ground_reaction_is_the_momentum_rate_plus_the_weight(numeric, walker, state):
     alpha = accelerations(walker, *state)
     force_x, force_y = numeric["reaction"](*arguments(walker, state, alpha)).ravel()
     along, normal = ground_reaction(walker, *state)
@@ -157,7 +157,7 @@ def test_ground_reaction_is_the_rate_of_momentum_and_the_weight(numeric, walker,
 
 @settings(max_examples=30)
 @given(walkers, states)
-def test_as_printed_differs_in_the_stance_legs_equation_only(numeric, walker, state):
+def test_printed_equations_differ_only_in_the_row_of_the_stance_leg(numeric, walker, state):
     alpha = accelerations(walker._replace(c21_sign=AS_PRINTED), *state)
     D = numeric["D"](*arguments(walker, state))
     force = numeric["force"](*arguments(walker, state)).ravel()

@@ -105,7 +105,7 @@ def rows_of(content, where):
     return {row["quantity"]: row for row in content.summary["paper_numbers"] if row["where"] == where}
 
 
-def test_summary_has_what_is_promised(compared):
+def test_summary_has_the_documented_keys(compared):
     summary = compared().summary
     assert summary.keys() >= FIXED_KEYS
     assert all(row.keys() >= FIXED_COLUMNS for row in summary["paper_numbers"])
@@ -122,7 +122,7 @@ def test_summary_has_what_is_promised(compared):
     json.dumps(summary, allow_nan=False)
 
 
-def test_table_3_holds_the_walks(compared, study):
+def test_table_3_contains_the_walks(compared, study):
     table = compared().summary["table3"]
     assert table["t_left"]["as_printed"] == pytest.approx(study.as_printed.table_3.t_left, rel=1e-9)
     assert table["t_cycle"]["corrected"] == pytest.approx(2 * study.corrected.table_3.t_left, rel=1e-9)
@@ -132,7 +132,7 @@ def test_table_3_holds_the_walks(compared, study):
     assert (table["E_avg"]["paper_matlab"], table["E_avg"]["paper_adams"]) == (150.13, 150.14)
 
 
-def test_a_slower_copy_differs_at_the_same_time_and_not_at_the_same_phase(compared):
+def test_slower_copy_differs_in_time_but_not_in_phase(compared):
     summary = compared().summary
     angle, velocity = summary["max_angle_error_rad"], summary["max_velocity_error_rad_s"]
     assert angle["raw"] > 0.05 > 1e-3 > angle["aligned"]
@@ -142,11 +142,11 @@ def test_a_slower_copy_differs_at_the_same_time_and_not_at_the_same_phase(compar
     assert summary["left_out"] == []
 
 
-def test_a_start_off_the_fixed_point_is_a_departure(compared):
+def test_start_off_the_fixed_point_is_listed_as_a_departure(compared):
     assert compared().summary["departures"] == ["the start is not the rigid model's fixed point"]
 
 
-def test_stored_differences_are_those_of_the_summary(compared):
+def test_stored_differences_equal_those_in_the_summary(compared):
     content = compared()
     aligned, raw = content["aligned"], content["errors"]
     assert aligned["aligned_angle_error_rad"].shape == (10, aligned["phase"].size, 2)
@@ -154,7 +154,7 @@ def test_stored_differences_are_those_of_the_summary(compared):
     assert np.abs(raw["raw_velocity_error_rad_s"]).max() == content.summary["max_velocity_error_rad_s"]["raw"]
 
 
-def test_x_p_is_reproduced_and_its_misprint_told(compared):
+def test_x_p_is_reproduced_and_its_misprint_reported(compared):
     rows = rows_of(compared(), "eq. 11, Table 2")
     assert [row["verdict"] for row in rows.values()] == ["reproduced"] * 4
     assert_allclose(
@@ -171,7 +171,7 @@ def test_x_p_is_reproduced_and_its_misprint_told(compared):
         ("ground.roughness_m=0.001", "the ground is uneven"),
     ],
 )
-def test_another_walker_and_uneven_ground_are_not_judged_by_the_paper(compared, change, said):
+def test_other_walkers_and_uneven_ground_are_not_compared_with_the_paper(compared, change, said):
     content = compared(change)
     assert said in " ".join(content.summary["departures"])
     assert not {"verdicts", "paper_numbers", "table1", "errata"} & content.summary.keys()
@@ -190,12 +190,12 @@ def test_another_walker_and_uneven_ground_are_not_judged_by_the_paper(compared, 
         ("slope_deg=3", "slope_rad 0.0523599 instead of 0.0174"),
     ],
 )
-def test_departures_from_the_papers_scene_are_named(compared, change, said):
+def test_departures_from_the_scene_of_the_paper_are_named(compared, change, said):
     assert any(said in departure for departure in compared(change).summary["departures"])
 
 
 @pytest.mark.parametrize(("steps", "aligned", "orbit"), [(0, False, False), (1, True, False), (3, True, True)])
-def test_a_walk_that_ended_early_is_compared_as_far_as_it_went(compared, steps, aligned, orbit):
+def test_walk_that_ended_early_is_compared_up_to_its_end(compared, steps, aligned, orbit):
     content = compared(steps=steps, outcome="fell")
     summary = content.summary
     assert summary["max_angle_error_rad"]["raw"] is not None
@@ -206,7 +206,7 @@ def test_a_walk_that_ended_early_is_compared_as_far_as_it_went(compared, steps, 
     assert all("None" not in row["evidence"] for row in summary["paper_numbers"])
 
 
-def test_without_states_and_energies_the_numbers_are_still_held_against_the_walks(compared):
+def test_printed_values_are_compared_even_without_states_and_energies(compared):
     content = compared(leave_out=("angle", "velocity", "mechanical_J"))
     assert content.summary["max_angle_error_rad"]["raw"] is None
     assert content.summary["table3"]["E_avg"]["contact"] is None
@@ -214,13 +214,13 @@ def test_without_states_and_energies_the_numbers_are_still_held_against_the_walk
     assert {"outputs" in entry["why"] for entry in content.summary["left_out"]} == {True}
 
 
-def test_a_walk_that_ended_at_once_has_no_motion_to_compare(compared):
+def test_walk_that_ended_at_once_has_no_motion_to_compare(compared):
     content = compared(steps=0, outcome="off-pad", samples=1)
     assert content.summary["max_angle_error_rad"]["raw"] is None
     assert any("ended immediately" in entry["why"] for entry in content.summary["left_out"])
 
 
-def test_a_set_of_equations_without_a_gait_leaves_its_column_empty(compared, gaits):
+def test_equations_without_a_gait_leave_their_column_empty(compared, gaits):
     sets = dict(gaits.summary["equation_sets"], **{"as-printed": {"reason": "too steep"}})
     content = compared(fixedpoint=Content({}, {**gaits.summary, "equation_sets": sets}))
     assert {row["as_printed"] for row in rows_of(content, "Table 3").values()} == {None}
@@ -236,14 +236,14 @@ def test_errata_do_not_depend_on_the_config(compared):
     assert told(compared()) == told(compared("slope_deg=3", "contact.stiffness=1e6"))
 
 
-def test_the_result_is_the_same_to_the_last_bit_and_holds_no_gap(compared):
+def test_result_is_bitwise_reproducible_and_complete(compared):
     content = compared(steps=1, outcome="fell")
     assert content.digest() == compared(steps=1, outcome="fell").digest()
     variables = [variable for group in content.groups.values() for variable in group.variables.values()]
     assert not any(variable.missing for variable in variables)
 
 
-def test_columns_of_numbers_stand_in_the_rows_that_have_them(compared):
+def test_stored_columns_list_only_rows_with_a_value(compared):
     group, rows = compared()["paper_numbers"], compared().summary["paper_numbers"]
     for name in ("as_printed", "corrected", "contact"):
         found = dict(zip(group[f"{name}_row"].tolist(), group[name].tolist(), strict=True))
@@ -259,7 +259,7 @@ def stored(tmp_path_factory):
     return execute(loaded.config, "compare", folder)
 
 
-def test_the_papers_scene_departs_from_itself_in_nothing(stored):
+def test_scene_of_the_paper_has_no_departures(stored):
     assert stored.summary["departures"] == []
     assert [entry for entry in stored.left_out if not entry.saves] == []
     assert stored.summary["verdicts"] == {
@@ -272,7 +272,7 @@ def test_the_papers_scene_departs_from_itself_in_nothing(stored):
     }
 
 
-def test_contact_model_walks_five_cycles_from_the_fixed_point_and_lags(stored):
+def test_contact_walk_takes_five_cycles_and_lags_the_rigid_one(stored):
     summary = stored.summary
     rows = {(row["where"], row["quantity"]): row for row in summary["paper_numbers"]}
     assert rows["section 5, Fig. 7", "gait cycles walked"]["verdict"] == "input"
@@ -285,7 +285,7 @@ def test_contact_model_walks_five_cycles_from_the_fixed_point_and_lags(stored):
 @pytest.mark.parametrize(
     "group", ["paper_numbers", "errata", "table1", "table2", "table3", "errors", "aligned", "orbit"]
 )
-def test_artifact_opens_with_xarray_and_holds_finite_numbers(stored, group):
+def test_artifact_opens_in_xarray_with_finite_values(stored, group):
     with xarray.open_dataset(stored.artifact, group=group, engine="h5netcdf") as dataset:
         assert dataset.variables
         for variable in dataset.variables.values():

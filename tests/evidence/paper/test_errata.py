@@ -39,7 +39,7 @@ def found(study):
 
 
 @pytest.mark.parametrize(("name", "sign"), [("as_printed", 1.0), ("corrected", -1.0)])
-def test_energy_drift_is_that_of_another_integration(study, name, sign):
+def test_energy_drift_agrees_with_an_independent_integration(study, name, sign):
     model = getattr(study, name)
     swing = numpy_walker.swing(model.state, sign, SLOPE)
     record = np.array([numpy_walker.energy(swing.sol(t)) for t in np.linspace(0.0, swing.t[-1], 400)])
@@ -49,7 +49,7 @@ def test_energy_drift_is_that_of_another_integration(study, name, sign):
 
 
 @pytest.mark.parametrize(("name", "sign"), [("as_printed", 1.0), ("corrected", -1.0)])
-def test_fixed_points_come_back_after_a_step_of_another_integration(study, name, sign):
+def test_fixed_points_return_after_a_step_of_an_independent_integration(study, name, sign):
     model = getattr(study, name)
     before = tuple(numpy_walker.swing(model.state, sign, SLOPE).y[:, -1])
     after = velocities_after_impact(walker_of_the_paper(CORRECTED), before, RIGHT)
@@ -65,7 +65,7 @@ def test_only_the_sign_of_a_5_as_printed_gives_x_p():
     assert distance(study.corrected.state) > 10.0
 
 
-def test_impact_of_a_57_with_the_right_row_is_the_one_in_use():
+def test_corrected_impact_of_a_57_equals_the_one_in_use():
     walker = walker_of_the_paper(CORRECTED)
     after = velocities_after_impact(walker, BEFORE, RIGHT)
     theta_1, theta_2, omega_1, omega_2 = impact(walker, *BEFORE)
@@ -73,14 +73,14 @@ def test_impact_of_a_57_with_the_right_row_is_the_one_in_use():
     assert_allclose((after[1], after[0]), (omega_1, omega_2), rtol=1e-12)
 
 
-def test_the_new_stance_foot_rests_only_with_the_right_row():
+def test_new_stance_foot_is_at_rest_only_with_the_corrected_row():
     walker = walker_of_the_paper(CORRECTED)
     assert foothold_speed_after_impact(walker, BEFORE, RIGHT) < 1e-14
     assert foothold_speed_after_impact(walker, BEFORE, MISPRINTED) > 0.1
 
 
 @pytest.mark.parametrize("row_2", [RIGHT, MISPRINTED])
-def test_gradient_of_the_foot_is_its_difference(row_2):
+def test_gradient_of_the_foot_equals_its_difference(row_2):
     walker, h = walker_of_the_paper(CORRECTED), 1e-6
     E = swing_foot_gradient(walker, 0.3, -0.2, row_2)
     by_1 = (swing_foot(walker, 0.3 + h, -0.2, row_2) - swing_foot(walker, 0.3 - h, -0.2, row_2)) / (2 * h)
@@ -88,7 +88,7 @@ def test_gradient_of_the_foot_is_its_difference(row_2):
     assert_allclose(E, np.column_stack((by_1, by_2, np.eye(2))), atol=1e-9)
 
 
-def test_foot_of_x_p_is_on_the_slope_only_with_the_right_row():
+def test_foot_of_x_p_is_on_the_slope_only_with_the_corrected_row():
     walker, (theta_1, theta_2) = walker_of_the_paper(CORRECTED), (X_P[0].value, X_P[1].value)
     assert_allclose(
         swing_foot(walker, theta_1, theta_2, RIGHT), numpy_walker.positions((theta_1, theta_2))[3], atol=1e-15
@@ -97,14 +97,14 @@ def test_foot_of_x_p_is_on_the_slope_only_with_the_right_row():
     assert abs(height_over_slope(walker, theta_1, theta_2, MISPRINTED)) > 0.01
 
 
-def test_fixed_point_with_both_misprints_is_the_one_of_another_program():
+def test_fixed_point_with_both_misprints_agrees_with_an_independent_program():
     walker = walker_of_the_paper(AS_PRINTED)._replace(slope=np.pi / 180)
     state = fixed_point(walker, study_the_paper().as_printed.state, MISPRINTED)
     assert_allclose(state, (-0.2416, 0.2067, -0.2873, -0.9984), atol=5e-5)
     assert_allclose(step(walker, state, MISPRINTED), state, atol=1e-6)
 
 
-def test_inertia_of_the_impact_gives_the_masses_energy_for_angles_first(study):
+def test_inertia_of_the_impact_gives_the_kinetic_energy_with_angles_first(study):
     walker, rates = walker_of_the_paper(CORRECTED), np.array([-0.6, -0.84, 0.3, -0.2])
     q, h = np.array([-0.2022, 0.1674]), 1e-6
     ahead = numpy_walker.positions(q + h * rates[:2], h * rates[2:])[:3]
@@ -118,13 +118,13 @@ def test_inertia_of_the_impact_gives_the_masses_energy_for_angles_first(study):
     assert study.kinetic_energy["foot_first"] != pytest.approx(study.kinetic_energy["masses"], rel=0.05)
 
 
-def test_adams_start_has_the_energy_of_its_masses(study):
+def test_energy_of_the_adams_start_is_that_of_its_masses(study):
     start = [row.adams.value for row in TABLE_2]
     assert study.adams.energy == pytest.approx(numpy_walker.energy(start), rel=1e-8)
     assert study.adams.energy > 1.4 * 150.14
 
 
-def test_the_ground_would_have_to_pull_on_the_adams_start(study):
+def test_adams_start_needs_a_pulling_ground(study):
     start = [row.adams.value for row in TABLE_2]
     fall, h = numpy_walker.fall(start, -1.0, longest=0.3), 1e-5
 
@@ -139,14 +139,14 @@ def test_the_ground_would_have_to_pull_on_the_adams_start(study):
     assert normal_force(study.adams.pull_from - 0.002) > 0 > normal_force(study.adams.pull_from + 0.002)
 
 
-def test_percentages_of_table_2_are_exact_arithmetic():
+def test_percentages_of_table_2_follow_from_its_values():
     for row in TABLE_2:
         matlab, adams = (abs(Fraction(entry.text)) for entry in (row.matlab, row.adams))
         assert row.percent_of_matlab == pytest.approx(float(100 * (adams - matlab) / matlab), rel=1e-12)
         assert row.percent_of_adams == pytest.approx(float(100 * (adams - matlab) / adams), rel=1e-12)
 
 
-def test_speeds_that_differ_by_less_than_a_percent_take_a_cycle_that_is_not_the_sum_of_its_steps():
+def test_printed_cycle_is_not_the_sum_of_its_steps():
     assert speed_difference(1.39, 1.38) < 1.0 < speed_difference(0.60 + 0.79, 0.59 + 0.77)
 
 
@@ -171,7 +171,7 @@ def test_speeds_that_differ_by_less_than_a_percent_take_a_cycle_that_is_not_the_
         "Table 3, velocity, and the step length of section 5",
     ],
 )
-def test_every_erratum_has_what_is_printed_what_is_right_and_numbers(found, where):
+def test_every_erratum_has_printed_and_correct_text_and_values(found, where):
     erratum = found[where]
     assert erratum.printed
     assert erratum.right
@@ -181,7 +181,7 @@ def test_every_erratum_has_what_is_printed_what_is_right_and_numbers(found, wher
     assert "nan" not in erratum.measured
 
 
-def test_errata_say_the_measured_numbers(found):
+def test_errata_quote_the_measured_values(found):
     assert "0.1286 J as printed" in found["A.5 row 2, A.29"].measured
     assert "13 equation numbers" in found["Appendix A"].measured
     assert "1.36 s" in found["Table 3, cycle of MSC ADAMS"].measured
@@ -189,7 +189,7 @@ def test_errata_say_the_measured_numbers(found):
     assert "cut off" in found["eq. 11, x_p"].measured
 
 
-def test_the_contact_parameters_have_three_readings(found):
+def test_contact_parameters_have_three_readings(found):
     """In a model in metres 10^8 N/m^2.2 carry 20 kg 2.5 mm deep; 1000^1.2 times more carry them 0.06 mm deep."""
     measured = found["section 4, Fig. 4b"].measured
     weight = 20 * 9.81

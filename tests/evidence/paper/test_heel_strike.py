@@ -39,7 +39,7 @@ def printed_system(walker, theta_1, theta_2, w_1, w_2, foot_row_2):
 
 
 @given(walkers, half_angles, rates, rates)
-def test_impact_solves_the_papers_system_with_the_foot_where_it_is(walker, half_angle, w_1, w_2):
+def test_impact_solves_the_system_of_the_paper_at_the_actual_foot_position(walker, half_angle, w_1, w_2):
     theta_1, theta_2 = at_heel_strike(walker, half_angle)
     L = walker.leg_length
     height_row = [L * math.sin(theta_1), -L * math.sin(theta_2), 0.0, 1.0]
@@ -86,7 +86,7 @@ class Motion:
 
 
 @given(walkers, half_angles, rates, rates)
-def test_angular_momentum_about_the_new_foothold_survives(walker, half_angle, w_1, w_2):
+def test_angular_momentum_about_the_new_foothold_is_conserved(walker, half_angle, w_1, w_2):
     theta_1, theta_2 = at_heel_strike(walker, half_angle)
     before = Motion(walker, theta_1, theta_2, w_1, w_2)
     after = Motion(walker, *impact(walker, theta_1, theta_2, w_1, w_2))
@@ -97,7 +97,7 @@ def test_angular_momentum_about_the_new_foothold_survives(walker, half_angle, w_
 
 
 @given(walkers, half_angles, rates, rates)
-def test_angular_momentum_of_the_trailing_leg_about_the_hip_survives(walker, half_angle, w_1, w_2):
+def test_angular_momentum_of_the_trailing_leg_about_the_hip_is_conserved(walker, half_angle, w_1, w_2):
     theta_1, theta_2 = at_heel_strike(walker, half_angle)
     before = Motion(walker, theta_1, theta_2, w_1, w_2)
     after = Motion(walker, *impact(walker, theta_1, theta_2, w_1, w_2))
@@ -122,14 +122,14 @@ def test_impact_of_a_foot_at_rest_changes_nothing(walker, rate):
 
 
 @given(walkers, half_angles, rates, rates)
-def test_impact_mirrors(walker, half_angle, w_1, w_2):
+def test_impact_of_the_mirrored_state_is_mirrored(walker, half_angle, w_1, w_2):
     before = (*at_heel_strike(walker, half_angle), w_1, w_2)
     mirrored = impact(walker._replace(slope=-walker.slope), *(-value for value in before))
     assert mirrored == tuple(-value for value in impact(walker, *before))
 
 
 @given(walkers, half_angles)
-def test_guard_height_and_step_length_agree_with_the_feet(walker, half_angle):
+def test_guard_and_step_length_agree_with_foot_positions(walker, half_angle):
     theta_1, theta_2 = at_heel_strike(walker, half_angle)
     foot = Motion(walker, theta_1, theta_2, 0.0, 0.0).swing_foot
     downhill = np.array([math.cos(walker.slope), -math.sin(walker.slope)])
@@ -140,7 +140,7 @@ def test_guard_height_and_step_length_agree_with_the_feet(walker, half_angle):
 
 
 @given(walkers, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
-def test_swing_foot_height_is_its_distance_from_the_slope(walker, theta_1, theta_2):
+def test_swing_foot_height_is_the_distance_from_the_slope(walker, theta_1, theta_2):
     foot = Motion(walker, theta_1, theta_2, 0.0, 0.0).swing_foot
     normal = np.array([math.sin(walker.slope), math.cos(walker.slope)])
     assert swing_foot_height(walker, theta_1, theta_2) == pytest.approx(foot @ normal, abs=1e-14 * walker.leg_length)

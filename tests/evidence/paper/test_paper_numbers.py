@@ -61,12 +61,12 @@ def printed(text):
     ("text", "value", "last_digit"),
     [("-0.60", -0.6, 0.01), ("+0.15%", 0.15, 0.01), ("10^5", 1e5, 1e5), ("10^-4", 1e-4, 1e-4), ("five", 5, 1)],
 )
-def test_a_printed_number_knows_its_value_and_its_last_digit(text, value, last_digit):
+def test_printed_number_has_a_value_and_a_last_digit(text, value, last_digit):
     assert printed(text).value == pytest.approx(value, rel=1e-15)
     assert printed(text).last_digit == pytest.approx(last_digit)
 
 
-def test_comparisons_in_words_are_read_as_their_number():
+def test_verbal_comparisons_are_read_as_numbers():
     assert number("less than 1%") == number("less than one") == 1
 
 
@@ -83,18 +83,18 @@ def test_comparisons_in_words_are_read_as_their_number():
         ("0.60", None, ""),
     ],
 )
-def test_agreement_goes_by_the_printed_digits(text, value, found):
+def test_agreement_is_judged_by_the_printed_digits(text, value, found):
     assert printed(text).agreement(value) == found
 
 
-def test_both_feet_of_x_p_stand_on_the_papers_slope():
+def test_both_feet_of_x_p_are_on_the_slope_of_the_paper():
     slope, rounding = slope_of(*X_P[:2])
     assert slope == pytest.approx(0.0174)
     assert rounding == pytest.approx(5e-5)
     assert sum(fixed_point_as_printed()[:2]) == pytest.approx(-2 * walker_of_the_paper(CORRECTED).slope)
 
 
-def test_table_3_of_a_limping_walk_takes_the_last_completed_stride():
+def test_table_3_of_a_limping_walk_uses_the_last_complete_stride():
     table = characteristics([0.5, 0.6, 0.7, 0.8, 0.9], [0.1, 0.2, 0.3, 0.4, 0.5], 150.0)
     assert (table.t_left, table.t_right) == (0.7, 0.8)
     assert table.t_cycle == pytest.approx(1.5)
@@ -106,7 +106,7 @@ def test_table_3_of_a_single_step_has_no_cycle():
     assert characteristics([], [], None) == Characteristics(None, None, None, None, None)
 
 
-def test_energy_is_averaged_over_time_and_the_last_five_steps():
+def test_energy_is_time_averaged_over_the_last_five_steps():
     time = [0.0, 1.0, 1.5, 2.0, 5.0, 7.0]
     energy = [9.0, 9.0, 2.0, 2.0, 2.0, 9.0]
     record = over_last_steps(*map(np.array, (time, energy, [1.0, 1.5, 2.0, 3.0, 4.0, 5.0])))
@@ -160,7 +160,7 @@ def rows(study):
     return judged
 
 
-def test_every_number_of_tables_and_of_eq_11_has_a_row(rows):
+def test_every_printed_value_of_tables_and_eq_11_has_a_row(rows):
     found = rows()
     tables = [entry for row in TABLE_2 for entry in (row.matlab, row.adams, row.percent)]
     tables += [entry for row in TABLE_3 for entry in (row.matlab, row.adams)]
@@ -187,7 +187,7 @@ OWN_CONTRADICTIONS = (
 )
 
 
-def test_each_printed_value_counts_once(rows, study):
+def test_each_printed_value_is_counted_once(rows, study):
     every = list(paper_rows(rows.measured(), study))
     assert len({(row.where, row.quantity) for row in every}) == len(every) == 38
     # eq. 11 and the MATLAB column of Table 2 print the same four values, Table 2 and section 4 the same two percentages
@@ -195,11 +195,11 @@ def test_each_printed_value_counts_once(rows, study):
     assert len(printed_twice) == 4 + 2
 
 
-def test_what_is_used_as_given_is_an_input(rows):
+def test_values_used_as_given_are_inputs(rows):
     assert {entry for entry, row in rows().items() if row.verdict == NumberVerdict.INPUT} == {*INPUTS}
 
 
-def test_values_are_contradicted_by_other_values_of_the_paper_with_the_computation(rows):
+def test_contradicted_values_show_the_computation(rows):
     found = {entry: row for entry, row in rows().items() if row.verdict == NumberVerdict.CONTRADICTED}
     assert found.keys() == {*OWN_CONTRADICTIONS}
     step, adams_step = (2 * np.sin((stance - swing) / 2) for swing, stance in ((-0.2022, 0.1674), (-0.2021, 0.1670)))
@@ -217,17 +217,17 @@ def test_values_are_contradicted_by_other_values_of_the_paper_with_the_computati
         assert computed in found[entry].evidence
 
 
-def test_evidence_beside_a_contradiction_is_a_sentence_of_its_own(rows):
+def test_evidence_consists_of_capitalised_sentences(rows):
     for row in rows().values():
         assert not re.search(r"[a-z)]\. [a-z]", row.evidence), row.evidence
 
 
-def test_rounding_is_left_open_before_a_value_counts_as_contradicted(rows):
+def test_rounding_is_allowed_for_before_a_value_counts_as_contradicted(rows):
     row = rows()[TABLE_2[0].percent]  # -0.2022 and -0.2021 may differ by up to 0.1%
     assert (row.verdict, "with rounding -0.10 to +0.00%" in row.evidence) == (NumberVerdict.EXPLAINED, True)
 
 
-def test_no_value_of_adams_that_its_paper_does_not_contradict_is_called_more_than_not_reproduced(rows):
+def test_uncontradicted_adams_values_are_at_most_not_reproduced(rows):
     adams = [row.adams for row in (*TABLE_2, *TABLE_3)]
     found = rows()
     verdicts = {entry: found[entry].verdict for entry in (*adams, LOST_BALANCE)}
@@ -236,16 +236,16 @@ def test_no_value_of_adams_that_its_paper_does_not_contradict_is_called_more_tha
     assert {verdicts[entry] for entry in verdicts.keys() - contradicted} == {NumberVerdict.NOT_REPRODUCED}
 
 
-def test_a_cycle_that_is_the_sum_of_its_steps_is_not_contradicted(rows):
+def test_cycle_that_is_the_sum_of_its_steps_is_not_contradicted(rows):
     assert rows()[T_CYCLE.matlab].verdict == NumberVerdict.NOT_REPRODUCED
 
 
-def test_a_contact_model_that_starts_from_the_adams_start_takes_it_as_an_input(rows):
+def test_adams_start_is_an_input_if_the_contact_model_starts_there(rows):
     found = rows(start=adams_start_as_printed())
     assert {found[row.adams].verdict for row in TABLE_2} == {NumberVerdict.INPUT}
 
 
-def test_the_energy_of_matlab_is_that_of_ten_steps_and_that_of_adams_is_nobodys(rows):
+def test_matlab_energy_is_explained_and_adams_energy_is_not_reproduced(rows):
     found = rows()
     assert "(5 steps)" in E_AVG.matlab.quantity
     assert found[E_AVG.matlab].verdict == NumberVerdict.EXPLAINED
@@ -256,14 +256,14 @@ def test_the_energy_of_matlab_is_that_of_ten_steps_and_that_of_adams_is_nobodys(
     assert "-0.110 J off the printed value" in found[E_AVG.adams].evidence
 
 
-def test_a_start_that_walks_does_not_explain_a_fall(rows):
+def test_walking_start_does_not_explain_a_fall(rows):
     row = rows()[LOST_BALANCE]
     assert (row.verdict, row.contact) == (NumberVerdict.NOT_REPRODUCED, 10.0)
     assert "takes 10 of 10 steps (walked)" in row.evidence
     assert rows(from_x_p=(1, "fell"))[LOST_BALANCE].verdict == NumberVerdict.REPRODUCED
 
 
-def test_the_adams_start_falls_when_another_integration_says_so(study):
+def test_adams_start_falls_when_an_independent_integration_does(study):
     walker = walker_of_the_paper(CORRECTED)._replace(slope=study.adams.slope)
 
     def hip(_time, y):
@@ -286,7 +286,7 @@ def test_the_adams_start_falls_when_another_integration_says_so(study):
     assert "the walk ends (fell) at 0.347 s" in told
 
 
-def test_in_another_scene_only_what_the_paper_itself_contradicts_counts_against_it(rows):
+def test_in_other_scenes_only_internal_contradictions_count_against_the_paper(rows):
     elsewhere = ("slope_rad 0.05 instead of 0.0174",)
     found = rows(Departures(elsewhere, elsewhere))
     of_the_walk = {entry for row in TABLE_3 for entry in (row.matlab, row.adams)} - {*OWN_CONTRADICTIONS}
@@ -295,13 +295,13 @@ def test_in_another_scene_only_what_the_paper_itself_contradicts_counts_against_
     assert {found[entry].verdict for entry in OWN_CONTRADICTIONS} == {NumberVerdict.CONTRADICTED}
 
 
-def test_the_largest_error_is_contradicted_however_near_the_models_come(rows):
+def test_largest_printed_error_is_contradicted_for_any_model_result(rows):
     small = WalkDifference(np.array([(9e-5, 1e-4)]), np.array([(1e-4, 1e-4)]))
     row = rows(errors={"raw": small, "aligned": small})[LARGEST_ERROR]
     assert (row.verdict, row.contact) == (NumberVerdict.CONTRADICTED, 1e-4)
 
 
-def test_a_walk_that_fell_at_once_leaves_gaps(rows):
+def test_immediate_fall_leaves_missing_values(rows):
     nothing = Characteristics(None, None, None, None, None)
     gone = {"steps": 0, "outcome": "fell", "table_3": nothing, "step_length": None, "start": None}
     found = rows(**gone, energy=None)
@@ -309,13 +309,13 @@ def test_a_walk_that_fell_at_once_leaves_gaps(rows):
     assert all("None" not in row.evidence for row in found.values())
 
 
-def test_a_slope_without_gaits_has_no_columns_of_the_rigid_model(rows):
+def test_slope_without_gaits_has_no_rigid_columns(rows):
     found = rows(Departures(("slope_rad -0.1 instead of 0.0174",), ()), models={})
     assert all(found[entry].as_printed is found[entry].corrected is None for entry in X_P)
     assert "no gait" in found[E_AVG.matlab].evidence
 
 
-def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
+def test_verdict_in_another_scene_says_that_it_is_about_the_paper_alone(rows):
     elsewhere = Departures(("slope_rad 0.05 instead of 0.0174",), ("slope_rad 0.05 instead of 0.0174",))
     about_itself = "about the paper's own numbers, not this scene"
     for row in rows(elsewhere).values():
@@ -324,7 +324,7 @@ def test_a_verdict_about_the_papers_own_numbers_says_so_in_another_scene(rows):
     assert not any("this scene" in row.evidence for row in rows().values())
 
 
-def test_no_step_is_not_called_a_step_of_no_length(rows):
+def test_missing_step_is_not_reported_as_zero_length(rows):
     row = next(row for printed, row in rows(models={}, step_length=None).items() if printed == STEP_LENGTH)
     assert "No model takes a step" in row.evidence
     assert "times the printed length" not in row.evidence

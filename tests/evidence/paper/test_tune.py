@@ -34,7 +34,7 @@ def small(config, *sets, cells=3):
     return tuned(config, f"tune.cells={cells}", "tune.rigid_limit=false", *sets)
 
 
-def test_the_papers_contact_needs_no_adjustment():
+def test_contact_of_the_paper_needs_no_adjustment():
     found = small("paper").summary["adjustment"]
     assert not found["needed"]
     assert (found["scale_dtheta1"], found["scale_dtheta2"], found["walked_steps"]) == (1.0, 1.0, 10)
@@ -43,7 +43,7 @@ def test_the_papers_contact_needs_no_adjustment():
     assert margins["dtheta_2 down"]["beyond"] == "off-pad"
 
 
-def test_the_gait_is_the_one_that_the_walk_settles_on():
+def test_contact_gait_is_the_one_that_the_walk_settles_on():
     summary = small("paper").summary
     gait, walk = summary["gait"], summary["procedure"]["adjusted"]
     assert gait["stable"]
@@ -52,7 +52,7 @@ def test_the_gait_is_the_one_that_the_walk_settles_on():
     assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
 
 
-def test_what_drives_a_gaits_step_is_what_the_ground_takes_of_it():
+def test_work_per_step_equals_the_losses():
     gait = small("level", "strides=1", cells=2).summary["gait"]
     given = gait["work_per_step_J"]
     assert sum(gait["lost_J"].values()) == pytest.approx(sum(given.values()), rel=1e-7)
@@ -65,7 +65,7 @@ def test_what_drives_a_gaits_step_is_what_the_ground_takes_of_it():
     assert "their interaction, including that with the push-off's duration" in told
 
 
-def test_the_papers_own_start_does_not_walk_and_says_why():
+def test_start_of_the_paper_does_not_walk_and_the_reason_is_stated():
     start = small("paper").summary["paper_start"]
     assert start["outcome"] != "walked"
     assert start["energy_J"] == pytest.approx(221.5, abs=0.5)
@@ -73,7 +73,7 @@ def test_the_papers_own_start_does_not_walk_and_says_why():
     assert "221.5 J" in start["reason"]
 
 
-def test_both_fates_of_the_papers_adams_start_are_told_with_model_and_ground():
+def test_both_outcomes_of_the_adams_start_name_model_and_ground():
     start = small("paper").summary["paper_start"]
     rigid, contact = start["reason"].split("the contact model on ")
     assert "in the rigid model, whose stance foot is pinned to an even slope" in rigid
@@ -86,13 +86,13 @@ def test_both_fates_of_the_papers_adams_start_are_told_with_model_and_ground():
     assert plane.summary["paper_start"]["outcome"] != "off-pad"
 
 
-def test_percentages_are_given_on_both_bases():
+def test_percentages_are_relative_to_both_starts():
     row = small("paper").summary["table2"]["dtheta_2"]
     assert row["paper_percent_of_matlab"] == pytest.approx(100 * (3.20 - 0.84) / 0.84)
     assert row["paper_percent_of_adams"] == pytest.approx(100 * (3.20 - 0.84) / 3.20)
 
 
-def test_creeping_feet_need_an_adjustment_and_the_found_start_walks():
+def test_creeping_feet_need_an_adjustment_and_the_adjusted_start_walks():
     summary = small("sliding-feet", "tune.stance_factors=[1.0, 1.1]").summary
     found = summary["adjustment"]
     assert found["needed"]
@@ -102,7 +102,7 @@ def test_creeping_feet_need_an_adjustment_and_the_found_start_walks():
     assert 0.0 < found["distance"] < 0.2
 
 
-def test_the_map_is_what_single_walks_say():
+def test_adjustment_map_agrees_with_single_walks():
     content = small("paper")
     cells = content["map"]
     assert cells["outcome"].shape == (3, 3)
@@ -119,7 +119,7 @@ NO_FRICTION = ("contact.static_friction=0", "contact.dynamic_friction=0")
 @pytest.mark.parametrize(
     "sets", [NO_FRICTION, ("contact.static_friction=0.05", "contact.dynamic_friction=0.04")], ids=["none", "little"]
 )
-def test_that_no_start_walks_is_an_answer_in_words(sets):
+def test_missing_walking_start_is_explained(sets):
     content = small("paper", *sets)
     gait, found = content.summary["gait"], content.summary["adjustment"]
     assert not gait["found"]
@@ -130,7 +130,7 @@ def test_that_no_start_walks_is_an_answer_in_words(sets):
     assert "no_answer" not in content.summary
 
 
-def test_the_page_says_that_no_start_walks():
+def test_page_says_that_no_start_walks():
     results = Results(None, {"tune": small("paper", *NO_FRICTION)})
     (found,) = [block for block in verdict.section(results).blocks if isinstance(block, Statements)]
     (told,) = found.items
@@ -141,12 +141,12 @@ def test_the_page_says_that_no_start_walks():
     assert made.blocks[0].text.startswith("The contact model has no gait of its own")
 
 
-def test_pads_for_a_gait_that_is_not_there_have_no_answer():
+def test_pads_for_a_missing_gait_have_no_answer():
     with pytest.raises(NoAnswer, match="no contact gait to lay the pads for"):
         small("paper", *NO_FRICTION, "contact.pad_pitch=own")
 
 
-def test_a_start_that_flies_is_an_answer():
+def test_airborne_start_is_a_valid_answer():
     summary = small("paper", "start=[-0.2018, 0.167, -1.02, -3.2]").summary
     assert summary["adjustment"]["needed"]
     assert summary["procedure"]["released"]["outcome"] != "walked"
@@ -159,7 +159,7 @@ def kneed():
     )
 
 
-def test_a_kneed_walker_needs_no_adjustment_on_plain_ground():
+def test_kneed_walker_needs_no_adjustment_on_plain_ground():
     summary = kneed().summary
     found = summary["adjustment"]
     assert (found["needed"], found["found"], found["walked_steps"]) == (False, True, 2)
@@ -168,7 +168,7 @@ def test_a_kneed_walker_needs_no_adjustment_on_plain_ground():
     assert down["beyond"] is not None
 
 
-def test_a_kneed_gait_gives_its_height_to_ground_friction_and_knees():
+def test_kneed_gait_loses_energy_to_ground_friction_and_knees():
     gait = kneed().summary["gait"]
     assert sum(gait["lost_J"].values()) == pytest.approx(gait["height_lost_J"], rel=1e-7)
     assert gait["lost_J"]["knee_strikes"] > 0.0
@@ -178,7 +178,7 @@ def test_a_kneed_gait_gives_its_height_to_ground_friction_and_knees():
     assert step == pytest.approx(gait["period_s"], rel=0.01)
 
 
-def test_what_is_the_papers_alone_is_left_out_for_another_walker_in_words():
+def test_parts_about_the_paper_are_omitted_for_other_walkers_with_a_reason():
     content = kneed()
     assert set(content.summary["procedure"]) == {"released", "adjusted"}
     assert "paper_start" not in content.summary
@@ -192,7 +192,7 @@ def test_what_is_the_papers_alone_is_left_out_for_another_walker_in_words():
     assert small("paper").summary["left_out"] == []
 
 
-def test_the_page_tells_of_the_kneed_adjustment_in_its_own_words():
+def test_page_describes_the_kneed_adjustment():
     made = adjustment.section(Results(load(Path("kneed")).config, {"tune": kneed()}))
     assert "the stance leg starts" in made.finding
     assert "into the knee's strike" in made.blocks[0].text
@@ -204,13 +204,13 @@ def tables_of(summary):
     return {block.caption: block for block in made.blocks if hasattr(block, "caption")}
 
 
-def test_a_start_that_stays_as_it_is_has_no_table_of_before_and_after():
+def test_unchanged_start_has_no_table_of_changes():
     assert not {"The start before and after the adjustment", "The procedure, walk by walk"} & set(
         tables_of(kneed().summary)
     )
 
 
-def test_the_page_names_what_swings_beside_the_legs_and_no_joint_that_was_not_there():
+def test_page_lists_torso_and_knees_only_if_the_walker_has_them():
     row = kneed().summary["table2"]["dtheta_2"]
     changed = kneed().summary | {
         "adjustment": kneed().summary["adjustment"] | {"needed": True},
@@ -223,7 +223,7 @@ def test_the_page_names_what_swings_beside_the_legs_and_no_joint_that_was_not_th
     assert walks == ["from the rigid state", "from the adjusted start"]
 
 
-def test_what_could_not_be_told_apart_is_not_put_down_to_what_causes_do_together():
+def test_inseparable_causes_are_not_attributed_to_their_interaction():
     limit = LimitFindings((ALL_SERIES,), 0.7, 0.71, {ALL_SERIES: [], NORMAL_SERIES: [at_period(0.712)]}, None)
     told = causes(limit)
     assert "together_s" not in told
@@ -241,7 +241,7 @@ def at_period(period):
     return Distance(ContactFactors(NORMAL_SERIES, 1.0, 1.0, 1.0, 1.0), period, 0.37, 0.0, period - 0.7, 0.0, 0.0)
 
 
-def test_of_a_compass_that_is_not_the_papers_nothing_of_the_paper_is_told():
+def test_report_of_another_compass_does_not_mention_the_paper():
     content = small("paper", "walker.hip_mass_kg=11", "strides=1", cells=2)
     assert "paper_start" not in content.summary
     assert "paper_start" not in content.groups

@@ -33,20 +33,20 @@ QUICK = (
 )
 
 
-def test_families_and_their_sizes():
+def test_case_families_have_the_expected_sizes():
     families = {case.family for case in CASES.values()}
     assert families == {"stiffness", "walkers", "terrain", "slopes", "starts", "numerics"}
     assert len(CASES) >= 60
 
 
-def test_every_case_says_why_and_is_a_config():
+def test_every_case_has_a_reason_and_a_valid_config():
     for case in CASES.values():
         assert len(case.reason) > 5
         assert config_of(case).name == "paper"
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_case_ends_as_expected_and_passes_every_measure(name):
+def test_case_ends_as_expected_and_passes_every_check(name):
     result = CaseCell(CASES[name]).run()[0]
     assert result.failures == ()
 
@@ -58,14 +58,14 @@ def test_errors_of_a_long_rigid_walk_do_not_add_up():
     assert result.failures == ()
 
 
-def test_another_outcome_than_expected_is_told():
+def test_unexpected_outcome_is_reported():
     case = Case(name="wrong", expected=("fell",), reason="to be wrong", steps=2)
     result = judge(case, config_of(case))
     assert not result.ok
     assert "ended as walked, not fell" in result.failures
 
 
-def test_a_budget_too_small_is_told_with_what_there_was():
+def test_exhausted_budget_is_reported_with_its_size():
     case = Case(name="small", expected=("walked",), reason="to be cut short", steps=4, budget=10_000)
     result = judge(case, config_of(case))
     assert result.outcome == "budget-exhausted"
@@ -73,7 +73,7 @@ def test_a_budget_too_small_is_told_with_what_there_was():
     assert 0 < result.steps < 4
 
 
-def test_a_rigid_case_too_ends_with_its_budget():
+def test_rigid_case_also_ends_at_its_budget():
     needed = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"])).rhs_evaluations
     case = CASES["rigid-single-stride"].model_copy(update={"budget": needed // 2, "expected": ("budget-exhausted",)})
     result = judge(case, config_of(case))
@@ -82,7 +82,7 @@ def test_a_rigid_case_too_ends_with_its_budget():
     assert case.budget <= result.rhs_evaluations < needed
 
 
-def test_a_start_is_lowered_by_metres_whatever_the_leg():
+def test_start_is_lowered_in_metres_for_any_leg_length():
     short = Case(name="x", expected=("walked",), reason="x", config={"walker": {"leg_length_m": 1.0}}, lowered_m=-0.01)
     long = short.model_copy(update={"config": {"walker": {"leg_length_m": 10.0}}})
     for case in (short, long):
@@ -91,25 +91,25 @@ def test_a_start_is_lowered_by_metres_whatever_the_leg():
         assert there[CENTRE_HEIGHT] - on_ground[CENTRE_HEIGHT] == pytest.approx(0.01, rel=1e-12)
 
 
-def test_disagreement_with_a_tighter_tolerance_is_told():
+def test_disagreement_with_a_tighter_tolerance_is_reported():
     case = Case(name="sharp", expected=("walked",), reason="to be inexact", steps=2, agreement=1e-15)
     result = judge(case, config_of(case))
     assert any("ten times tighter" in failure for failure in result.failures)
     assert any("dop853" in failure for failure in result.failures)
 
 
-def test_lines_that_are_no_config_are_refused():
+def test_invalid_config_lines_are_rejected():
     case = Case(name="bad", expected=("walked",), reason="none", config={"slope_degg": 1.0})
     with pytest.raises(ConfigError, match="slope_deg"):
         config_of(case)
 
 
-def test_two_cases_of_one_name_are_refused():
+def test_cases_of_equal_name_are_rejected():
     with pytest.raises(ConfigError, match="paper"):
         check_unique_names([CASES["paper"], CASES["paper"]])
 
 
-def test_a_contact_block_in_si_means_the_same_quantities():
+def test_contact_block_in_si_gives_the_same_quantities():
     si = config_of(Case(name="si", expected=("walked",), reason="none", config={"contact": {"units": "si"}}))
     paper = config_of(CASES["paper"])
     assert si.contact.in_si().stiffness == pytest.approx(paper.contact.in_si().stiffness)

@@ -10,12 +10,12 @@ from walkerlab.evidence.verification.known import PROBLEMS
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.args[0])
-def test_contact_code_gives_the_known_answer(problem):
+def test_contact_code_reproduces_known_answers(problem):
     answer = problem()
     assert answer.error <= answer.limit
 
 
-def test_closed_form_of_the_bounce_is_what_integration_gives():
+def test_closed_form_of_the_bounce_agrees_with_integration():
     mass, stiffness, drop, gravity = 1.0, 1e4, 0.1, 9.81
     speed = math.sqrt(2.0 * gravity * drop)
 
@@ -35,7 +35,7 @@ def test_closed_form_of_the_bounce_is_what_integration_gives():
     assert references.linear_bounce_period(mass, stiffness, drop, gravity) == pytest.approx(period, rel=1e-8)
 
 
-def test_wheel_keeps_its_speed_from_impact_to_impact():
+def test_wheel_has_the_same_speed_at_every_impact():
     spokes, slope, gravity, inertia = 8, 0.08, 9.81, 1e-3
     half = math.pi / spokes
     after = references.wheel_speed(spokes, slope, gravity, inertia)

@@ -50,18 +50,18 @@ def whole(tmp_path_factory):
     return run(tmp_path_factory.mktemp("whole"))
 
 
-def test_the_paper_is_a_cell_that_walks():
+def test_cell_of_the_paper_walks():
     outcome, steps, sharper, error, _ = stiction_cell(PAPER_STIFFNESS, 0.1)
     assert (outcome, steps, sharper) == (Outcome.WALKED, 4, Outcome.WALKED)
     assert 0.0 < error < 1e-6
 
 
-def test_the_papers_ground_is_the_papers():
+def test_ground_of_the_paper_is_a_cell_of_the_map():
     contact = prepare_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
     assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
 
 
-def test_a_fixed_step_is_fine_where_it_is_small_and_its_error_falls_with_it():
+def test_small_fixed_step_is_accurate_and_its_error_falls_with_its_size():
     numbers = step_column(PAPER_STIFFNESS, (4e-6, 8e-6, 1e-3))
     verdicts = [VERDICT_NAMES[int(number)] for number in numbers[::2]]
     assert verdicts == ["fine", "fine", "diverges"]
@@ -69,7 +69,7 @@ def test_a_fixed_step_is_fine_where_it_is_small_and_its_error_falls_with_it():
     assert numbers[5] == ERROR_MISSING
 
 
-def test_where_no_error_was_measured_the_map_has_a_gap():
+def test_cells_without_a_measured_error_are_missing():
     """Also where both runs end alike, but after different numbers of steps."""
     walked, slid = float(Outcome.WALKED), float(Outcome.SLID)
     rows = (
@@ -90,7 +90,7 @@ def test_where_no_error_was_measured_the_map_has_a_gap():
     assert (none["largest_error"], none["median_error"]) == (None, None)
 
 
-def test_every_cell_has_a_name_of_its_own():
+def test_every_cell_has_a_unique_name():
     units = list(units_of(3))
     assert len({name for name, *_ in units}) == len(units)
     assert sum(cells for _, cells, _ in units) == 2 * 3 * 3
@@ -107,11 +107,11 @@ def test_both_maps_are_stored(whole):
 
 
 @pytest.mark.parametrize("stiffer", [1.0, 1e2, 1e4])
-def test_on_oil_the_walker_slides_however_stiff_the_ground_below(stiffer):
+def test_walker_slides_on_oil_at_any_stiffness(stiffer):
     assert stiction_cell(stiffer * PAPER_STIFFNESS, 10.0)[::2][:2] == [Outcome.SLID] * 2
 
 
-def test_a_run_that_was_cut_off_goes_on_and_comes_to_the_same(whole, tmp_path):
+def test_interrupted_run_resumes_with_the_same_result(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, CutOff(left=1 + 3))  # what was there, and three pieces
     kept = Checkpoint(tmp_path / "maps.parts", "key").kept
@@ -122,5 +122,5 @@ def test_a_run_that_was_cut_off_goes_on_and_comes_to_the_same(whole, tmp_path):
     assert rest.done == rest.total == 8
 
 
-def test_two_processes_come_to_the_same(whole, tmp_path):
+def test_two_processes_give_the_same_result(whole, tmp_path):
     assert run(tmp_path, jobs=2).digest() == whole.digest()

@@ -38,25 +38,25 @@ def walk(judged_walk):
     return judged_walk.record
 
 
-def test_a_heel_strike_keeps_momentum(walk):
+def test_heel_strike_conserves_angular_momentum(walk):
     assert MASSES.momentum_change(MASSES.poses(walk.before), MASSES.poses(walk.after)) < 1e-14
 
 
 @pytest.mark.parametrize("index", [2, 3])
-def test_a_heel_strike_that_is_a_little_wrong_does_not(walk, index):
+def test_slightly_wrong_heel_strike_does_not_conserve_momentum(walk, index):
     wrong = walk.after.copy()
     wrong[:, index] *= 1.0 + 1e-6
     assert MASSES.momentum_change(MASSES.poses(walk.before), MASSES.poses(wrong)) > 1e-8
 
 
-def test_walks_without_a_heel_strike_are_not_called_equal(judged_walk):
+def test_walks_without_a_heel_strike_do_not_count_as_equal(judged_walk):
     none = replace(judged_walk, touches=np.zeros(0))
     assert time_difference("a walk", none, judged_walk, CASE, 1e-9) == []
     (found,) = time_difference("itself", judged_walk, judged_walk, CASE, 1e-9)
     assert found.value == 0.0
 
 
-def test_momentum_with_leg_inertia_is_kept_too():
+def test_momentum_is_conserved_with_leg_inertia():
     heavy = COMPASS._replace(leg_inertia=0.7)
     before = np.array([[0.21, -0.245, -0.4, -1.1]])
     after = np.array([impact(heavy, *before[0])])
@@ -65,20 +65,20 @@ def test_momentum_with_leg_inertia_is_kept_too():
     assert masses.momentum_change(masses.poses(before), masses.poses(after)) < 1e-14
 
 
-def test_energy_won_at_a_heel_strike_is_seen(walk):
+def test_energy_gained_at_a_heel_strike_is_detected(walk):
     before, after = MASSES.poses(walk.before), MASSES.poses(walk.after)
     assert energy_won(before, after) == 0.0
     assert energy_won(after, MASSES.poses(walk.before[:, [1, 0, 3, 2]])) > 0.0
     assert MASSES.pose(walk.after[0]).kinetic < MASSES.pose(walk.before[0]).kinetic
 
 
-def test_what_is_no_number_fails():
+def test_nan_fails_the_check():
     assert not Measure("x", math.nan, 1.0).ok
     assert not Measure("x", finite(math.inf), 1.0).ok
     assert Measure("x", 0.0, 0.0).ok
 
 
-def test_a_twin_there_and_back_is_the_walker():
+def test_scaling_to_the_twin_and_back_restores_the_walker():
     by = to_twin(PAPER)
     back = Units(1.0 / by.length, 1.0 / by.mass, 1.0 / by.time)
     again = scaled(scaled(PAPER, by), back)
@@ -89,7 +89,7 @@ def test_a_twin_there_and_back_is_the_walker():
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed", "torso"])
-def test_a_driven_walker_and_its_twin_are_one_walker_of_unit_size(name):
+def test_driven_walker_and_its_twin_agree_in_unit_size(name):
     sets = (*(f"walker.hip.{number}=0.01" for number in Hip.model_fields), "push_off.impulse_N_s=0.1")
     config = load(Path(name), sets).config
     own, twins = (unit_walker(rigid_walker(each, "corrected"))[0] for each in (config, scaled(config, to_twin(config))))

@@ -33,7 +33,7 @@ def prepared_for(case):
 
 
 @pytest.mark.parametrize("name", ["paper", "leg-inertia", "foot-40-percent", "friction-0", "dropped-1-cm", "moon"])
-def test_what_a_walk_gains_is_what_ground_and_gravity_give(name):
+def test_momentum_gain_equals_the_impulse_of_ground_and_gravity(name):
     found = momentum_balance(*ready_for(name))
     assert found.residual <= 1e-7 + found.unsure
     assert found.unsure < 1e-5
@@ -42,24 +42,24 @@ def test_what_a_walk_gains_is_what_ground_and_gravity_give(name):
 @pytest.mark.parametrize(
     "changed", [{"hip_mass_kg": 10.01}, {"leg_mass_kg": 5.005}, {"foot_to_mass_m": 0.501}, {"leg_inertia_kg_m2": 0.05}]
 )
-def test_a_walker_that_is_a_little_another_one_does_not_balance(changed):
+def test_slightly_changed_walker_does_not_balance(changed):
     config, *ready = ready_for("paper")
     other = config.model_copy(update={"walker": config.walker.model_copy(update=changed)})
     assert not momentum_finding(other, *ready).ok
 
 
-def test_a_ground_that_pushes_a_little_more_does_not_balance():
+def test_slightly_stronger_ground_does_not_balance():
     config, *ready = ready_for("paper")
     heavier = config.model_copy(update={"gravity_m_s2": 1.001 * config.gravity_m_s2})
     assert not momentum_finding(heavier, *ready).ok
 
 
-def test_beside_a_hinge_that_pushes_too_it_is_not_measured():
+def test_momentum_is_not_measured_with_a_pinned_foot():
     case = Case(name="x", expected=("walked",), reason="r", config={"contact": {"stance": "pinned"}})
     assert momentum_finding(*prepared_for(case)) == NotMeasured(MEASURE, "the pin transmits forces as well")
 
 
-def test_where_friction_hangs_on_slips_below_the_tolerance_it_is_not_measured():
+def test_momentum_is_not_measured_if_slip_is_below_the_tolerance():
     ready = ready_for("stiction-1e-7")
     found = momentum_balance(*ready)
     assert found.unresolved > MAX_UNKNOWN > found.unsure
@@ -68,19 +68,19 @@ def test_where_friction_hangs_on_slips_below_the_tolerance_it_is_not_measured():
     assert "below the tolerance" in said.why
 
 
-def test_where_the_sums_do_not_settle_it_is_not_measured(monkeypatch):
+def test_momentum_is_not_measured_if_the_quadrature_does_not_converge(monkeypatch):
     monkeypatch.setattr(momentum, "MAX_UNKNOWN", 1e-9)
     said = momentum_finding(*ready_for("paper"))
     assert isinstance(said, NotMeasured)
     assert "do not settle" in said.why
 
 
-def test_feet_at_a_thousand_kilometres_a_second_are_measured_by_their_own_momentum():
+def test_momentum_error_of_very_fast_feet_is_relative_to_their_momentum():
     case = Case(name="x", expected=("lifted-off",), reason="r", config={"start": [-0.2, 0.16, 1e6, 1e6]})
     assert momentum_finding(*prepared_for(case)).ok
 
 
-def test_sums_are_simpsons_and_know_where_they_are_unsure():
+def test_simpson_sums_report_their_uncertainty():
     times = with_middles(np.array([0.0, 1.0, 1.5, 4.0]))
     cubic = (times**3)[:, None]
     np.testing.assert_allclose(impulse(times, cubic)[:, 0], np.array([0.0, 1.0, 1.5, 4.0]) ** 4 / 4.0)
@@ -89,6 +89,6 @@ def test_sums_are_simpsons_and_know_where_they_are_unsure():
     assert unsettled(times, kink)[1] > 0.0
 
 
-def test_intervals_that_want_it_are_cut_into_four():
+def test_uncertain_intervals_are_split_into_four():
     times = with_middles(np.array([0.0, 1.0, 2.0]))
     assert split(times, np.array([False, True])).tolist() == [0.0, 1.0, 1.25, 1.5, 1.75, 2.0]

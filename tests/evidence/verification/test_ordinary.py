@@ -17,20 +17,20 @@ def test_ordinary_methods_on_the_paper_walker():
     assert all(choice.rhs_evaluations <= MAX_ORDINARY_EVALUATIONS for choice in found.values())
 
 
-def test_a_script_on_the_rigid_walker():
+def test_ordinary_methods_on_the_rigid_walker():
     case = next(case for case in package_cases() if case.name == "rigid-single-stride")
     found = choices(case, config_of(case))
     assert [choice.method for choice in found] == ["SciPy RK45", "SciPy LSODA", "SciPy Radau"]
     assert all(0.0 < choice.error < 1e-2 and choice.verdict == "fine" for choice in found)
 
 
-def test_a_walk_that_goes_nowhere_shows_nothing():
+def test_walk_without_steps_shows_no_methods():
     for name in ("split", "rigid-split", "rigid-standing-still", "rigid-slope-minus-1-deg"):
         case = next(case for case in package_cases() if case.name == name)
         assert choices(case, config_of(case)) == ()
 
 
-def test_the_reference_is_sharp_whatever_the_case_asks_for():
+def test_reference_is_accurate_at_any_tolerance_of_the_case():
     loosest = next(case for case in package_cases() if case.name == "loosest")
     one, other = (choices(case, config_of(case)) for case in (PAPER, loosest))
     assert [choice.error for choice in one] == [choice.error for choice in other]
@@ -39,10 +39,10 @@ def test_the_reference_is_sharp_whatever_the_case_asks_for():
 @pytest.mark.parametrize(
     ("off", "verdict"), [(1e-3, "fine"), (0.1, "wrong silently"), (100.0, "diverges"), (np.nan, "diverges")]
 )
-def test_verdict_follows_from_the_error(off, verdict):
+def test_verdict_depends_on_the_error(off, verdict):
     assert ARRIVAL.judged("m", np.full(8, off), 1, 0.0).verdict == verdict
 
 
-def test_what_did_not_arrive_has_no_error():
+def test_unfinished_run_has_no_error():
     choice = ARRIVAL.judged("m", None, MAX_ORDINARY_EVALUATIONS, 0.0)
     assert (choice.verdict, choice.error) == ("gives up", None)

@@ -50,7 +50,7 @@ def start_of(config):
     return model, np.array([*(swing, stance, more)[:bodies], *rates[:bodies]])
 
 
-def test_a_kneed_scene_is_tried_in_every_respect():
+def test_kneed_scene_covers_every_family_of_cases():
     cases = cases_of(config_of("kneed"))
     assert {case.family for case, _ in cases.values()} == {"walkers", "ground", "knees", "slopes", "starts", "numerics"}
     assert 12 <= len(cases) <= 20
@@ -66,32 +66,32 @@ def test_a_kneed_scene_is_tried_in_every_respect():
         ("round-feet", (), set()),
     ],
 )
-def test_knees_and_stops_are_tried_where_there_are_some(name, sets, knees):
+def test_knee_cases_exist_only_for_knees_and_stops(name, sets, knees):
     gait = GAIT if name == "kneed" else {"state": [-0.22, 0.2, -1.1, -1.4], "step_length_m": 0.2}
     cases = cases_of(config_of(name, *sets), gait)
     assert {name for name, (case, _) in cases.items() if case.family == "knees"} == knees
 
 
-def test_every_case_is_a_config_of_its_own():
+def test_every_case_has_a_different_config():
     cases = cases_of(config_of("kneed", COMPLIANT))
     for case, own in cases.values():
         assert Config.model_validate(own.model_dump()) == own, case.name
     assert len({own.model_dump_json() for case, own in cases.values() if case.model == "contact"}) >= len(cases) - 5
 
 
-def test_a_scene_without_contact_is_tried_in_the_rigid_model_alone():
+def test_scene_without_contact_is_tested_in_the_rigid_model_only():
     assert {case.model for case, _ in cases_of(config_of("kneed", "contact=null")).values()} == {"rigid"}
 
 
 @pytest.mark.parametrize("slope", ["scene-level", "scene-twice-as-steep"])
-def test_on_another_slope_both_feet_stand_on_it(slope):
+def test_changed_slope_keeps_both_feet_on_the_ground(slope):
     _, own = cases_of(config_of("kneed"))[slope]
     masses = RigidMasses(assembly_of(own.walker, rigid=True), own.slope_rad)
     assert feet_off_the_slope(masses.poses(np.array([own.start]))) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ["scene-friction-0", "scene-standing-still", "scene-rigid"])
-def test_a_kneed_walkers_case_passes_every_measure(name):
+def test_kneed_case_passes_every_check(name):
     case, own = cases_of(config_of("kneed"))[name]
     result, *ordinary = CaseCell(case, own).run()
     assert result.failures == ()
@@ -101,7 +101,7 @@ def test_a_kneed_walkers_case_passes_every_measure(name):
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_a_heel_strike_keeps_momentum_summed_over_the_masses_of_any_walker(name):
+def test_heel_strike_conserves_summed_momentum_of_any_walker(name):
     config = config_of(name)
     model, before = start_of(config)
     after = np.zeros(before.size)
@@ -117,7 +117,7 @@ def test_a_heel_strike_keeps_momentum_summed_over_the_masses_of_any_walker(name)
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_kinetic_energy_summed_over_the_masses_is_that_of_the_equations(name):
+def test_summed_kinetic_energy_equals_that_of_the_equations(name):
     config = config_of(name)
     model, state = start_of(config)
     masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
@@ -125,7 +125,7 @@ def test_kinetic_energy_summed_over_the_masses_is_that_of_the_equations(name):
 
 
 @pytest.mark.parametrize(("name", "sets"), [("kneed", (COMPLIANT,)), ("round-feet", ()), ("torso", ())])
-def test_a_twin_of_any_walker_there_and_back_is_the_walker(name, sets):
+def test_scaling_any_walker_to_its_twin_and_back_restores_it(name, sets):
     config = config_of(name, *sets)
     by = to_twin(config)
     twin = scaled(config, by)
@@ -140,13 +140,13 @@ def numbers_of(block):
     return [x for value in inner for x in (value if isinstance(value, list) else [value]) if isinstance(x, float)]
 
 
-def test_known_problems_are_answered_once_for_all_scenes():
+def test_known_problems_are_shared_by_all_scenes():
     stage = PIPELINE["known-problems"]
     slices = [Keys().identity(stage, config_of(name), {}).config_slice for name in ("kneed", "paper")]
     assert slices == [{}, {}]
 
 
-def test_only_other_walkers_read_their_scene():
+def test_verification_reads_the_scene_only_for_other_walkers():
     stage = PIPELINE["stability"]
     steep, paper = (Keys().identity(stage, config_of(name), {}).config_slice for name in ("slope-3deg", "paper"))
     assert steep == paper

@@ -24,45 +24,45 @@ def ending(*outcomes):
     return walk, asked
 
 
-def test_it_is_never_the_method_itself():
+def test_second_method_is_never_the_method_itself():
     for name in ("dop853", "radau5", "scipy-bdf"):
         assert name not in [method.name for method in other_methods(name)]
 
 
-def test_the_first_method_that_answers_is_taken():
+def test_first_method_with_an_answer_is_used():
     walk, asked = ending(Outcome.BUDGET_EXHAUSTED, Outcome.FELL)
     second = second_walk("radau5", 400_000, walk)
     assert (second.method, second.walk.outcome, second.tried) == ("scipy-bdf", Outcome.FELL, "dop853 budget-exhausted")
     assert asked == [("dop853", 400_000), ("scipy-bdf", LIBRARY_BUDGET)]
 
 
-def test_that_none_answers_is_told():
+def test_failure_of_all_second_methods_is_reported():
     walk, _ = ending(Outcome.BUDGET_EXHAUSTED, Outcome.BUDGET_EXHAUSTED, Outcome.SOLVER_FAILED)
     second = second_walk("radau5", 400_000, walk)
     assert (second.method, second.walk) == ("", None)
     assert second.tried == "dop853 budget-exhausted, scipy-bdf budget-exhausted, scipy-radau solver-failed"
 
 
-def test_stiff_ground_is_walked_by_a_multistep_method():
+def test_multistep_method_walks_on_stiff_ground():
     result = judge(CASES["stiction-1e-4"], config_of(CASES["stiction-1e-4"]))
     assert result.ok
     assert (result.second_method, result.second_tried) == ("scipy-bdf", "dop853 budget-exhausted")
     assert any("from the walk with scipy-bdf" in finding.measure for finding in result.findings)
 
 
-def test_a_rigid_walk_too():
+def test_multistep_method_walks_the_rigid_model():
     result = judge(CASES["rigid-single-stride"], config_of(CASES["rigid-single-stride"]))
     (finding,) = [finding for finding in result.findings if "from the walk with radau5" in finding.measure]
     assert 0.0 < finding.value < finding.limit < 1e-6
 
 
-def test_what_has_no_answer_is_not_compared_and_says_so():
+def test_case_without_an_answer_is_not_compared_with_a_reason():
     case = CASES["no-budget"]
     result = judge(case, config_of(case))
     assert (result.second_method, result.second_tried) == ("", "the walk itself ended as budget-exhausted")
 
 
 @pytest.mark.parametrize(("rtol", "limit"), [(1e-10, 1e-7), (1e-3, 1e-4)])
-def test_what_tolerances_promise(rtol, limit):
+def test_allowed_difference_follows_the_tolerance(rtol, limit):
     case = Case(name="x", expected=("walked",), reason="to be compared")
     assert promised(case, rtol, 100) == pytest.approx(limit)

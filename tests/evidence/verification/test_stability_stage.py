@@ -50,20 +50,20 @@ def report_of(summary, **others):
     return section(Results(None, stored))
 
 
-def test_all_right_is_an_answer():
+def test_passing_every_case_is_a_result():
     summary = summarise([GOOD], [RIGHT], [])
     assert "no_answer" not in summary
     assert (summary["passed"], summary["failed"]) == (2, 0)
 
 
-def test_what_is_wrong_is_named():
+def test_failed_checks_are_named():
     summary = summarise([GOOD, BAD], [RIGHT, WRONG], [])
     assert summary["no_answer"]["message"] == "2 of 4 did not end as expected: bad, block"
     assert (summary["passed"], summary["failed"]) == (2, 2)
     assert summary["cases"][1]["note"] == "ended as fell, not walked"
 
 
-def test_report_says_in_red_what_failed():
+def test_report_shows_failures_in_red():
     shown = report_of(summarise([GOOD, BAD], [RIGHT, WRONG], []))
     red = [block.text for block in shown.blocks if getattr(block, "tone", "") == "bad"]
     assert len(red) == 2
@@ -71,7 +71,7 @@ def test_report_says_in_red_what_failed():
     assert report_of(None) is None
 
 
-def test_a_case_that_gives_up_as_expected_is_counted_apart_and_is_not_green():
+def test_expected_failure_is_counted_separately_and_not_green():
     gave_up = replace(GOOD, name="rings", expected=("budget-exhausted",), outcome="budget-exhausted")
     summary = summarise([GOOD, gave_up], [RIGHT], [])
     shown = report_of(summary)
@@ -82,19 +82,19 @@ def test_a_case_that_gives_up_as_expected_is_counted_apart_and_is_not_green():
     assert report_of(summarise([GOOD], [RIGHT], [])).finding.endswith("ended as expected.")
 
 
-def test_the_page_lists_what_no_case_covers():
+def test_page_lists_what_no_case_covers():
     gaps = [item.about for block in report_of(summarise([GOOD], [], [])).blocks for item in getattr(block, "items", ())]
     assert {"Very stiff linear springs:", "The loosest tolerances:", "ADAMS:"} <= {*gaps}
 
 
-def test_the_worst_measure_is_of_what_is_right_and_not_of_work():
+def test_worst_value_of_a_check_excludes_counts_of_work():
     busy = replace(GOOD, findings=(Measure(BUDGET_USED, 0.9, 1.0), Measure("x", 0.25, 1.0)))
     table = next(block for block in report_of(summarise([busy], [], [])).blocks if isinstance(block, Table))
     place = [column.title for column in table.columns].index("worst measure / limit")
     assert next(iter(table.groups.values()))[0][place].text == "0.25"
 
 
-def test_report_names_the_other_method_or_why_there_is_none():
+def test_report_names_the_second_method_or_why_it_is_missing():
     alone = replace(GOOD, name="alone", second_tried="dop853 budget-exhausted")
     shown = report_of(summarise([replace(GOOD, second_method="dop853"), alone], [RIGHT], []))
     (table,) = [block for block in shown.blocks if getattr(block, "caption", "") == "Extreme cases"]
@@ -102,7 +102,7 @@ def test_report_names_the_other_method_or_why_there_is_none():
     assert "dop853 budget-exhausted (alone)" in table.note
 
 
-def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_them():
+def test_report_shows_the_maps_or_how_to_make_them():
     summary = summarise([GOOD], [RIGHT], [])
     assert "walkerlab stability --full" in report_of(summary).blocks[-1].text
     said = report_of(summary, **{"stability-maps": MAPS}).blocks[-1].text
@@ -110,7 +110,7 @@ def test_report_tells_of_the_maps_once_they_are_there_and_before_how_to_make_the
     assert "3 fine and 6 diverges" in said
 
 
-def test_one_and_two_processes_find_the_same():
+def test_one_and_two_processes_give_the_same_result():
     cases = [
         case for case in package_cases() if case.name in ("moon", "friction-0.05", "rigid-single-stride", "rigid-split")
     ]
@@ -121,7 +121,7 @@ def test_one_and_two_processes_find_the_same():
     assert one == two
 
 
-def test_cases_of_ones_own_come_from_a_file(tmp_path):
+def test_user_cases_are_read_from_a_file(tmp_path):
     (tmp_path / "cases.yaml").write_text("- {name: mine, expected: [walked], reason: mine, config: {slope_deg: 2}}\n")
     (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
     (case,) = load(tmp_path / "own.yaml").config.stability.cases
@@ -163,20 +163,20 @@ def test_cases_of_ones_own_come_from_a_file(tmp_path):
         ),
     ],
 )
-def test_a_bad_file_of_cases_is_told_with_its_place(tmp_path, text, said):
+def test_bad_case_file_is_reported_with_position(tmp_path, text, said):
     (tmp_path / "cases.yaml").write_text(text)
     (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
     with pytest.raises(ConfigError, match=said):
         load(tmp_path / "own.yaml")
 
 
-def test_a_file_of_cases_that_is_not_there_is_not_taken_for_a_config(tmp_path):
+def test_missing_case_file_is_not_mistaken_for_a_config(tmp_path):
     (tmp_path / "own.yaml").write_text("extends: paper\nstability: {cases: cases.yaml}\n")
     with pytest.raises(ConfigError, match=r"own.yaml:2:20: there is no file .*Allowed: a file that holds a list"):
         load(tmp_path / "own.yaml")
 
 
-def test_lines_of_a_case_in_the_config_itself_are_told_with_their_place(tmp_path):
+def test_errors_in_case_lines_of_the_config_have_a_position(tmp_path):
     (tmp_path / "own.yaml").write_text(
         "extends: paper\nstability:\n  cases:\n  - {name: x, expected: [walked], reason: y, config: {gravity: 3}}\n"
     )
@@ -184,27 +184,27 @@ def test_lines_of_a_case_in_the_config_itself_are_told_with_their_place(tmp_path
         load(tmp_path / "own.yaml")
 
 
-def test_a_case_may_have_pads_of_the_contact_gaits_own_pitch():
+def test_case_may_use_pads_at_the_pitch_of_the_contact_gait():
     case = Case(name="own", expected=("walked",), reason="r", steps=2, config={"contact": {"pad_pitch": "own"}})
     assert judge(case, config_of(case)).failures == ()
 
 
 @pytest.mark.parametrize("lines", [{"stance": "pinned"}, {"terrain": "after-mid-swing"}])
-def test_a_scene_that_no_equation_without_events_describes_is_not_tried_with_ordinary_methods(lines):
+def test_scene_with_mode_changes_is_not_tried_with_ordinary_methods(lines):
     case = Case(name="own", expected=("walked",), reason="r", steps=2, config={"contact": lines})
     verdict, *shown = CaseCell(case).run()
     assert verdict.failures == ()
     assert shown == []
 
 
-def test_the_verdict_names_what_failed():
+def test_verdict_names_what_failed():
     summary = summarise([BAD], [], [])
     results = Results(load().config, {"stability": SimpleNamespace(summary=summary, groups={})})
     first = verdict_section.section(results).blocks[0]
     assert (first.tone, first.text) == ("bad", "stability: 1 of 1 did not end as expected: bad.")
 
 
-def test_own_pads_on_ground_without_pads_are_walked_as_contact_sim_walks_them():
+def test_own_pad_pitch_on_plain_ground_walks_as_in_contact_sim():
     ground = {"terrain": "after-mid-swing", "pad_pitch": "own"}
     case = Case(name="x", expected=("walked",), reason="r", steps=2, config={"slope_deg": 4.0, "contact": ground})
     plain = case.model_copy(update={"config": {"slope_deg": 4.0, "contact": {"terrain": "after-mid-swing"}}})
@@ -213,7 +213,7 @@ def test_own_pads_on_ground_without_pads_are_walked_as_contact_sim_walks_them():
     assert own.scene.ground == rigid.scene.ground
 
 
-def test_what_could_not_be_measured_is_told_with_the_reason():
+def test_unmeasured_checks_are_reported_with_the_reason():
     missed = replace(GOOD, not_measured=(NotMeasured("momentum", "the pin transmits forces as well"),))
     summary = summarise([missed], [], [])
     assert summary["cases"][0]["not_measured"] == [{"measure": "momentum", "why": "the pin transmits forces as well"}]

@@ -14,7 +14,7 @@ def case():
     return found
 
 
-def test_the_lightest_walker_takes_the_same_steps_at_every_tolerance(case):
+def test_lightest_walker_takes_the_same_steps_at_every_tolerance(case):
     """Its feet are damped hardest for their mass: a velocity got as a difference ends such walks by chance."""
     start = prepare_start(config_of(case), case)
     walks = [

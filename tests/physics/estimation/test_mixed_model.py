@@ -33,7 +33,7 @@ def covariance(data, noise):
     return np.diag(noise.measurement[data.quantity] ** 2) + noise.roughness_m**2 * data.G @ data.G.T
 
 
-def test_the_likelihood_is_that_of_a_normal_distribution(data):
+def test_likelihood_equals_a_multivariate_normal_density(data):
     # Imported here: it takes a second, in each process that collects the tests.
     from scipy.stats import multivariate_normal
 
@@ -55,7 +55,7 @@ def test_the_likelihood_is_that_of_a_normal_distribution(data):
 
 
 @pytest.mark.parametrize("kicks", [0, 2])
-def test_the_slope_of_the_likelihood_is_its_difference_quotient(data, kicks):
+def test_likelihood_gradient_equals_its_difference_quotient(data, kicks):
     rows, logs = reduce(replace(data, kicks=kicks)), np.log([0.3, 0.5, 0.2, 0.1])
     noise = noise_at(logs, (0, 1))
     likelihood, slope = restricted_with_slope(rows, noise)
@@ -65,7 +65,7 @@ def test_the_slope_of_the_likelihood_is_its_difference_quotient(data, kicks):
         assert slope[place] == pytest.approx((ends[0] - ends[1]) / 2e-5, abs=1e-7)
 
 
-def test_heights_and_kicks_are_told_apart():
+def test_roughness_and_kicks_are_separated():
     draw = np.random.default_rng(2)
     J, G, quantity = draw.normal(size=(600, 2)), draw.normal(size=(600, 80)), np.zeros(600, int)
     noise, disturbances = draw.normal(0.0, 0.3, 600), draw.normal(size=80)
@@ -76,7 +76,7 @@ def test_heights_and_kicks_are_told_apart():
         assert found.process == pytest.approx([floor, kick], abs=0.02)
 
 
-def test_a_prior_is_one_more_measurement(data):
+def test_prior_acts_like_one_more_measurement(data):
     weighed = np.vstack((data.J, data.prior[:, 1:]))
     residuals = np.append(data.residuals, data.prior[:, 0])
     S = np.eye(17)
@@ -97,7 +97,7 @@ def test_whitening_makes_values_independent(data, roughness):
     assert root @ covariance(data, noise) @ root.T == pytest.approx(np.eye(16), abs=1e-12)
 
 
-def test_standard_deviations_of_many_values_are_found():
+def test_noise_of_many_values_is_recovered():
     draw = np.random.default_rng(5)
     quantity = np.repeat([0, 1], 4000)
     J, G = draw.normal(size=(8000, 2)), draw.normal(size=(8000, 60))
@@ -109,7 +109,7 @@ def test_standard_deviations_of_many_values_are_found():
     assert found.roughness_m == pytest.approx(0.1, rel=0.3)
 
 
-def test_an_even_floor_is_found_even():
+def test_even_floor_is_estimated_as_even():
     draw = np.random.default_rng(6)
     G = draw.normal(size=(400, 20))
     products = reduce(
@@ -119,7 +119,7 @@ def test_an_even_floor_is_found_even():
     assert found.roughness_m < 0.03
 
 
-def test_heights_that_act_alike_on_a_very_rough_floor_leave_a_finite_likelihood():
+def test_indistinguishable_heights_on_a_rough_floor_have_a_finite_likelihood():
     rng = np.random.default_rng(5)
     G = np.outer(rng.normal(size=400), np.ones(6))
     values = rng.normal(0.0, 1e-9, 400)

@@ -64,7 +64,7 @@ def filtered(problem, u, rng):
     return total
 
 
-def test_the_likelihood_is_that_of_particle_filters(problem):
+def test_likelihood_agrees_with_a_particle_filter(problem):
     """Filters estimate the likelihood without bias and scatter by 0.2 to 0.7 in its logarithm; three are averaged."""
     rng, values = np.random.default_rng(1), []
     for slope in SLOPES_DEG:

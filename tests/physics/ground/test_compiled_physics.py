@@ -35,14 +35,14 @@ def check(system, state):
 
 
 @pytest.mark.parametrize("has_ground", [(True, True), (False, True), (False, False)])
-def test_compiled_walker_on_ground_moves_as_in_python(has_ground):
+def test_compiled_contact_walker_agrees_with_python(has_ground):
     walker = ground.compass(inertia=0.1)
     for state in states_on_ground(walker, 40):
         check(on_ground(walker, has_ground), state)
 
 
 @pytest.mark.parametrize("has_ground", [False, True])
-def test_compiled_pinned_walker_moves_as_in_python(has_ground):
+def test_compiled_pinned_walker_agrees_with_python(has_ground):
     walker = ground.compass()
     for state in states_on_ground(walker, 20):
         check(on_ground(walker, (has_ground, True), pinned=True), (*state[2:4], *state[6:]))

@@ -29,7 +29,7 @@ def motion_of(walker, foot, state):
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
-def test_slip_is_the_velocity_of_the_balls_own_material(theta, omega, slip, vertical_velocity, depth, foot):
+def test_slip_is_the_velocity_of_the_foot_material_at_the_contact(theta, omega, slip, vertical_velocity, depth, foot):
     """Follow the material point that is lowest now for a moment: the ball turns with its leg."""
     walker = ground.compass(radius=BALL)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
@@ -61,9 +61,7 @@ def test_energies_are_those_of_legs_and_hip(theta, omega, slip, vertical_velocit
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
-def test_the_ground_changes_the_momentum_of_the_masses_by_its_force_at_the_contact(
-    theta, omega, slip, vertical_velocity, depth, foot
-):
+def test_momentum_changes_by_the_contact_force(theta, omega, slip, vertical_velocity, depth, foot):
     """Newton and Euler of legs and hip about the contact point, for the whole walker: forces of gravity and ground."""
     walker = ground.compass(radius=BALL)
     has_ground = (foot == 0, foot == 1)
@@ -91,7 +89,7 @@ def test_the_ground_changes_the_momentum_of_the_masses_by_its_force_at_the_conta
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=st.floats(1e-4, 8e-3), foot=feet)
 @example(theta=(0.6875, 0.0), omega=(0.0, 2.0**-7), slip=0.0, vertical_velocity=0.0, depth=2.0**-7, foot=0)
-def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, vertical_velocity, depth, foot):
+def test_power_balances_and_the_ground_only_dissipates(theta, omega, slip, vertical_velocity, depth, foot):
     """dE/dt of the energy balance along the motion is what damping and friction take."""
     walker = ground.compass(normal=SOFT)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
@@ -107,7 +105,7 @@ def test_power_is_balanced_and_the_ground_only_takes(theta, omega, slip, vertica
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)
 
 
-def test_a_foot_in_the_air_or_without_ground_feels_nothing():
+def test_foot_in_the_air_or_without_ground_feels_nothing():
     walker = ground.compass()
     hovering = ground.placed(walker, 1, -0.3, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
     inside = ground.placed(walker, 1, 1e-4, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
@@ -128,7 +126,7 @@ def test_smooth_ground_has_no_tangential_force():
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
-def test_smooth_ground_is_friction_with_a_coefficient_of_zero(theta, omega, slip, vertical_velocity, depth, foot):
+def test_smooth_ground_equals_zero_friction_coefficients(theta, omega, slip, vertical_velocity, depth, foot):
     smooth, none = ground.compass(friction=ground.SMOOTH), ground.compass(friction=Coulomb(0.0, 0.0, 0.1, 1.0))
     state = ground.placed(smooth, foot, depth, theta, omega, slip, vertical_velocity)
     assert rate_of(on_ground(smooth, BOTH), state) == rate_of(on_ground(none, BOTH), state)
@@ -157,9 +155,7 @@ def differenced(system, state, steps):
     depth=st.floats(1e-4, 4e-3),
     foot=feet,
 )
-def test_derivatives_of_the_motion_on_ground_are_those_of_differences(
-    friction, theta, omega, slip, vertical_velocity, depth, foot
-):
+def test_derivatives_on_ground_equal_finite_differences(friction, theta, omega, slip, vertical_velocity, depth, foot):
     walker = ground.compass(friction=friction, normal=SOFT, radius=BALL, inertia=0.2)
     state = ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity)
     has_ground = (foot == 0, foot == 1)
@@ -175,7 +171,7 @@ def test_derivatives_of_the_motion_on_ground_are_those_of_differences(
 
 
 @pytest.mark.parametrize("vertical_velocity", [-1e-4, 0.0, 1e-4])
-def test_derivatives_hold_at_the_stiffness_of_the_paper(vertical_velocity):
+def test_derivatives_are_correct_at_the_stiffness_of_the_paper(vertical_velocity):
     walker = ground.compass()
     state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.86), 2e-3, vertical_velocity)
     J = gradient_of(on_ground(walker, (False, True)), state)
@@ -206,7 +202,7 @@ def creep_velocity(slope, friction):
 
 
 @pytest.mark.parametrize("slope", [0.02, 0.1])
-def test_a_loaded_block_creeps_downhill_instead_of_sticking(slope):
+def test_loaded_block_creeps_downhill_instead_of_sticking(slope):
     """T/N = tan(slope); the cubic gives mu = mu_s (3 u - u^3) / 2 at u = v / v_s, near v_s (T/N) / (1.5 mu_s)."""
     law = ground.COULOMB
     velocity = creep_velocity(slope, law)
@@ -215,7 +211,7 @@ def test_a_loaded_block_creeps_downhill_instead_of_sticking(slope):
     assert velocity == pytest.approx(law.stiction_velocity * np.tan(slope) / (1.5 * law.static), rel=u**2)
 
 
-def test_a_block_on_a_slope_steeper_than_its_friction_slides_away():
+def test_block_on_a_slope_steeper_than_its_friction_slides_away():
     law = Coulomb(0.2, 0.1, 0.01, 0.1)
     velocity = creep_velocity(0.3, law)
     expected = ground.GRAVITY * (np.sin(0.3) - 0.1 * np.cos(0.3))  # after 1 s, less the moment in which mu_s held it

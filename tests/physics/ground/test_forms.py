@@ -40,7 +40,7 @@ def state_in_line(walker, knee):
 
 @pytest.mark.parametrize("knee", KNEES)
 @pytest.mark.parametrize("assembly", [LEGS, WITH_TORSO], ids=["legs", "torso"])
-def test_one_body_accelerates_as_the_two_that_are_held_together(assembly, knee):
+def test_merged_body_accelerates_like_two_locked_bodies(assembly, knee):
     walker = walker_of(assembly)
     y = state_in_line(walker, knee)
     # a walker with stops keeps its bodies, and the shank follows
@@ -57,7 +57,7 @@ def test_one_body_accelerates_as_the_two_that_are_held_together(assembly, knee):
 
 @pytest.mark.parametrize("knee", [(RELEASED, RELEASED), *KNEES])
 @pytest.mark.parametrize("assembly", [LEGS, WITH_TORSO], ids=["legs", "torso"])
-def test_energies_of_a_pinned_form_are_those_of_the_same_motion_afloat(assembly, knee):
+def test_energies_of_a_pinned_form_equal_those_of_the_floating_form(assembly, knee):
     walker = walker_of(assembly)
     y, n = state_in_line(walker, knee), int(walker.whole.bodies)
     pinned = on_ground(walker, BOTH, knee, pinned=True)
@@ -66,7 +66,7 @@ def test_energies_of_a_pinned_form_are_those_of_the_same_motion_afloat(assembly,
     assert total_energy(pinned, z) == pytest.approx(total_energy(on_ground(walker, BOTH), afloat), rel=1e-12)
 
 
-def test_a_state_of_bodies_that_are_one_is_found_in_that_of_all_bodies():
+def test_state_of_a_reduced_form_is_part_of_the_full_state():
     walker = walker_of(WITH_TORSO)
     for knee in KNEES:
         form = walker.forms[0, locked_knees(knee)]
@@ -74,7 +74,7 @@ def test_a_state_of_bodies_that_are_one_is_found_in_that_of_all_bodies():
         np.testing.assert_array_equal(to_form(form, to_full(form, z, walker.size)), z)
 
 
-def test_levers_of_bodies_that_are_one_are_summed():
+def test_levers_of_merged_bodies_are_summed():
     walker = walker_of(WITH_TORSO)
     whole, straight = walker.whole, walker.forms[0, 3]
     expected = np.zeros(3)
@@ -82,11 +82,11 @@ def test_levers_of_bodies_that_are_one_are_summed():
     np.testing.assert_allclose(straight.foot_x[0, :3], expected, rtol=1e-14)
 
 
-def test_what_a_form_has_not_is_no_attribute():
+def test_form_has_no_attributes_it_does_not_use():
     assert not hasattr(walker_of(LEGS).whole, "weight")
 
 
-def test_more_bodies_than_a_form_has_room_for_are_refused_in_words():
+def test_too_many_bodies_are_rejected():
     names = [f"link {k}" for k in range(9)]
     joints = (Revolute(f"hinge {k}", names[k], (0.0, 0.0), names[k + 1], (0.0, 1.0)) for k in range(8))
     feet = tuple(BallFoot(name, name, (0.0, 0.0), 0.0) for name in (names[0], names[-1]))

@@ -32,13 +32,13 @@ def test_friction_is_odd(law, slip):
 
 
 @given(law=friction_laws(), slip=slips)
-def test_friction_never_pushes(law, slip):
+def test_friction_opposes_slip(law, slip):
     assert coefficient(law, slip) * slip <= 0.0
     assert abs(coefficient(law, slip)) <= law.static * (1.0 + 1e-12)
 
 
 @given(law=friction_laws())
-def test_friction_peaks_at_the_stiction_velocity_and_falls_to_its_dynamic_value(law):
+def test_friction_peaks_at_the_stiction_velocity_and_falls_to_the_dynamic_value(law):
     assert coefficient(law, 0.0) == pytest.approx(0.0, abs=1e-15)
     assert coefficient(law, law.stiction_velocity) == pytest.approx(-law.static)
     for faster in (1.0, 2.0, 1e3):
@@ -49,13 +49,13 @@ def test_friction_peaks_at_the_stiction_velocity_and_falls_to_its_dynamic_value(
     assert np.all(np.diff(falling) <= 1e-15)
 
 
-def test_friction_between_the_velocities_is_the_mean_of_both_half_way():
+def test_friction_half_way_between_the_velocities_is_the_mean():
     assert coefficient(PAPER, 0.55) == pytest.approx(-0.8)
     assert coefficient(PAPER, 0.05) == pytest.approx(-0.9 * (3 * 0.5 - 0.5**3) / 2)
 
 
 @given(law=friction_laws(), fraction=st.floats(-1.5, 1.5))
-def test_derivative_of_the_friction_is_that_of_differences(law, fraction):
+def test_derivative_of_friction_equals_finite_differences(law, fraction):
     slip = fraction * law.friction_velocity
     h = 1e-4 * min(law.stiction_velocity, law.friction_velocity - law.stiction_velocity)
     assume(all(abs(abs(slip) - join) > 2 * h for join in (law.stiction_velocity, law.friction_velocity)))
@@ -66,11 +66,11 @@ def test_derivative_of_the_friction_is_that_of_differences(law, fraction):
 
 @pytest.mark.parametrize("join", [PAPER.stiction_velocity, PAPER.friction_velocity])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_friction_and_its_derivative_are_continuous_at_the_joins(join, side):
+def test_friction_and_its_derivative_are_continuous_at_switching_points(join, side):
     below, above = (friction_coefficient(PAPER, side * join * (1.0 + s)) for s in (-1e-9, 1e-9))
     assert below == pytest.approx(above, abs=1e-6)
 
 
 @given(slip=slips)
-def test_smooth_ground_does_not_hold(slip):
+def test_smooth_ground_has_no_friction(slip):
     assert friction_coefficient(Frictionless(), slip) == (0.0, 0.0)

@@ -29,7 +29,7 @@ rates = st.tuples(*(st.floats(-3.0, 3.0),) * 2)
 
 
 @given(theta=angles, omega=rates)
-def test_a_pinned_walker_moves_as_the_rigid_one(theta, omega):
+def test_pinned_driven_walker_moves_like_the_rigid_one(theta, omega):
     """Written for the rigid model's own equations; the roles of the feet decide whose torque is whose."""
     config = loader.load(Path("paper"), [*SETTINGS, "walker.foot_radius_m=0"]).config
     rigid, y = rigid_walker(config, "corrected"), np.array((*theta, *omega))
@@ -41,7 +41,7 @@ def test_a_pinned_walker_moves_as_the_rigid_one(theta, omega):
 
 @settings(max_examples=20)
 @given(theta=angles, omega=rates, stance=st.sampled_from([0, 1]))
-def test_their_derivatives_are_those_of_differences(theta, omega, stance):
+def test_derivatives_of_hip_torques_equal_finite_differences(theta, omega, stance):
     walker = changed_forms(ground.compass(radius=0.01, inertia=0.2), **HIP)
     state = (0.0, 5.0, *theta, 0.2, -0.1, *omega)
     system = on_ground(walker, IN_THE_AIR, progress=new_progress(stance))
@@ -49,7 +49,7 @@ def test_their_derivatives_are_those_of_differences(theta, omega, stance):
     assert np.abs(gradient_of(system, state) - expected).max() < 1e-7 * (1.0 + np.abs(expected).max())
 
 
-def test_with_knees_they_act_on_the_thighs():
+def test_hip_torques_act_on_the_thighs_of_a_kneed_walker():
     config = loader.load(Path("kneed")).config
     passive = contact_scene(config, 0.4).walker
     pushed = changed_forms(passive, hip=(0.0, 0.0, 1.0))
@@ -66,7 +66,7 @@ def test_with_knees_they_act_on_the_thighs():
     assert (swing, stance) == tuple(locked.form.knees[:, 1])
 
 
-def test_a_springs_work_over_the_steps_taken_is_what_its_energy_fell_by():
+def test_spring_work_equals_the_drop_of_its_energy():
     """As in the rigid model; the energy balance counts what it stores."""
     config = loader.load(Path("paper"), ["slope_deg=3", SETTINGS[0], "contact.terrain=after-mid-swing"]).config
     gait = find_gaits(rigid_walker(config, "corrected")).gait
@@ -80,7 +80,7 @@ def test_a_springs_work_over_the_steps_taken_is_what_its_energy_fell_by():
     assert abs(walk.driven.hip) > 1e-3
 
 
-def test_the_energy_balance_of_a_driven_walk_closes():
+def test_energy_balance_of_a_driven_walk_closes():
     config = loader.load(Path("paper"), ["slope_deg=0.9", *SETTINGS, "contact.terrain=after-mid-swing"]).config
     scene = contact_scene(config, RIGID_STEP)
     start = start_state(scene, (-0.2044455, 0.169539, -0.6057394, -0.861714))

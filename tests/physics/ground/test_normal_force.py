@@ -23,7 +23,7 @@ rates = st.floats(-10.0, 10.0)
 
 
 @given(x0=st.floats(-5.0, 5.0), width=st.floats(1e-3, 10.0), h0=st.floats(-5.0, 5.0), h1=st.floats(-5.0, 5.0))
-def test_step_is_flat_outside_and_meets_its_ends_without_a_kink(x0, width, h0, h1):
+def test_step_function_is_flat_outside_and_smooth_at_its_ends(x0, width, h0, h1):
     def at(fraction):
         return smooth_step(x0 + fraction * width, x0, h0, x0 + width, h1)
 
@@ -39,7 +39,7 @@ def test_step_is_flat_outside_and_meets_its_ends_without_a_kink(x0, width, h0, h
     assert slope == pytest.approx(1.5 * (h1 - h0) / width, abs=1e-9 * (1.0 + rise) / width)
 
 
-def test_step_is_the_cubic_with_those_ends():
+def test_step_function_is_the_cubic_with_those_ends():
     """The only cubic with given values and flat ends, from its four conditions."""
     x0, h0, x1, h1 = 0.3, -1.0, 1.1, 4.0
     conditions = [[x**3, x**2, x, 1.0] for x in (x0, x1)] + [[3 * x**2, 2 * x, 1.0, 0.0] for x in (x0, x1)]
@@ -56,7 +56,7 @@ def test_normal_force_is_never_adhesive(law, depth, rate):
 
 
 @given(law=laws, depth=depths, rate=rates)
-def test_damping_only_takes_energy(law, depth, rate):
+def test_damping_only_dissipates_energy(law, depth, rate):
     """(F - k d^e) d' >= 0, also where the clip at zero cuts the damping short."""
     normal = impact_normal_force(depth, rate, law)
     assert (normal.force - normal.spring) * rate >= -1e-12 * normal.spring * abs(rate)
@@ -81,7 +81,7 @@ def test_elastic_energy_is_the_work_of_the_spring():
 
 
 @given(law=laws, fraction=st.floats(0.01, 3.0), rate=rates)
-def test_derivatives_of_the_normal_force_are_those_of_differences(law, fraction, rate):
+def test_derivatives_of_the_normal_force_equal_finite_differences(law, fraction, rate):
     depth = fraction * law.full_damping_penetration
     normal = impact_normal_force(depth, rate, law)
     h = 1e-5 * depth
@@ -98,7 +98,7 @@ def test_derivatives_of_the_normal_force_are_those_of_differences(law, fraction,
 
 
 @pytest.mark.parametrize("rate", [-0.3, 0.0, 0.3])
-def test_normal_force_and_its_derivative_are_continuous_where_damping_is_complete(rate):
+def test_normal_force_and_its_derivative_are_continuous_at_full_damping(rate):
     law = NormalLaw(4e11, 2.2, 9e4, 1e-4)
     below, above = (impact_normal_force(law.full_damping_penetration * (1.0 + s), rate, law) for s in (-1e-9, 1e-9))
     for one, other in zip(below, above, strict=True):
@@ -106,7 +106,7 @@ def test_normal_force_and_its_derivative_are_continuous_where_damping_is_complet
 
 
 @pytest.mark.parametrize("rate", [-1.0, 1.0])
-def test_the_first_touch_is_soft(rate):
+def test_force_starts_at_zero_at_first_touch(rate):
     """No force, no spring and no damping at zero penetration: a touch is no jump, whatever the speed."""
     law = NormalLaw(4e11, 2.2, 9e4, 1e-4)
     forces = [impact_normal_force(d, rate, law).force for d in (1e-7, 1e-8, 1e-9)]
@@ -114,7 +114,7 @@ def test_the_first_touch_is_soft(rate):
     assert forces[-1] < 1e-4 * law.damping * abs(rate)
 
 
-def test_the_law_has_its_units():
+def test_normal_law_is_consistent_in_its_units():
     """N/mm^e and mm against N/m^e and m."""
     k, e, c, d_max = 1e5, 2.2, 90.0, 0.1
     law = NormalLaw(k * 1000.0**e, e, c * 1000.0, d_max / 1000.0)

@@ -32,7 +32,7 @@ def test_pinned_walker_is_the_rigid_swing_with_a_leg_shorter_by_the_radius(state
 
 
 @given(state=states)
-def test_pinned_on_the_other_foot_the_legs_change_roles(state):
+def test_pinning_the_other_foot_swaps_the_roles_of_the_legs(state):
     t_1, t_2, w_1, w_2 = state
     one = rate_of(pinned(), state)
     other = rate_of(pinned(foot=0), (t_2, t_1, w_2, w_1))
@@ -40,7 +40,7 @@ def test_pinned_on_the_other_foot_the_legs_change_roles(state):
 
 
 @given(state=states, inertia=inertias)
-def test_derivatives_of_the_pinned_walker_are_those_of_differences(state, inertia):
+def test_derivatives_of_the_pinned_walker_equal_finite_differences(state, inertia):
     check_jacobian(pinned(inertia=inertia), state)
 
 
@@ -62,7 +62,7 @@ def check_jacobian(system, state):
     stance=st.sampled_from([-2.0, -0.3, 1.0]),
     foot=st.sampled_from([0, 1]),
 )
-def test_derivatives_hold_with_the_other_foot_in_the_ground(angle, depth, swing, stance, foot):
+def test_derivatives_are_correct_with_the_other_foot_in_the_ground(angle, depth, swing, stance, foot):
     system = pinned(radius=0.01, inertia=0.1, foot=foot, has_ground=True)
     # legs that end at the balls' centres: by as much as the swing leg reaches further down
     other = -math.acos(math.cos(angle) + depth / 0.99)
@@ -76,7 +76,7 @@ def test_derivatives_hold_with_the_other_foot_in_the_ground(angle, depth, swing,
 
 
 @given(state=states, radius=radii)
-def test_the_hinge_stays_where_it_is_and_the_ball_just_touches(state, radius):
+def test_hinge_stays_fixed_and_the_foot_just_touches(state, radius):
     walker = ground.compass(radius=radius)
     full = floating_state(walker.forms[1, 0], state, 8)
     motion = feet_motion(walker.whole, full)[1]
@@ -88,7 +88,7 @@ def test_the_hinge_stays_where_it_is_and_the_ball_just_touches(state, radius):
 
 
 @given(state=states)
-def test_velocities_of_the_floating_state_are_those_of_its_positions(state):
+def test_velocities_of_the_floating_state_are_the_rates_of_its_positions(state):
     form = pinned().form
     h = 1e-6
     moved = [tuple(np.array(state) + np.array([s * h * state[2], s * h * state[3], 0.0, 0.0])) for s in (-1, 1)]
@@ -96,6 +96,6 @@ def test_velocities_of_the_floating_state_are_those_of_its_positions(state):
     np.testing.assert_allclose((above - below)[:2] / (2 * h), floating_state(form, state, 8)[4:6], atol=1e-8)
 
 
-def test_the_pinned_walker_has_two_angles_only():
+def test_pinned_walker_has_only_two_angles():
     form = pinned().form
     assert (form.places, form.bodies) == (0, 2)

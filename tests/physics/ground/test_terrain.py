@@ -27,7 +27,7 @@ def walked_on(pitch):
 
 
 @given(pitch=pitches, along=places, foot=feet)
-def test_a_cell_holds_what_lies_between_its_edges(pitch, along, foot):
+def test_cell_contains_the_points_between_its_edges(pitch, along, foot):
     terrain = walked_on(pitch)
     begins, ends = cell_edges(terrain, foot, cell_at(terrain, foot, along))
     assert begins - 1e-9 <= along <= ends + 1e-9
@@ -35,7 +35,7 @@ def test_a_cell_holds_what_lies_between_its_edges(pitch, along, foot):
 
 
 @given(pitch=pitches, foot=feet, cell=st.integers(-50, 50))
-def test_cells_follow_each_other_without_gap_or_overlap(pitch, foot, cell):
+def test_cells_tile_the_ground_without_gap_or_overlap(pitch, foot, cell):
     terrain = walked_on(pitch)
     here, there = cell_edges(terrain, foot, cell), cell_edges(terrain, foot, cell + 1)
     assert here[1] == pytest.approx(there[0], abs=1e-9)
@@ -44,7 +44,7 @@ def test_cells_follow_each_other_without_gap_or_overlap(pitch, foot, cell):
 
 
 @given(pitch=pitches, j=st.integers(-20, 20))
-def test_each_legs_pads_lie_centred_on_its_footholds(pitch, j):
+def test_pads_of_each_leg_are_centred_on_its_footholds(pitch, j):
     """The stance leg's on s = 2 j S, the other's on s = (2 j + 1) S; where one has a pad the other has none."""
     terrain = walked_on(pitch)
     for foothold, foot in ((2 * j * pitch, 1), ((2 * j + 1) * pitch, 0)):
@@ -56,7 +56,7 @@ def test_each_legs_pads_lie_centred_on_its_footholds(pitch, j):
 
 @pytest.mark.parametrize("has_ground", [False, True])
 @pytest.mark.parametrize("ahead", [False, True])
-def test_a_pad_stays_where_it_is(has_ground, ahead):
+def test_pads_do_not_move(has_ground, ahead):
     terrain = walked_on(0.4)
     for stands in (True, False):
         assert has_ground_in_air(terrain, has_ground, stands, ahead) == has_ground
@@ -67,7 +67,7 @@ def test_a_pad_stays_where_it_is(has_ground, ahead):
 
 
 @given(along=places, foot=feet)
-def test_a_plane_is_one_cell_without_edges_in_reach(along, foot):
+def test_plane_is_one_cell_with_edges_out_of_reach(along, foot):
     terrain = after_mid_swing(0.4)
     begins, ends = cell_edges(terrain, foot, cell_at(terrain, foot, along))
     assert begins < along - 1e6 < along + 1e6 < ends
@@ -75,7 +75,7 @@ def test_a_plane_is_one_cell_without_edges_in_reach(along, foot):
     assert math.isfinite(ends)
 
 
-def test_on_a_plane_a_foot_is_carried_only_after_it_was_in_the_air_ahead():
+def test_foot_on_a_plane_is_supported_only_after_swinging_ahead_in_the_air():
     terrain = after_mid_swing(0.4)
     assert terrain.order_matters
     assert starts_with_ground(terrain, True)

@@ -46,7 +46,7 @@ def walk(period=PERIOD, steps=STEPS, interval=0.004, shift=0.0):
     return Motion(time, angle, rate / period, strikes)
 
 
-def test_a_walk_differs_nowhere_from_itself():
+def test_walk_does_not_differ_from_itself():
     _, in_time = difference_in_time(walk(), walk())
     in_phase = difference_in_phase(walk(), walk(), PHASES)
     for difference in (in_time, in_phase):
@@ -55,7 +55,7 @@ def test_a_walk_differs_nowhere_from_itself():
     assert orbit_distances(walk(), walk()).max() < 1e-15
 
 
-def test_angles_of_a_stretched_copy_differ_in_time_and_not_in_phase():
+def test_angles_of_a_stretched_copy_differ_in_time_but_not_in_phase():
     copy = walk(period=1.01 * PERIOD)
     _, in_time = difference_in_time(copy, walk())
     in_phase = difference_in_phase(copy, walk(), PHASES)
@@ -74,7 +74,7 @@ def test_difference_in_time_grows_from_step_to_step():
     assert (np.diff(each) > 0).all()
 
 
-def test_an_angle_that_is_off_by_a_constant_is_off_by_it_in_both_ways_and_alone():
+def test_constant_offset_of_one_angle_is_found_in_time_and_phase():
     plain = walk()
     leaning = Motion(plain.time, plain.angle + np.array([0.0, 0.01]), plain.velocity, plain.step_ends)
     for difference in (difference_in_time(leaning, plain)[1], difference_in_phase(leaning, plain, PHASES)):
@@ -82,13 +82,13 @@ def test_an_angle_that_is_off_by_a_constant_is_off_by_it_in_both_ways_and_alone(
         assert_allclose(difference.largest("velocity"), 0.0, atol=1e-15)
 
 
-def test_a_heel_strike_that_comes_late_makes_the_velocities_differ_by_its_jump():
+def test_late_heel_strike_makes_velocities_differ_by_the_jump():
     _, difference = difference_in_time(walk(period=PERIOD * (1 + 1e-4), steps=1), walk(steps=1))
     assert_allclose(difference.largest("velocity"), 2 * KINK * np.pi / PERIOD, rtol=1e-3)
 
 
 @pytest.mark.parametrize("step", range(STEPS))
-def test_a_step_begins_after_its_impact_and_ends_before_the_next(step):
+def test_step_begins_after_its_impact_and_ends_before_the_next(step):
     angle, velocity = walk().during(step, np.array([0.0, 1.0]))
     assert_allclose(angle[0], legs_at(np.array([float(step)]), 1.0)[0][0], atol=1e-12)
     assert_allclose(velocity[0], legs_at(np.array([float(step)]), 1.0)[1][0] / PERIOD, atol=1e-9)
@@ -99,7 +99,7 @@ def test_only_steps_that_both_completed_are_compared():
     assert difference_in_phase(walk(steps=4), walk(), PHASES).angle.shape == (4, PHASES.size, 2)
 
 
-def test_walks_without_a_step_have_no_difference_in_phase_and_without_a_stride_no_orbit():
+def test_short_walks_have_no_phase_difference_or_orbit():
     plain = walk()
     cut = Motion(plain.time[:50], plain.angle[:50], plain.velocity[:50], plain.step_ends[:0])
     with pytest.raises(ValueError, match="no step"):
@@ -118,7 +118,7 @@ def rough(interval, impact):
     return Motion(time, np.column_stack((angle, angle)), np.column_stack((velocity, velocity)), np.array([0.5 + 1e-13]))
 
 
-def test_a_touch_between_samples_is_continued_from_before_and_not_smeared_by_the_impact():
+def test_touch_between_samples_is_extrapolated_from_before_the_impact():
     motion = rough(interval=0.003, impact=1e-4)
     smeared = motion.during(0, np.array([1.0]))[1]
     whole = add_strike_samples(motion).during(0, np.array([1.0]))[1]
@@ -126,17 +126,17 @@ def test_a_touch_between_samples_is_continued_from_before_and_not_smeared_by_the
     assert abs(smeared + 1.0).min() > 0.1
 
 
-def test_a_walk_with_samples_at_its_heel_strikes_is_left_alone():
+def test_walk_with_samples_at_its_heel_strikes_is_unchanged():
     motion = walk()
     assert add_strike_samples(motion) is motion
 
 
 @pytest.mark.parametrize("shift", [2.0, 4.0])
-def test_orbit_of_a_copy_shifted_in_time_lies_where_the_orbit_lies(shift):
+def test_orbit_of_a_time_shifted_copy_is_the_same(shift):
     assert orbit_distances(walk(shift=shift), walk(interval=0.0037)).max() < 1e-3  # second order in the interval
 
 
-def test_orbit_distance_of_a_larger_circle_is_the_gap_in_units_of_the_range():
+def test_orbit_distance_between_circles_is_relative_to_the_range():
     def circle(radius):
         time = np.linspace(0.0, 2.0, 2001)
         ring = radius * np.cos(np.pi * time), radius * np.sin(np.pi * time)
@@ -146,7 +146,7 @@ def test_orbit_distance_of_a_larger_circle_is_the_gap_in_units_of_the_range():
     assert_allclose(orbit_distances(circle(1.1), circle(1.0)), 0.1 / 2.0, rtol=1e-3)
 
 
-def test_distance_of_polylines_is_that_of_their_points_when_they_are_dense():
+def test_distance_of_dense_polylines_equals_that_of_their_points():
     rng = np.random.default_rng(3)
     for _ in range(5):
         one, other = (np.cumsum(rng.normal(size=(12, 2)), axis=0) for _ in range(2))
@@ -157,7 +157,7 @@ def test_distance_of_polylines_is_that_of_their_points_when_they_are_dense():
         assert hausdorff(one, other) == pytest.approx(expected, abs=5e-3)
 
 
-def test_phase_plane_has_angle_and_velocity_of_the_leg():
+def test_phase_plane_shows_angle_and_velocity_of_the_leg():
     motion = walk()
     assert_allclose(phase_plane(motion, 1), np.column_stack((motion.angle[:, 1], motion.velocity[:, 1])))
 
@@ -171,7 +171,7 @@ def locking(at, interval=0.003):
     )
 
 
-def test_a_knee_strike_between_samples_is_no_smear_on_either_side():
+def test_knee_strike_between_samples_is_not_smeared():
     motion = add_strike_samples(locking(0.5005))
     times = np.linspace(0.49, 0.51, 400)
     angle, velocity = motion.at(times)
@@ -179,14 +179,14 @@ def test_a_knee_strike_between_samples_is_no_smear_on_either_side():
     assert_allclose(velocity[:, 0], np.where(times < 0.5005, -1.0, 1.0), atol=1e-9)
 
 
-def test_a_strike_is_not_continued_across_another():
+def test_extrapolation_to_a_strike_stops_at_the_previous_one():
     late = replace(locking(0.9975), step_ends=np.array([0.9985]))
     assert not np.isin([0.9975, 0.9985], add_strike_samples(late).time).any()
     apart = replace(locking(0.9), step_ends=np.array([0.9985]))
     assert np.isin([0.9, 0.9985], add_strike_samples(apart).time).all()
 
 
-def test_knees_that_lock_a_moment_apart_are_no_difference_between_impacts():
+def test_slightly_different_knee_lock_times_are_not_a_difference():
     one, other = (add_strike_samples(locking(at)) for at in (0.5045, 0.5155))
     apart = difference_in_phase(one, other, PHASES)
     smooth = between_impacts(one, other, PHASES)

@@ -70,7 +70,7 @@ def swing_foot_comes_down(_t, y):
 swing_foot_comes_down.terminal, swing_foot_comes_down.direction = True, -1.0
 
 
-def test_the_first_step_ends_where_and_when_the_formulas_say():
+def test_first_step_ends_as_hand_formulas_predict():
     y = np.array([0.0, 0.0, *FIXED_POINT[:2], 0.0, 0.0, *FIXED_POINT[2:]])
     centre, velocity = foot(y, 1)
     y[:2] += np.array([0.0, RADIUS]) - centre

@@ -14,7 +14,7 @@ def test_samples_do_not_change_the_walk():
     assert seen.samples.time_s[-1] <= seen.end_time_s < seen.samples.time_s[-1] + 0.011
 
 
-def test_samples_show_the_touches_where_they_were_found():
+def test_samples_include_the_touches():
     walk, scene = walked(interval=0.001, steps=4), scene_of()
     samples = walk.samples
     feet = sample_feet(scene.walker, samples)
@@ -30,7 +30,7 @@ def test_samples_show_the_touches_where_they_were_found():
     assert np.median(supporting) == pytest.approx(20.0 * 9.81, rel=0.05)
 
 
-def test_deepest_penetration_is_what_the_samples_show():
+def test_deepest_penetration_agrees_with_the_samples():
     walk, scene = walked(interval=0.001, steps=4), scene_of()
     feet = sample_feet(scene.walker, walk.samples)
     depth = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()

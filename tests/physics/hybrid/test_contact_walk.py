@@ -40,7 +40,7 @@ NEAR_RIGID = (
 # ---- measured by two other programs ---------------------------------------------------------------------------------
 
 
-def test_ten_steps_are_walked_and_settle_slower_and_shorter_than_the_rigid_gait():
+def test_ten_steps_settle_slower_and_shorter_than_the_rigid_gait():
     walk = walked()
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s.shape == (10,)
@@ -48,7 +48,7 @@ def test_ten_steps_are_walked_and_settle_slower_and_shorter_than_the_rigid_gait(
     assert walk.lengths_m[-1] == pytest.approx(0.361, abs=5e-4)
 
 
-def test_stickier_friction_brings_the_walk_towards_the_rigid_one():
+def test_lower_stiction_velocity_brings_the_walk_closer_to_the_rigid_one():
     walk = walked(*STICKY)
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s[-1] == pytest.approx(0.7045, abs=1e-4)
@@ -69,7 +69,7 @@ def test_too_fast_a_start_recovers_to_the_same_gait(factor):
     assert walk.periods_s[-1] == pytest.approx(walked(OWN_PITCH, steps=40).periods_s[-1], abs=1e-5)
 
 
-def test_pads_laid_at_the_rigid_pitch_are_tripped_over_after_twelve_steps():
+def test_pads_at_the_rigid_pitch_trip_the_walker_after_twelve_steps():
     walk = walked(steps=20)
     assert walk.outcome is Outcome.OFF_PAD
     assert walk.periods_s.size == 12
@@ -77,27 +77,27 @@ def test_pads_laid_at_the_rigid_pitch_are_tripped_over_after_twelve_steps():
     assert lag / RIGID_STEP == pytest.approx(0.3, abs=0.05)
 
 
-def test_pads_at_the_gaits_own_pitch_carry_it_for_ever():
+def test_pads_at_the_pitch_of_the_contact_gait_allow_endless_walking():
     walk = walked(OWN_PITCH, steps=40)
     assert walk.outcome is Outcome.WALKED
     assert np.ptp(walk.periods_s[-10:]) < 1e-6
 
 
-def test_steeper_the_scuff_begins_further_back_and_fewer_steps_are_walked():
+def test_steeper_slopes_scuff_earlier_and_allow_fewer_steps():
     start = (-0.3233886, 0.2186688, -0.3773739, -1.0923836)
     walk = walked("slope_deg=3", start=start, step=0.5354454, steps=12)
     assert walk.outcome is Outcome.OFF_PAD
     assert 8 <= walk.periods_s.size <= 9  # the pad's edge is missed by a tenth of a millimetre after the eighth
 
 
-def test_slippery_ground_shortens_five_steps_then_trips_the_walker():
+def test_slippery_ground_shortens_five_steps_and_then_trips_the_walker():
     walk = walked(*SLIPPERY)
     assert walk.outcome is Outcome.OFF_PAD
     assert walk.periods_s.size == 5
     assert walk.lengths_m[-1] == pytest.approx(0.34, abs=2e-3)
 
 
-def test_glassy_ground_lets_the_stance_foot_slide_away_at_once():
+def test_stance_foot_slides_away_at_once_on_glassy_ground():
     walk = walked(*GLASSY)
     assert walk.outcome is Outcome.SLID
     assert walk.periods_s.size == 0
@@ -114,7 +114,7 @@ def slid_foot(tolerance, start):
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
-def test_a_walk_ends_the_moment_its_loaded_stance_foot_is_too_far_from_its_foothold(tolerance):
+def test_walk_ends_when_its_loaded_stance_foot_slides_too_far(tolerance):
     away, height, farthest = slid_foot(tolerance, (*FIXED_POINT[:2], 0.0, 0.0))
     assert height < -1e-5
     # located to 1e-12 s at a few m/s
@@ -122,13 +122,13 @@ def test_a_walk_ends_the_moment_its_loaded_stance_foot_is_too_far_from_its_footh
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-8])
-def test_a_walk_ends_the_moment_its_stance_foot_lands_too_far_from_its_foothold(tolerance):
+def test_walk_ends_when_its_stance_foot_lands_too_far_away(tolerance):
     away, height, farthest = slid_foot(tolerance, FIXED_POINT)
     assert away > farthest
     assert height == pytest.approx(0.0, abs=1e-11)
 
 
-def test_near_rigid_contact_walks_almost_the_rigid_gait():
+def test_nearly_rigid_contact_walks_almost_the_rigid_gait():
     """Stiffness and damping 10^4 times, stiction at 0.1 mm/s, and a point foot, as the rigid model has it."""
     walk = walked(*NEAR_RIGID, "walker.foot_radius_m=0")
     assert walk.outcome is Outcome.WALKED
@@ -137,7 +137,7 @@ def test_near_rigid_contact_walks_almost_the_rigid_gait():
 
 
 @pytest.mark.parametrize("slope", ["slope_deg=1", "slope_rad=0.01755"])
-def test_the_adams_start_of_table_2_does_not_walk_and_says_so(slope):
+def test_adams_start_of_table_2_does_not_walk(slope):
     walk = walked(slope, start=(-0.2021, 0.1670, -1.02, -3.20))
     assert walk.outcome in (Outcome.LIFTED_OFF, Outcome.OFF_PAD, Outcome.FELL)
     assert walk.periods_s.size == 0
@@ -150,14 +150,14 @@ def test_the_adams_start_of_table_2_does_not_walk_and_says_so(slope):
 
 
 @pytest.mark.parametrize("sets", [(), STICKY, NEAR_RIGID, SLIPPERY], ids=["paper", "sticky", "near-rigid", "slippery"])
-def test_energy_is_accounted_for(sets):
+def test_energy_balance_closes(sets):
     walk = walked(*sets)
     assert walk.energy_balance_residual_J < 1e-6
     assert walk.dissipated_J[0] > 0.0
     assert walk.dissipated_J[1] > 0.0
 
 
-def test_what_walking_downhill_yields_is_what_the_ground_takes():
+def test_potential_energy_lost_downhill_equals_the_ground_losses():
     """A settled gait loses per step the weight's work along the slope."""
     walk = walked(OWN_PITCH, steps=40, interval=0.01)
     weight_along = 20.0 * 9.81 * math.sin(math.radians(1.0))
@@ -168,7 +168,7 @@ def test_what_walking_downhill_yields_is_what_the_ground_takes():
     assert late - early == pytest.approx(weight_along * way, rel=1e-5)
 
 
-def test_times_of_touches_converge_with_the_tolerance():
+def test_touch_times_converge_with_the_tolerance():
     reference = walked(tolerance=1e-10).touch_time_s
     errors = {tol: np.abs(walked(tolerance=tol).touch_time_s - reference).max() for tol in (1e-5, 1e-6, 1e-7)}
     assert errors[1e-5] < 1e-4
@@ -176,7 +176,7 @@ def test_times_of_touches_converge_with_the_tolerance():
     assert errors[1e-7] < 1e-7
 
 
-def test_single_support_agrees_with_scipys_radau_on_the_compiled_motion():
+def test_single_support_agrees_with_scipy_radau():
     """The same motion, integrated by another program from the start to before the swing foot leaves its pad."""
     scene = scene_of()
     system = on_ground(scene.walker, (True, True))
@@ -202,20 +202,20 @@ def test_single_support_agrees_with_scipys_radau_on_the_compiled_motion():
     np.testing.assert_allclose(samples.states[chosen][-1], peer.y[:, -1], atol=1e-7)
 
 
-def test_scipys_radau_walks_the_same_steps():
+def test_scipy_radau_walks_the_same_steps():
     peer, own = walked(method="scipy-radau", steps=3), walked(steps=3)
     assert peer.outcome is own.outcome is Outcome.WALKED
     np.testing.assert_allclose(peer.touch_time_s, own.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(peer.touch_along_m, own.touch_along_m, atol=1e-6)
 
 
-def test_the_same_walk_gives_the_same_bits():
+def test_repeated_walk_is_bitwise_equal():
     one, other = walked(steps=4), walked.__wrapped__(steps=4)
     np.testing.assert_array_equal(one.touch_time_s, other.touch_time_s)
     assert one.end_state == other.end_state
 
 
-def test_a_budget_ends_the_walk_in_words():
+def test_exhausted_budget_ends_the_walk_with_advice():
     walk = walked(budget=2000)
     assert walk.outcome is Outcome.BUDGET_EXHAUSTED
     assert not walk.outcome.answered
@@ -225,7 +225,7 @@ def test_a_budget_ends_the_walk_in_words():
 # ---- the parts a scene can leave out ---------------------------------------------------------------------------------
 
 
-def test_on_a_plane_that_lets_scuffing_feet_through_the_walk_goes_on():
+def test_walk_continues_on_a_plane_that_ignores_scuffing():
     """Compiled code is not needed for this: SciPy's method walks the same source in Python."""
     plane = walked("contact.terrain=after-mid-swing", method="scipy-radau", steps=3)
     pads = walked(method="scipy-radau", steps=3)
@@ -233,13 +233,13 @@ def test_on_a_plane_that_lets_scuffing_feet_through_the_walk_goes_on():
     np.testing.assert_allclose(plane.touch_time_s, pads.touch_time_s, atol=1e-5)
 
 
-def test_smooth_ground_cannot_be_walked_on():
+def test_walker_cannot_walk_on_smooth_ground():
     walk = walked("contact.friction=none", method="scipy-radau", steps=2)
     assert walk.outcome is Outcome.SLID
     assert walk.dissipated_J[1] == 0.0
 
 
-def test_a_pinned_first_step_is_the_rigid_one_until_the_hinge_is_released():
+def test_pinned_first_step_equals_the_rigid_one_until_release():
     """The ball's centre is the hinge: the rigid walk of a walker whose legs are shorter by the radius."""
     walk = walked("contact.stance=pinned", "walker.foot_radius_m=0", method="scipy-radau", steps=2)
     assert walk.outcome is Outcome.WALKED
@@ -255,7 +255,7 @@ def test_a_pinned_first_step_is_the_rigid_one_until_the_hinge_is_released():
     w_2=st.floats(-5.0, 3.0),
     friction=st.sampled_from([(), SLIPPERY, STICKY]),
 )
-def test_any_start_ends_in_words(theta_2, w_1, w_2, friction):
+def test_any_start_ends_with_a_known_outcome(theta_2, w_1, w_2, friction):
     start = (-2.0 * math.radians(1.0) - theta_2, theta_2, w_1, w_2)
     walk = walked.__wrapped__(*friction, start=start, steps=4, budget=300_000)
     assert walk.outcome not in (Outcome.SOLVER_FAILED, Outcome.REJECTED)
@@ -278,7 +278,7 @@ BOUNCING = (
 )
 
 
-def test_a_foot_that_an_event_left_on_the_surface_does_not_hold_the_walk_up():
+def test_foot_left_on_the_surface_by_an_event_does_not_stall_the_walk():
     """Hardly damped feet bounce on and on; rounding decides on which side of the surface an event leaves them."""
     walk = walked(*BOUNCING, steps=4, budget=300_000)
     assert walk.outcome is Outcome.WALKED

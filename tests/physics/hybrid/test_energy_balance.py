@@ -28,7 +28,7 @@ def nothing_explained(monkeypatch):
     monkeypatch.setattr(contact_result, "UNEXPLAINED", 0.0)
 
 
-def test_a_walk_by_equations_of_another_walker_is_refused_with_its_residual_in_words():
+def test_walk_with_inconsistent_equations_is_rejected_with_its_residual():
     """The pinned walker moves as one with a heavier hip would; its energy is its own."""
     scene, heavier = scene_of("contact.stance=pinned"), scene_of("contact.stance=pinned", "walker.hip_mass_kg=20")
     forms = scene.walker.forms.copy()
@@ -49,14 +49,14 @@ def test_a_walk_by_equations_of_another_walker_is_refused_with_its_residual_in_w
     assert taken.energy_balance_residual_J > 0.01  # J: five kilograms differ by more than numbers do
 
 
-def test_what_the_tolerance_explains_grows_with_it():
+def test_explained_residual_grows_with_the_tolerance():
     loose, tight = (contact_walks.walked(steps=1, tolerance=tolerance) for tolerance in (1e-5, 1e-8))
     # what was turned into heat differs by little
     assert loose.explained_residual_J == pytest.approx(1e3 * tight.explained_residual_J, rel=1e-3)
     assert tight.energy_balance_residual_J < tight.explained_residual_J
 
 
-def test_a_command_gives_no_answer_and_says_by_how_much_the_balance_is_off(nothing_explained):
+def test_command_fails_and_reports_the_energy_residual(nothing_explained):
     scene_sets = ("slope_deg=1", f"start={list(FIXED_POINT)}", f"contact.pad_pitch={RIGID_STEP}", "outputs=[]")
     with pytest.raises(NoAnswer) as refused:
         contact_sim.run(contact_walks.load(None, scene_sets).config, {}, Silent())
@@ -66,7 +66,7 @@ def test_a_command_gives_no_answer_and_says_by_how_much_the_balance_is_off(nothi
     assert f"off by {residual:.3g} J" in refused.value.advice
 
 
-def test_searches_and_maps_do_not_go_by_such_walks(nothing_explained):
+def test_searches_and_maps_ignore_walks_with_unbalanced_energy(nothing_explained):
     scene = scene_of()
     ground, start = scene.ground, start_state(scene, FIXED_POINT)
     starts = scaled_starts(scene.walker, ground, lambda *_: start, 2, None)
@@ -77,20 +77,20 @@ def test_searches_and_maps_do_not_go_by_such_walks(nothing_explained):
     assert find_gait_from(scene.walker, ground, settings(), start).gait is None
 
 
-def test_a_ladder_of_methods_is_measured_by_its_errors_alone(nothing_explained):
+def test_benchmark_judges_methods_by_their_errors_alone(nothing_explained):
     scene = scene_of()
     ground, start = scene.ground, start_state(scene, FIXED_POINT)
     trial = ContactTrial(scene.walker, ground, start, 1, "contact")
     assert trial.prepare("radau5", 1e-3, 100_000)().outcome == "walked"
 
 
-def test_the_balance_of_a_walk_by_dop853_closes_far_within_what_its_tolerance_explains():
+def test_energy_balance_of_dop853_closes_well_within_its_tolerance():
     """A rule of order 5 on steps of order 8 left two hundredths here, and more than the whole on bouncing feet."""
     walk = contact_walks.walked(steps=3, method="dop853")
     assert walk.energy_balance_residual_J < 1e-3 * walk.explained_residual_J
 
 
-def test_a_stiff_walk_that_exhausts_dop853_is_advised_to_take_radau5():
+def test_stiff_walk_that_exhausts_dop853_advises_radau5():
     walk = contact_walks.walked(steps=3, method="dop853", budget=3000)
     assert walk.outcome is Outcome.BUDGET_EXHAUSTED
     assert "solver.contact.method to radau5" in walk.advice

@@ -60,7 +60,7 @@ def plain(release_at_touch=False):
     )  # fmt: skip
 
 
-def test_released_by_compression_it_walks_twenty_steps_near_the_rigid_gait():
+def test_release_by_compression_walks_twenty_steps_near_the_rigid_gait():
     walk = walked(steps=20)
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s[-1] == pytest.approx(PERIOD, abs=0.01)
@@ -68,20 +68,20 @@ def test_released_by_compression_it_walks_twenty_steps_near_the_rigid_gait():
     assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
 
 
-def test_with_friction_that_creeps_less_it_tracks_the_rigid_gait():
+def test_friction_with_less_creep_tracks_the_rigid_gait():
     walk = walked(steps=12, stiction_velocity=0.01, friction_velocity=0.1)
     assert walk.outcome is Outcome.WALKED
     assert walk.periods_s[-1] == pytest.approx(PERIOD, abs=3e-3)
 
 
-def test_released_at_touch_it_is_another_walker():
+def test_release_at_touch_gives_a_different_walk():
     walk = walked(steps=20, rules=AT_TOUCH)
     steps = walk.periods_s
     assert walk.outcome in (Outcome.FELL, Outcome.BENT_KNEE) or steps[-1] < PERIOD - 0.01
 
 
 @pytest.mark.parametrize(("rules", "steps"), [(None, 4), (AT_TOUCH, 3)], ids=["compression", "touch"])
-def test_a_plain_integration_locks_releases_and_touches_at_the_same_times(rules, steps):
+def test_independent_integration_has_the_same_lock_release_and_touch_times(rules, steps):
     other = plain_walk.walk(plain(rules is AT_TOUCH), plain_walk.start(plain(), ANGLES, RATES), steps, 2e-5)
     walk = walked(steps=steps, rules=rules, tolerance=1e-10)
     assert other.outcome == walk.outcome == Outcome.WALKED
@@ -118,7 +118,7 @@ def spin(points, about, drift):
     return sum(m * turning(r - about, v - drift) for m, r, v in points)
 
 
-def test_a_lock_keeps_all_momentum_and_the_swing_legs_about_the_hip():
+def test_knee_lock_conserves_total_momentum_and_that_of_the_swing_leg():
     """Momentum sums over the masses: of the whole, and of the leg whose knee locks about the hip that carries it."""
     scene = scene_of()
     state = (*BENT_STATE[:4], BENT_STATE[2], *BENT_STATE[5:])  # straight just now
@@ -142,7 +142,7 @@ def test_a_lock_keeps_all_momentum_and_the_swing_legs_about_the_hip():
     assert np.linalg.norm(jump) > 1e-6
 
 
-def test_the_equations_of_a_locked_knee_are_those_of_one_leg():
+def test_equations_of_a_locked_knee_equal_those_of_one_leg():
     """Compared with the compass whose legs carry thigh and shank masses as one."""
 
     scene = scene_of()
@@ -167,7 +167,7 @@ def test_the_equations_of_a_locked_knee_are_those_of_one_leg():
     "knee",
     [(RELEASED, RELEASED), (STOPPING, RELEASED), (RELEASED, LOCKED), (STOPPING, LOCKED), (LOCKED, LOCKED)],
 )
-def test_exact_derivatives_are_those_of_differences(knee):
+def test_exact_derivatives_equal_finite_differences(knee):
     rules = KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))
     scene = scene_of(rules)
     y = np.array(BENT_STATE)
@@ -183,7 +183,7 @@ def test_exact_derivatives_are_those_of_differences(knee):
     np.testing.assert_allclose(J, differences, atol=1e-5 * np.abs(differences).max())
 
 
-def test_a_twin_of_another_size_walks_the_same_steps():
+def test_scaled_twin_walks_the_same_steps():
     one, other = walked(steps=3, tolerance=1e-9), walked(steps=3, tolerance=1e-9, scale=4.0)
     np.testing.assert_allclose(other.touch_time_s / 2.0, one.touch_time_s, atol=1e-6)
     np.testing.assert_allclose(other.touch_along_m / 4.0, one.touch_along_m, atol=1e-6)
@@ -197,7 +197,7 @@ def test_one_compiled_walk_serves_straight_legs_knees_and_a_pinned_step():
     assert set(walk_in_form.signatures) == compiled
 
 
-def test_a_library_walks_it_with_as_few_bodies():
+def test_library_method_walks_with_the_same_reduced_bodies():
     scene = scene_of()
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     walk = scene.walk(start, 2, Tolerances("scipy-radau", 1e-6, 1e-8, 10**6), 0.01)
@@ -207,7 +207,7 @@ def test_a_library_walks_it_with_as_few_bodies():
     assert walk.energy_balance_residual_J < 1e-4 * exchanged(walk)
 
 
-def test_a_stiff_stop_walks_as_the_ideal_lock_does():
+def test_stiff_knee_stop_walks_like_the_ideal_lock():
     ideal = walked(steps=3)
     stopped = [walked(steps=3, rules=KneeRules(NormalLaw(k, 1.0, 1e-3 * k, 1e-5))) for k in (1e3, 1e5)]
     for walk in stopped:
@@ -219,7 +219,7 @@ def test_a_stiff_stop_walks_as_the_ideal_lock_does():
     assert apart[1] < 0.3 * apart[0]
 
 
-def test_a_stop_comes_to_the_ideal_lock_with_the_root_of_its_stiffness():
+def test_knee_stop_converges_to_the_ideal_lock_with_the_root_of_stiffness():
     """At one damping ratio, fully developed far below the compression; when the knees lock, and the steps' ends."""
     ideal, stiffnesses = walked(steps=3), (1e3, 1e5, 1e7)
     laws = [NormalLaw(k, 1.0, 0.3 * k**0.5, 1e-7) for k in stiffnesses]
@@ -230,7 +230,7 @@ def test_a_stop_comes_to_the_ideal_lock_with_the_root_of_its_stiffness():
         assert orders == pytest.approx([0.5, 0.5], abs=0.05)
 
 
-def test_its_own_gait_is_found_on_the_section_and_is_the_one_that_a_long_walk_settles_on():
+def test_kneed_contact_gait_is_the_one_that_a_long_walk_settles_on():
     scene, walk = scene_of(), walked(steps=40, tolerance=1e-9)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     answer = find_gait_from(scene.walker, scene.ground, settings(1e-10), start)
@@ -246,7 +246,7 @@ def test_its_own_gait_is_found_on_the_section_and_is_the_one_that_a_long_walk_se
     assert abs(gait.multipliers[0]) == pytest.approx(abs(0.35257 + 0.55221j), abs=0.1)
 
 
-def test_the_derivative_of_the_step_through_lock_and_release_is_its_slope():
+def test_step_derivative_through_lock_and_release_equals_its_slope():
     scene, stance = scene_of(), 1
     methods = settings(1e-11)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
@@ -264,7 +264,7 @@ def test_the_derivative_of_the_step_through_lock_and_release_is_its_slope():
         np.testing.assert_allclose(at.DP[:, column], slope, atol=2e-4 * np.abs(at.DP).max())
 
 
-def test_a_round_foots_start_rolls_and_stands():
+def test_start_of_a_round_foot_rolls_on_the_ground():
     scene = scene_of(radius=0.2)
     y = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     stance = feet_motion(scene.walker.whole, y)[1]

@@ -15,7 +15,7 @@ TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10**7)
 
 
 @pytest.mark.parametrize("rules", [KneeRules(), AT_TOUCH], ids=["compression", "touch"])
-def test_the_derivative_of_a_step_is_that_of_differences(rules):
+def test_step_derivative_equals_finite_differences(rules):
     scene = scene_of(rules)
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     _, z = next(section_points(scene.walker, scene.ground, TOLERANCES, start))

@@ -22,7 +22,7 @@ DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
-def test_dampings_share_of_a_bounce_is_the_height_that_it_costs(rtol):
+def test_damping_loss_of_a_bounce_equals_the_lost_height(rtol):
     """In the air again, all that is missing went into damping: the law lets go before the ball has left the ground."""
     ball = rig(MASS, 1.0, DAMPED, Coulomb(0.0, 0.0, 0.1, 1.0))
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), 0.25, rtol=rtol, atol=1e-3 * rtol)
@@ -35,7 +35,7 @@ def test_dampings_share_of_a_bounce_is_the_height_that_it_costs(rtol):
     assert run.dissipated[0] == pytest.approx(missing, abs=max(1e3 * rtol, 1e-11))
 
 
-def test_the_deepest_penetration_is_found_inside_a_step():
+def test_deepest_penetration_is_found_inside_a_step():
     walk, scene = walked(interval=2e-5, steps=2), scene_of()
     feet = sample_feet(scene.walker, walk.samples)
     seen = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()

@@ -87,26 +87,26 @@ def from_the_gait(*sets, steps=4, base=None, tolerance=TOLERANCE, method="radau5
     ],
     ids=["feet pass as the foot lifts", "stance foot bounces", "law switches as the foot lifts"],
 )
-def test_after_mid_swing_the_walk_is_the_right_one(sets, periods):
+def test_walk_on_after_mid_swing_ground_agrees_with_the_reference(sets, periods):
     walk = from_the_gait(*sets, AFTER_MID_SWING, steps=len(periods))
     assert walk.outcome is Outcome.WALKED
     np.testing.assert_allclose(walk.periods_s, periods, atol=6e-7)
 
 
 @pytest.mark.parametrize("sets", [(), ("contact.stiction_velocity=1", "contact.friction_velocity=10")])
-def test_on_both_grounds_a_walk_that_scuffs_no_pad_is_the_same(sets):
+def test_walk_without_scuffs_is_the_same_on_both_grounds(sets):
     pads, plane = walked(*sets, steps=6), walked(*sets, AFTER_MID_SWING, steps=6)
     np.testing.assert_allclose(plane.touch_time_s, pads.touch_time_s, atol=1e-8)
     np.testing.assert_allclose(plane.slip_m, pads.slip_m, atol=1e-8)
     np.testing.assert_allclose(plane.rolling_m, pads.rolling_m, atol=1e-8)
 
 
-def test_slips_are_the_same_on_both_grounds_where_the_law_switches_as_the_foot_lifts():
+def test_slips_are_equal_on_both_grounds_if_the_law_switches_at_lift():
     pads, plane = from_the_gait(*SWITCHING), from_the_gait(*SWITCHING, AFTER_MID_SWING)
     np.testing.assert_allclose(plane.slip_m, pads.slip_m, atol=1e-7)
 
 
-def test_a_lift_at_the_instant_at_which_the_force_law_lets_go_is_noticed_at_once():
+def test_lift_at_the_instant_of_zero_force_is_detected_at_once():
     """A lift noticed a step later adds what the foot moves meanwhile, up to 0.05 mm."""
     exact = from_the_gait(*LETS_GO, steps=8, base=Path("kneed"), tolerance=1e-10)
     assert exact.slip_m[[0, 2, 4, 6]] == pytest.approx([1.2121e-3, 1.1332e-3, 1.1529e-3, 1.1495e-3], abs=5e-8)
@@ -118,7 +118,7 @@ def test_a_lift_at_the_instant_at_which_the_force_law_lets_go_is_noticed_at_once
 
 @pytest.mark.parametrize("method", ["radau5", "dop853"])
 @pytest.mark.parametrize("name", BOUNCING_FEET)
-def test_feet_that_bounce_do_not_stick_where_the_force_law_lets_go(name, method):
+def test_bouncing_feet_do_not_stick_at_zero_force(name, method):
     base, sets, expected = BOUNCING_FEET[name]
     for tolerance in (1e-6, 1e-9):
         walk = from_the_gait(*sets, steps=6, base=base, tolerance=tolerance, method=method)
@@ -129,13 +129,13 @@ def test_feet_that_bounce_do_not_stick_where_the_force_law_lets_go(name, method)
         assert walk.work.rhs_evaluations < 400_000
 
 
-def test_a_lift_behind_a_switching_point_that_cannot_be_located_is_noticed_at_once():
+def test_lift_after_an_unresolvable_switching_point_is_detected_at_once():
     for method, tolerance in (("radau5", 1e-7), ("radau5", 1e-8), ("dop853", 1e-8)):
         walk = from_the_gait(*GRIPS_AGAIN, steps=8, tolerance=tolerance, method=method, start=GRIPS_AGAIN_START)
         assert walk.slip_m == pytest.approx([0.0008590980], abs=2e-9)
 
 
-def test_a_signal_that_starts_on_its_zero_leaves_its_side_at_once():
+def test_event_function_starting_at_zero_leaves_it_at_once():
     finder = new_crossing_finder(3)
     finder.values[0] = finder.nodes
     assert leaves_side(finder, 0, -1, False) == 0.0
@@ -144,7 +144,7 @@ def test_a_signal_that_starts_on_its_zero_leaves_its_side_at_once():
     assert leaves_side(finder, 0, -1, False) == pytest.approx(0.25)
 
 
-def test_a_knee_strikes_at_its_time_at_any_tolerance():
+def test_knee_strike_time_is_the_same_at_any_tolerance():
     """Also where the way to it, cut short of the step in which it was seen, takes more than one step."""
     walker = rigid_walker(load(Path("kneed")).config, "corrected")
     start = (*RIGID_ANGLES, *RIGID_RATES)

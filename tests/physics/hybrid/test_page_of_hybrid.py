@@ -9,19 +9,19 @@ from walkerlab.physics.hybrid import contact_events, rigid_walk
 NO_EVENTS = {"MATERIAL", "PER_FOOT", "EVENT_FUNCTIONS", "NO_EVENT", "LEGS_TURN", "EVENT_ROWS", "FARTHEST_SLIDE"}
 
 
-def test_the_page_lists_every_event_of_both_models():
+def test_hybrid_module_docstring_lists_every_event():
     of_contact = {name for name in vars(contact_events) if name.isupper()} - NO_EVENTS
     rigid = ("HEEL_STRIKE", "HIP_FALL", "AHEAD", "KNEE")
     assert [getattr(rigid_walk, name) for name in rigid] == list(range(rigid_walk.LEG_RATE))
     assert of_contact | set(rigid) <= set(re.findall(r"[A-Z_]+", hybrid.__doc__))
 
 
-def test_the_page_lists_every_file():
+def test_hybrid_module_docstring_lists_every_file():
     files = {path.stem for path in Path(hybrid.__file__).parent.glob("*.py")} - {"__init__"}
     assert files <= set(re.findall(r"`(\w+)`", hybrid.__doc__))
 
 
-def test_no_two_events_of_a_contact_walk_share_a_number():
+def test_event_numbers_of_a_contact_walk_are_unique():
     of_foot = ("HEIGHT", "LEFT_EDGE", "RIGHT_EDGE", "RELEASE", "FULL_DAMPING", "MATERIAL", "VERTICAL_VELOCITY")
     each = [getattr(contact_events, name) for name in of_foot]
     each += range(contact_events.FRICTION_SWITCHES, contact_events.FRICTION_SWITCHES + 4)

@@ -50,14 +50,14 @@ class Feet:
 
 
 @pytest.mark.parametrize("carried", [False, True])
-def test_in_the_air_a_foot_has_ground_while_it_is_ahead(carried):
+def test_foot_in_the_air_has_ground_while_it_is_ahead(carried):
     assert Feet("after-mid-swing", AIR).passing(FORWARD, carried).carried
     assert not Feet("after-mid-swing", AIR).passing(BACK, carried).carried
 
 
 @pytest.mark.parametrize("forward", [FORWARD, BACK])
 @pytest.mark.parametrize("carried", [False, True])
-def test_in_the_ground_passing_changes_nothing_until_the_foot_lifts(forward, carried):
+def test_passing_in_the_ground_has_no_effect_until_the_foot_lifts(forward, carried):
     feet = Feet("after-mid-swing", GROUND).passing(forward, carried)
     assert feet.carried == carried
     assert feet.lifting().carried == forward
@@ -66,7 +66,7 @@ def test_in_the_ground_passing_changes_nothing_until_the_foot_lifts(forward, car
 @pytest.mark.parametrize("taken_for_above", [False, True])
 @pytest.mark.parametrize("height", [-SURFACE, 0.0, SURFACE])
 @pytest.mark.parametrize("carried", [False, True])
-def test_on_the_surface_a_rising_foot_counts_as_above_it_and_any_other_as_in_it(carried, height, taken_for_above):
+def test_rising_foot_on_the_surface_counts_as_above_it(carried, height, taken_for_above):
     for forward in (FORWARD, BACK):
         rising = Feet("after-mid-swing", height, rising=True, in_air=taken_for_above)
         assert rising.passing(forward, carried).carried == forward
@@ -76,7 +76,7 @@ def test_on_the_surface_a_rising_foot_counts_as_above_it_and_any_other_as_in_it(
 
 @pytest.mark.parametrize("height", [AIR, SURFACE, GROUND])
 @pytest.mark.parametrize("forward", [FORWARD, BACK])
-def test_on_pads_and_on_ordinary_ground_the_order_of_the_feet_changes_nothing(forward, height):
+def test_order_of_the_feet_does_not_matter_on_pads_and_ordinary_ground(forward, height):
     for carried in (False, True):
         assert Feet("checkerboard", height).passing(forward, carried).carried == carried
     assert Feet("plane", height).passing(forward, carried=True).carried

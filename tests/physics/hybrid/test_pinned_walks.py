@@ -66,7 +66,7 @@ def plainly(walk, step_s=1e-5):
 @pytest.mark.parametrize(
     "walk", [SCUFFS_AND_FALLS, PUSHED_OFF_ITS_PAD, COMES_DOWN_IN_PASSING], ids=["scuffs", "pad", "passing"]
 )
-def test_a_pinned_walk_goes_as_a_plain_integration_says(walk):
+def test_pinned_walk_agrees_with_an_independent_integration(walk):
     found = walked(walk, tolerance=1e-9)
     outcome, touches, end = plainly(walk)
     assert found.outcome is outcome
@@ -74,7 +74,7 @@ def test_a_pinned_walk_goes_as_a_plain_integration_says(walk):
 
 
 @pytest.mark.parametrize("walk", [SCUFFS_AND_FALLS, PUSHED_OFF_ITS_PAD], ids=["scuffs", "pad"])
-def test_what_the_ground_takes_from_a_pinned_walk_is_what_the_walker_loses(walk):
+def test_ground_losses_of_a_pinned_walk_equal_the_energy_drop(walk):
     found = walked(walk)
     assert found.dissipated_J[:2].sum() > 1e-3
     assert found.energy_balance_residual_J < 1e-6

@@ -21,7 +21,7 @@ def campaign():
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_drawn_walk_differs_from_the_plain_integration_by_no_more_than_their_errors(campaign, seed):
+def test_random_walks_agree_with_an_independent_integration(campaign, seed):
     one = campaign.compare(campaign.both(seed), steps=1)
     assert one.wrong == []
     # errors that could hide a fault judge nothing
@@ -29,7 +29,7 @@ def test_a_drawn_walk_differs_from_the_plain_integration_by_no_more_than_their_e
 
 
 @pytest.mark.parametrize("seed", [1, 4, 5, 7, 11])
-def test_so_does_a_driven_one(campaign, seed):
+def test_driven_walks_agree_with_an_independent_integration(campaign, seed):
     """By a torque between the legs, and by push-offs, of which one lasts until the knee that it holds is released."""
     one = campaign.compare(campaign.driven(seed), steps=2)
     assert one.wrong == []
@@ -38,26 +38,26 @@ def test_so_does_a_driven_one(campaign, seed):
 
 
 @pytest.mark.parametrize("seed", [0, 4, 7, 8, 11, 12])
-def test_so_does_one_over_footholds_of_drawn_heights(campaign, seed):
+def test_walks_over_random_heights_agree_with_an_independent_integration(campaign, seed):
     one = campaign.compare(campaign.uneven(seed), steps=2)
     assert one.wrong == []
     assert max(error for judged in one.judged[1:] for error in judged.error.values()) < 1e-4
 
 
 @pytest.mark.parametrize("seed", [6, 25])
-def test_so_does_one_whose_foot_stands_in_uneven_ground_as_the_feet_pass(campaign, seed):
+def test_walks_passing_with_a_foot_in_uneven_ground_agree_with_an_independent_integration(campaign, seed):
     """The first was once said to stub its foot, and the second lost the ground under a loaded one."""
     assert campaign.compare(campaign.passing(seed), steps=1).wrong == []
 
 
-def test_so_does_one_of_bouncing_feet_by_dop853(campaign):
+def test_walks_with_bouncing_feet_agree_with_an_independent_integration(campaign):
     """Work summed by a rule of order 5 left 41 times rtol x (energy + work exchanged) at rtol 1e-9; 0.02 is right."""
     one = campaign.compare(campaign.explicit(17), steps=2)
     assert one.wrong == []
     assert max(one.residuals) < 0.1 * campaign.BALANCED
 
 
-def test_the_walks_of_the_short_campaign_are_on_every_ground(campaign):
+def test_short_campaign_covers_every_ground(campaign):
     grounds = {campaign.both(seed).ground for seed in SEEDS}
     assert {f"paper, {terrain}, {stance}" for terrain in campaign.TERRAINS for stance in ("free", "pinned")} <= grounds
     assert any(ground.startswith("kneed") and ground.endswith("pinned") for ground in grounds)

@@ -40,7 +40,7 @@ def walked(name, *changes, steps=10):
     return scene.walk(start_state(scene, gait.state), steps, WALK, 0.01), gait
 
 
-def test_the_paper_compass_walks_the_level_with_short_pulses_and_leaves_its_pads_with_a_long_one():
+def test_paper_compass_walks_on_level_ground_with_short_pulses_only():
     """The paper's contact, 4 N s: values of another derivation and code."""
     short, _ = walked("level", "push_off.duration_s=0.005")
     assert short.outcome is Outcome.WALKED
@@ -53,7 +53,7 @@ def test_the_paper_compass_walks_the_level_with_short_pulses_and_leaves_its_pads
     assert (long.outcome, long.steps) == (Outcome.OFF_PAD, 7)
 
 
-def test_a_pulse_has_the_impulse_of_the_push_off_and_is_smooth_at_its_ends():
+def test_pulse_has_the_impulse_of_the_push_off_and_smooth_ends():
     _, scene, _ = scene_of("level")
     system = on_ground(scene.walker, (True, True), progress=new_progress(steps=1, last_touch=2.0))
     times = 2.0 + np.linspace(-0.001, 0.006, 70_001)
@@ -66,7 +66,7 @@ def test_a_pulse_has_the_impulse_of_the_push_off_and_is_smooth_at_its_ends():
 
 
 @pytest.mark.parametrize("name", PUSHED)
-def test_the_equations_derivatives_in_a_pulse_are_differences(name):
+def test_derivatives_during_a_pulse_equal_finite_differences(name):
     _, scene, gait = scene_of(name, *PUSHED[name])
     system = on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
     y = np.array(start_state(scene, gait.state))
@@ -84,7 +84,7 @@ def test_the_equations_derivatives_in_a_pulse_are_differences(name):
         np.testing.assert_allclose(J[:, j], slope, rtol=1e-6, atol=1e-5)
 
 
-def test_the_force_acts_along_the_line_from_the_foot_to_the_hip_and_turns_nothing_about_the_hip():
+def test_push_off_force_acts_from_foot_to_hip_without_moment_about_the_hip():
     """About the hip, the root's acceleration taken along, the trailing leg feels no torque of it."""
     _, scene, gait = scene_of("level")
     system = on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
@@ -101,7 +101,7 @@ def test_the_force_acts_along_the_line_from_the_foot_to_the_hip_and_turns_nothin
 
 
 @pytest.mark.parametrize("name", ["level", "kneed-level", "torso"])
-def test_the_step_maps_derivative_takes_along_when_the_pulse_begins(name):
+def test_step_derivative_includes_the_start_time_of_the_pulse(name):
     config, _, gait = scene_of(name, *PUSHED[name])
     found = gait_off_pads(config, gait.step_length, gait.state)
     assert found.gait is not None, found.reason
@@ -125,7 +125,7 @@ def test_the_step_maps_derivative_takes_along_when_the_pulse_begins(name):
 
 
 @pytest.mark.parametrize("name", PUSHED)
-def test_the_energy_of_a_pushed_walk_balances(name):
+def test_energy_of_a_pushed_walk_balances(name):
     walk, _ = walked(name, *PUSHED[name], steps=4)
     assert walk.steps == 4
     assert walk.energy_balance_residual_J < walk.explained_residual_J
@@ -140,7 +140,7 @@ def at(name, times, *changes, steps=2):
     return scene.walk(start, steps, WALK, first + np.asarray(times))
 
 
-def test_a_push_does_its_work_within_its_duration():
+def test_push_does_its_work_within_its_duration():
     walk = at("level", [-1e-3, 0.0, 1e-4, 2.5e-3, 5e-3, 0.1], "push_off.duration_s=0.005")
     done = walk.samples.driven_J[:, 0]
     assert done[0] == done[1] == 0.0
@@ -148,7 +148,7 @@ def test_a_push_does_its_work_within_its_duration():
     assert done[5] == done[4]
 
 
-def test_a_trailing_knee_is_released_as_its_push_ends():
+def test_trailing_knee_is_released_as_its_push_ends():
     changes = ("push_off.duration_s=0.02", "walker.knee.release=touch")
     walk = at("kneed-level", [-1e-3, 1e-3, 0.0199, 0.0201], *changes)
     trailing = 1
@@ -156,14 +156,14 @@ def test_a_trailing_knee_is_released_as_its_push_ends():
     assert walk.samples.knees[3, trailing] != LOCKED
 
 
-def test_a_pinned_foot_pushes_off_once_its_hinge_is_gone():
+def test_pinned_foot_pushes_off_after_its_release():
     walk = at("level", [-1e-3, 1e-5, 6e-3], "contact.stance=pinned")
     before, _, after = walk.samples.driven_J[:, 0]
     assert before == 0.0
     assert after > 0.0
 
 
-def test_a_touch_while_a_pulse_lasts_ends_it_and_begins_the_next():
+def test_touch_during_a_pulse_ends_it_and_starts_the_next():
     _, scene, gait = scene_of("level", "push_off.impulse_N_s=0.5", "push_off.duration_s=2", "slope_deg=3")
     walk = scene.walk(start_state(scene, gait.state), 3, WALK, 1e-3)
     assert walk.outcome is Outcome.WALKED
@@ -175,7 +175,7 @@ def test_a_touch_while_a_pulse_lasts_ends_it_and_begins_the_next():
     assert abs(power[just_after]) < 1e-2 * abs(power[just_before])
 
 
-def test_pulses_shorter_than_the_grounds_own_time_come_to_the_rigid_impulse_as_the_ground_stiffens():
+def test_short_pulses_converge_to_the_rigid_impulse_as_the_ground_stiffens():
     """Only then do landing and push-off happen together; a longer pulse finds the leading foot at rest already."""
     law, off = load(Path("level")).config.contact, {}
     for factor, durations in ((1.0, (1e-6,)), (100.0, (1e-3, 1e-4, 3e-5))):
@@ -193,7 +193,7 @@ def test_pulses_shorter_than_the_grounds_own_time_come_to_the_rigid_impulse_as_t
     assert off[100.0, 3e-5] < 1e-2 * off[1.0, 1e-6]
 
 
-def test_where_a_long_pulse_leaves_no_gait_the_advice_is_a_shorter_one_which_has_one():
+def test_shorter_pulse_is_advised_and_has_a_gait():
     config, _, gait = scene_of("level", "push_off.impulse_N_s=6")
     lost = gait_off_pads(config, gait.step_length, gait.state)
     assert lost.gait is None
@@ -202,7 +202,7 @@ def test_where_a_long_pulse_leaves_no_gait_the_advice_is_a_shorter_one_which_has
     assert gait_off_pads(config, gait.step_length, gait.state).gait.stable
 
 
-def test_a_pulse_that_is_not_over_when_the_feet_pass_has_no_gait_and_says_why():
+def test_pulse_lasting_beyond_mid_swing_has_no_gait():
     config, _, gait = scene_of("slope-3deg", "push_off.impulse_N_s=0.5", "push_off.duration_s=0.5")
     lost = gait_off_pads(config, gait.step_length, gait.state)
     assert lost.gait is None
@@ -210,7 +210,7 @@ def test_a_pulse_that_is_not_over_when_the_feet_pass_has_no_gait_and_says_why():
     assert "push_off.duration_s" in lost.advice
 
 
-def test_a_bounce_of_the_leading_foot_while_a_pulse_lasts_begins_none():
+def test_bounce_of_the_leading_foot_starts_no_second_pulse():
     """Ground that hardly damps throws that foot up again; the pulse goes on as the first touch began it.
 
     So it does under a trailing foot that has left the ground: its work is that of the stated force on its way.
@@ -234,6 +234,6 @@ def test_a_bounce_of_the_leading_foot_while_a_pulse_lasts_begins_none():
     np.testing.assert_allclose(seen.driven_J[:, 0], work, atol=1e-3 * work[-1])
 
 
-def test_a_passive_walk_does_not_know_the_pulses_duration():
+def test_passive_walk_does_not_depend_on_the_pulse_duration():
     (one, _), (other, _) = (walked("slope-3deg", f"push_off.duration_s={d}", steps=2) for d in (0.005, 0.02))
     np.testing.assert_array_equal(one.samples.states, other.samples.states)

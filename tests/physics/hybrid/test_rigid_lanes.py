@@ -63,14 +63,14 @@ def random_starts(walker, n, seed=0):
 
 
 @pytest.mark.parametrize(("rtol", "error"), [(2e-6, 1e-6), (1e-8, 1e-8), (1e-11, 1e-10)])
-def test_ten_steps_end_where_the_reference_does(rtol, error):
+def test_ten_steps_end_at_the_reference_state(rtol, error):
     _, strikes = in_lanes(ONE_DEGREE, on_slope(ONE_DEGREE, START), rtol)
     assert strikes.after[0, -1] == pytest.approx(TENTH_STATE, abs=error)
     assert strikes.times[0, -1] == pytest.approx(TENTH_TIME, abs=10 * error)
 
 
 @pytest.mark.parametrize("walker", [ONE_DEGREE, STEEP, SMALL], ids=["paper", "steep", "small"])
-def test_random_starts_fare_as_they_do_one_by_one(walker):
+def test_random_starts_have_the_same_outcome_in_lanes_and_alone(walker):
     starts = random_starts(walker, 200)
     fates, strikes = in_lanes(walker, starts, 1e-11)  # on the steep slope errors grow with every step
     tolerances = Tolerances("dop853", 1e-12, 1e-14, 10**7)
@@ -83,7 +83,7 @@ def test_random_starts_fare_as_they_do_one_by_one(walker):
     assert {Outcome.FELL, Outcome.REJECTED} <= set(fates.outcome.tolist())
 
 
-def test_starts_around_a_gait_walk_as_they_do_one_by_one():
+def test_starts_near_a_gait_walk_the_same_in_lanes_and_alone():
     generator = np.random.default_rng(3)
     starts = on_slope(ONE_DEGREE, np.array(START) * generator.uniform(0.8, 1.2, (64, 3)))
     fates, strikes = in_lanes(ONE_DEGREE, starts)
@@ -95,7 +95,7 @@ def test_starts_around_a_gait_walk_as_they_do_one_by_one():
         assert strikes.after[i, : walk.steps] == pytest.approx(walk.after, abs=1e-6)
 
 
-def test_a_walk_does_not_feel_those_beside_it():
+def test_walk_does_not_depend_on_the_other_lanes():
     starts = random_starts(ONE_DEGREE, 60)
     together, _ = in_lanes(ONE_DEGREE, starts)
     backwards, _ = in_lanes(ONE_DEGREE, starts[::-1].copy())
@@ -104,18 +104,18 @@ def test_a_walk_does_not_feel_those_beside_it():
     assert (strikes.after[0] == strikes.after[2]).all()
 
 
-def test_a_walker_that_hangs_on_never_strikes():
+def test_walker_standing_still_never_strikes():
     shallow = ONE_DEGREE._replace(slope=0.0)
     fates, _ = in_lanes(shallow, on_slope(shallow, (0.0, 0.0, 0.0)))
     assert Outcome(int(fates.outcome[0])) is Outcome.NO_HEEL_STRIKE
 
 
-def test_numbers_that_overflow_end_the_walk():
+def test_overflow_ends_the_walk():
     fates, _ = in_lanes(ONE_DEGREE, on_slope(ONE_DEGREE, (0.1, 1e200, -1e200)))
     assert Outcome(int(fates.outcome[0])) in (Outcome.SOLVER_FAILED, Outcome.BUDGET_EXHAUSTED)
 
 
-def test_driven_walks_in_lanes_walk_as_they_do_one_by_one():
+def test_driven_walks_are_the_same_in_lanes_and_alone():
     driven = assembled(ONE_DEGREE).changed(hip=(5.0, 0.1, 0.5), push_off=1.0)
     starts = on_slope(ONE_DEGREE, np.array(START) * np.random.default_rng(4).uniform(0.95, 1.05, (16, 3)))
     fates, strikes = model_in_lanes(driven, starts, 1e-10)

@@ -51,7 +51,7 @@ TENTH_TIME = 7.025036761059791
 
 
 @pytest.mark.parametrize(("rtol", "error"), [(1e-6, 1e-6), (1e-10, 1e-10), (1e-13, 1e-13)])
-def test_ten_steps_end_where_the_reference_does(rtol, error):
+def test_ten_steps_end_at_the_reference_state(rtol, error):
     walk = walked(ONE_DEGREE, start_of(ONE_DEGREE), 10, rtol)
     assert walk.outcome is Outcome.WALKED
     assert walk.final_state == pytest.approx(TENTH_STATE, abs=error)
@@ -59,7 +59,7 @@ def test_ten_steps_end_where_the_reference_does(rtol, error):
 
 
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if not method.compiled])
-def test_a_library_method_walks_the_same_way(name):
+def test_library_method_walks_the_same_steps(name):
     walk, ours = (walked(ONE_DEGREE, start_of(ONE_DEGREE), 3, *how) for how in ((1e-10, name), (1e-13,)))
     assert walk.final_state == pytest.approx(ours.final_state, abs=1e-7)
     assert walk.work.rhs_evaluations > 0
@@ -92,7 +92,7 @@ def one_step_by_scipy(walker, start):
 
 
 @pytest.mark.parametrize("walker", [ONE_DEGREE, ONE_DEGREE._replace(slope=np.deg2rad(4.0), c21_sign=AS_PRINTED)])
-def test_a_step_is_the_one_scipy_takes(walker):
+def test_step_agrees_with_scipy(walker):
     start = start_of(walker)
     time, before, motion = one_step_by_scipy(walker, start)
     walk = walked(walker, start, 1, 1e-12, sampled=True)
@@ -123,12 +123,12 @@ def test_energy_is_constant_within_a_swing():
     assert walk.energy_drift <= 1e-11 * walk.mean_energy
 
 
-def test_energy_drifts_within_a_swing_as_printed():
+def test_energy_drifts_within_a_swing_of_the_printed_equations():
     walk = walked(PAPER._replace(c21_sign=AS_PRINTED), start_of(PAPER), 10, 1e-12)
     assert walk.energy_drift == pytest.approx(0.13, abs=0.01)
 
 
-def test_mean_energy_is_the_time_mean_of_the_samples():
+def test_mean_energy_is_the_time_average_of_the_samples():
     walk = walked(PAPER._replace(c21_sign=AS_PRINTED), start_of(PAPER), 4, 1e-10, sampled=True)
     energy = energies(PAPER, walk.samples.state).sum(axis=1)
     mean = np.trapezoid(energy, walk.samples.time_s) / walk.samples.time_s[-1]
@@ -136,7 +136,7 @@ def test_mean_energy_is_the_time_mean_of_the_samples():
     assert walk.mean_energy == pytest.approx(mean, rel=1e-6)
 
 
-def test_extremes_are_those_of_the_samples():
+def test_extremes_agree_with_the_samples():
     walk = walked(ONE_DEGREE, GAIT, 4, sampled=True)
     force = reactions(ONE_DEGREE, walk.samples.state)
     assert walk.min_normal_force == pytest.approx(force[:, 1].min(), rel=1e-3)
@@ -145,7 +145,7 @@ def test_extremes_are_those_of_the_samples():
     assert walk.max_scuff_depth == pytest.approx(-min(heights), rel=1e-2)
 
 
-def test_extremes_are_the_same_however_long_the_steps_are():
+def test_extremes_do_not_depend_on_the_solver_step():
     """They are taken inside the integration's steps; at samples alone they lie up to a thousandth low."""
     long, short = (walked(ONE_DEGREE, GAIT, 2, rtol=rtol) for rtol in (1e-8, 1e-13))
     assert long.work.accepted < 0.5 * short.work.accepted
@@ -160,7 +160,7 @@ def test_scuff_depth_is_reported(degrees, millimetres):
     assert 1e3 * gait.max_scuff_depth == pytest.approx(millimetres, rel=0.02)
 
 
-def test_measures_along_a_walk_are_those_of_each_state():
+def test_quantities_along_a_walk_equal_those_of_each_state():
     states = np.array([GAIT, (0.1, -0.2, 0.3, -0.4)])
     for state, energy, force in zip(states, energies(PAPER, states), reactions(PAPER, states), strict=True):
         parts = kinetic_energy(PAPER, *state), potential_energy(PAPER, *state[:2])
@@ -168,7 +168,7 @@ def test_measures_along_a_walk_are_those_of_each_state():
         assert tuple(force) == pytest.approx(ground_reaction(PAPER, *state), rel=1e-14)
 
 
-def test_samples_rise_and_hold_both_sides_of_every_heel_strike():
+def test_sample_times_increase_and_include_both_sides_of_heel_strikes():
     steps = STEPS_AT_ONCE + 3
     walk = walked(PAPER, GAIT, steps, sampled=True)
     time, state = walk.samples.time_s, walk.samples.state
@@ -185,7 +185,7 @@ def test_samples_rise_and_hold_both_sides_of_every_heel_strike():
     assert walk.samples.step[-1] == steps
 
 
-def test_a_walk_in_pieces_is_the_walk_as_a_whole():
+def test_walk_in_pieces_equals_the_whole_walk():
     steps = STEPS_AT_ONCE + 3
     taken = []
     whole = walked(PAPER, start_of(PAPER), steps, 1e-12, advance=taken.append)
@@ -196,13 +196,13 @@ def test_a_walk_in_pieces_is_the_walk_as_a_whole():
     assert whole.touch_time_s[-1] == pytest.approx(first.touch_time_s[-1] + second.touch_time_s[-1], abs=1e-10)
 
 
-def test_a_stable_walk_settles_on_the_gait():
+def test_stable_walk_settles_on_the_gait():
     walk = walked(PAPER, start_of(PAPER, (0.16, -0.55, -0.87)), 60, 1e-11)
     assert walk.outcome is Outcome.WALKED
     assert walk.final_state == pytest.approx(GAIT, abs=1e-9)
 
 
-def test_a_slow_walker_falls():
+def test_slow_walker_falls():
     walk = walked(PAPER, start_of(PAPER, (0.1674, -0.4, -0.5)), 10, sampled=True)
     assert walk.outcome is Outcome.FELL
     assert walk.steps == 0
@@ -211,14 +211,14 @@ def test_a_slow_walker_falls():
     assert np.cos(walk.samples.state[-1, 1] + PAPER.slope) == pytest.approx(0.5, abs=0.03)
 
 
-def test_a_walker_that_lies_down_is_rejected():
+def test_lying_walker_is_rejected():
     walk = walked(PAPER, start_of(PAPER, (1.5, 0.0, 0.0)), 10)
     assert walk.outcome is Outcome.REJECTED
     assert walk.steps == 0
     assert walk.mean_energy == pytest.approx(energies(PAPER, np.array([walk.start])).sum())
 
 
-def test_a_walk_that_needs_a_pulling_ground_is_walked_but_said_to_lift_off():
+def test_walk_that_needs_a_pulling_ground_is_reported_as_lifting_off():
     walker = PAPER._replace(slope=np.deg2rad(20.0))
     walk = walked(walker, start_of(walker, (0.0953848, 0.7024719, -1.8681666)), 1)
     assert walk.steps == 1
@@ -226,18 +226,18 @@ def test_a_walk_that_needs_a_pulling_ground_is_walked_but_said_to_lift_off():
     assert walk.outcome is Outcome.LIFTED_OFF
 
 
-def test_standing_legs_together_strike_no_heel():
+def test_standing_with_legs_together_is_not_a_heel_strike():
     # both legs hang straight down from a hip that stands exactly on top
     walker = PAPER._replace(slope=0.0)
     walk = walked(walker, (0.0, 0.0, 0.0, 0.0), 2)
     assert walk.outcome is Outcome.NO_HEEL_STRIKE
 
 
-def test_far_from_leaves_out_what_is_near_any_event():
+def test_far_from_excludes_samples_near_events():
     times = np.array([0.0, 0.99, 1.0, 1.02, 2.0, 3.5])
     assert far_from(times, np.array([1.0, 2.01]), 0.015).tolist() == [True, False, False, True, False, True]
     assert far_from(times, np.zeros(0), 1.0).all()
 
 
-def test_as_state_is_plain_numbers():
+def test_as_state_returns_plain_floats():
     assert all(type(value) is float for value in as_state(np.array(GAIT)))

@@ -37,7 +37,7 @@ def heights_of(walker, seed, steps, share=2e-4):
 
 
 @pytest.mark.parametrize("name", WALKERS)
-def test_rigid_walk_over_random_heights_is_that_of_a_library(name):
+def test_rigid_walk_over_random_heights_agrees_with_a_library(name):
     _, walker, gait = gait_of(name)
     heights = heights_of(walker, 5, 5)
     walk = take_walk(walker, TIGHT, gait.state, 5, heights=heights)
@@ -67,7 +67,7 @@ FEET_TOGETHER = (
 )
 
 
-def test_a_backward_landing_ends_the_walk_as_fell_and_is_no_step():
+def test_backward_landing_counts_as_a_fall():
     """The foot comes down 2 mm ahead of the other, which has rolled back by 8 mm."""
     walker = rigid_walker(load(Path("rigid-only"), ROUND_FEET_UPHILL).config)
     heights = np.array([0.0, 0.403e-3, 0.907e-3])
@@ -80,7 +80,7 @@ def test_a_backward_landing_ends_the_walk_as_fell_and_is_no_step():
 
 
 @pytest.mark.parametrize(("name", "share", "seed"), [("level", 1e-3, 8), ("level", 1e-3, 47), ("slope-3deg", 8e-3, 14)])
-def test_a_foot_that_lands_less_than_a_quarter_of_the_gaits_step_ahead_is_no_step(name, share, seed):
+def test_landing_less_than_a_quarter_step_ahead_is_not_a_step(name, share, seed):
     _, walker, gait = gait_of(name)
     heights, nearest = heights_of(walker, seed, 5, share), 0.25 * gait.step_length
     plain, outcome, ahead = plain_walk(walker, np.array(gait.state), heights, nearest)
@@ -91,14 +91,14 @@ def test_a_foot_that_lands_less_than_a_quarter_of_the_gaits_step_ahead_is_no_ste
     np.testing.assert_allclose(walk.touch_time_s, plain[:, 0], rtol=0.0, atol=1e-7)
 
 
-def test_a_walk_on_even_ground_has_no_shortest_landing():
+def test_walk_on_even_ground_has_no_shortest_landing():
     _, walker, gait = gait_of("slope-3deg")
     even, judged = (take_walk(walker, TIGHT, gait.state, 3, step_length=length) for length in (None, 1e3))
     np.testing.assert_array_equal(even.after, judged.after)
 
 
 @pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet"])
-def test_columns_change_over_steps_up_and_down_as_differences_say(name):
+def test_tangents_over_uneven_steps_equal_finite_differences(name):
     _, walker, gait = gait_of(name)
     shooting, section = RigidStepper(walker, EXACT_STEPS), strike_section(walker)
     z, d = coordinates_of(walker, gait.state), int(walker.coordinates)
@@ -116,7 +116,7 @@ def test_columns_change_over_steps_up_and_down_as_differences_say(name):
         np.testing.assert_allclose(columns[:, j], slope, rtol=1e-6, atol=1e-6)
 
 
-def test_gravitys_work_on_uneven_ground_includes_the_change_of_height():
+def test_work_of_gravity_on_uneven_ground_includes_height_changes():
     """And so does the cost of transport: what the walker descends is spent."""
     _, walker, gait = gait_of("paper")
     weight = walker.mass * walker.gravity
@@ -137,7 +137,7 @@ def test_feet_land_at_the_heights_of_their_footholds():
     np.testing.assert_array_equal(walk.foothold_height_m, heights[1:])
 
 
-def test_even_ground_changes_no_bit():
+def test_heights_of_zero_change_no_bit():
     _, walker, gait = gait_of("kneed")
     even, level = (take_walk(walker, TIGHT, gait.state, 3, heights=heights) for heights in (None, np.zeros(4)))
     np.testing.assert_array_equal(even.after, level.after)
@@ -162,7 +162,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_contact_walk_over_heights_keeps_its_energy_and_stays_near_the_rigid_one(case):
+def test_contact_walk_over_heights_balances_energy_and_stays_near_the_rigid_one(case):
     name, terrain = CASES[case]
     _, walker, gait = gait_of(name)
     heights = heights_of(walker, 2, 6)
@@ -182,14 +182,14 @@ def test_contact_walk_over_heights_keeps_its_energy_and_stays_near_the_rigid_one
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_level_ground_by_heights_is_even_ground_bit_for_bit(case):
+def test_zero_heights_equal_even_ground_bit_for_bit(case):
     name, terrain = CASES[case]
     _, even = on_terrain(name, terrain, None, steps=3)
     _, level = on_terrain(name, terrain, np.zeros(1), steps=3)
     np.testing.assert_array_equal(even.samples.states, level.samples.states)
 
 
-def test_stiffer_ground_brings_the_contact_walk_over_heights_to_the_rigid_one():
+def test_stiffer_uneven_ground_brings_the_contact_walk_closer_to_the_rigid_one():
     """Led towards the limit as tune does: stiffness, its root the damping, and slower creep."""
     config, walker, gait = gait_of("slope-3deg")
     heights, law = np.array([0.0, -2e-3, 1e-3, -1e-3, -1e-3]), config.contact
@@ -208,18 +208,18 @@ def test_stiffer_ground_brings_the_contact_walk_over_heights_to_the_rigid_one():
     assert off[2] < 0.5 * off[1]
 
 
-def test_a_foot_below_its_next_foothold_as_the_feet_pass_is_stubbed_on_plain_ground():
+def test_foot_below_its_next_foothold_at_mid_swing_stubs_on_plain_ground():
     _, walk = on_terrain("kneed", "plane", np.array([0.0, 0.0, 0.05]))
     assert (walk.outcome, walk.steps) == (Outcome.STUBBED, 1)
 
 
-def test_the_flank_of_a_raised_pad_is_off_pad():
+def test_hitting_the_side_of_a_raised_pad_is_off_pad():
     _, walk = on_terrain("slope-3deg", "checkerboard", np.array([0.0, 0.0, 0.2]))
     assert walk.outcome in (Outcome.OFF_PAD, Outcome.FELL)
     assert walk.steps == 1
 
 
-def test_past_mid_swing_a_foot_is_carried_once_it_has_been_above_its_foothold():
+def test_foot_is_supported_after_mid_swing_once_it_was_above_its_foothold():
     """A foothold so deep that the foot never comes down onto it in time, and one that it is never above: both fall."""
     for height in (0.3, -0.4):
         _, walk = on_terrain("slope-3deg", "after-mid-swing", np.array([0.0, 0.0, height]))
@@ -304,7 +304,7 @@ def walk_from(sets, start, steps, heights, tolerances=ON_GROUND):
 
 
 @pytest.mark.parametrize("terrain", ["after-mid-swing", "plane"])
-def test_a_foot_that_stands_in_the_ground_as_the_feet_pass_again_is_carried_as_on_even_ground(terrain):
+def test_foot_in_the_ground_at_a_second_passing_is_supported_as_on_even_ground(terrain):
     """Only a foothold that is never reached is not level."""
     sets = (*SLIDES_BACK, f"contact.terrain={terrain}")
     heights = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e-6])
@@ -314,7 +314,7 @@ def test_a_foot_that_stands_in_the_ground_as_the_feet_pass_again_is_carried_as_o
     assert uneven.end_time_s == pytest.approx(even.end_time_s, abs=1e-9)
 
 
-def test_an_instant_at_which_the_ground_lets_go_is_found_at_every_tight_tolerance():
+def test_loss_of_contact_is_located_at_every_tight_tolerance():
     heights = np.array([0.0, 5.5611e-05, -0.00097804, 0.00096203])
     walks = (
         walk_from(LETS_GO_LATE, LETS_GO_LATE_FROM, 3, heights, Tolerances("radau5", 1e-11, atol, 10**7))
@@ -327,7 +327,7 @@ def test_an_instant_at_which_the_ground_lets_go_is_found_at_every_tight_toleranc
 # ---- heights -------------------------------------------------------------------------------------------------------
 
 
-def test_listed_heights_go_on_at_the_last_and_drawn_ones_do_not_depend_on_how_many():
+def test_last_listed_height_repeats_and_random_heights_do_not_depend_on_their_count():
     np.testing.assert_array_equal(
         foothold_heights(Footholds(heights_m=(1e-3, -2e-3)), 4), [0.0, 1e-3, -2e-3, -2e-3, -2e-3]
     )
@@ -338,7 +338,7 @@ def test_listed_heights_go_on_at_the_last_and_drawn_ones_do_not_depend_on_how_ma
 
 
 @pytest.mark.parametrize("leg", [SWING, STANCE])
-def test_a_walk_ends_where_its_hip_is_low_over_its_own_foothold_not_over_the_slope(leg):
+def test_fall_is_judged_by_the_hip_height_above_the_foothold(leg):
     """Stairs that lead down by a leg's length are walked: nothing falls but the ground."""
     _, walker, gait = gait_of("slope-3deg")
     heights = np.append(0.0, -1e-3 * np.arange(1, 701)) if leg == SWING else np.append(0.0, 1e-4 * np.arange(1, 701))

@@ -92,7 +92,7 @@ def test_assembled_compass_equals_appendix_a(parts, state, g):
 
 
 @given(parts=compasses(), state=states)
-def test_compass_pinned_at_a_point_foot_moves_as_the_swing_phase_of_appendix_a(parts, state):
+def test_pinned_compass_equals_the_swing_phase_of_appendix_a(parts, state):
     g = 9.81
     pinned = on_ground(walker_of(parts, 0.0, g), (False, False), pinned=True)
     D, bias, G = printed_swing(parts, *state, g)
@@ -103,7 +103,7 @@ def test_compass_pinned_at_a_point_foot_moves_as_the_swing_phase_of_appendix_a(p
 
 
 @given(parts=compasses(), state=states, slope=st.floats(-0.5, 0.5))
-def test_slope_only_turns_the_frame(parts, state, slope):
+def test_slope_only_rotates_the_frame(parts, state, slope):
     """Absolute angles: the swing phase does not know the slope; the floating base knows it by its axes alone."""
     level, tilted = walker_of(parts, 0.0, 9.81), walker_of(parts, slope, 9.81)
     pinned = [rate_of(on_ground(w, (False, False), pinned=True), state) for w in (level, tilted)]
@@ -116,7 +116,7 @@ def test_slope_only_turns_the_frame(parts, state, slope):
 @pytest.mark.parametrize("inertia", [0.0, 0.3])
 @settings(max_examples=50)
 @given(state=states)
-def test_free_tree_accelerates_alike_about_its_centre_of_mass_and_about_a_foot(state, inertia):
+def test_free_tree_accelerates_the_same_for_any_root_point(state, inertia):
     """What is integrated leaves the centre of mass out; the full matrices about the foot do not."""
     parts = CompassParts(1.0, 0.4, 5.0, 10.0, inertia, 0.0)
     assembly = compass_assembly(parts)
@@ -133,7 +133,7 @@ def test_free_tree_accelerates_alike_about_its_centre_of_mass_and_about_a_foot(s
 
 
 @given(state=states, along=st.floats(-1e3, 1e3), depth=st.floats(0.0, 1e-3))
-def test_where_the_walker_is_along_the_slope_does_not_matter(state, along, depth):
+def test_position_along_the_slope_does_not_matter(state, along, depth):
     parts = CompassParts(1.0, 0.5, 5.0, 10.0, 0.1, 0.001)
     system = on_ground(walker_of(parts, 0.02, 9.81), (True, True))
     height = 0.9 - depth

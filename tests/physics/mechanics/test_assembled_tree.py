@@ -64,7 +64,7 @@ def flight(theta, omega, velocity, duration):
 
 
 @given(theta=angles, omega=rates, velocity=speeds)
-def test_walker_with_torso_and_knee_obeys_lagranges_equations(lagrange, theta, omega, velocity):
+def test_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, theta, omega, velocity):
     M, bias, weight = lagrange(theta, omega, velocity, GRAVITY)
     found = mass_matrix_and_bias(kneed.KNEED, kneed.STANCE_POINT, theta, omega, GRAVITY)
     squares = 1.0 + max(abs(w) for w in omega) ** 2
@@ -74,7 +74,7 @@ def test_walker_with_torso_and_knee_obeys_lagranges_equations(lagrange, theta, o
 
 
 @given(theta=angles, omega=rates)
-def test_pinned_walker_with_torso_and_knee_obeys_lagranges_equations(lagrange, theta, omega):
+def test_pinned_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, theta, omega):
     """The hinge is at the ball's centre: the foot point's rows drop out once its matrix is moved there."""
     pinned = on_ground(flying_walker(slope=0.1), IN_THE_AIR, pinned=True)
     at_hinge = Anchor("stance", (0.0, 0.02))
@@ -91,7 +91,7 @@ def test_pinned_walker_with_torso_and_knee_obeys_lagranges_equations(lagrange, t
 
 
 @given(theta=angles, omega=rates, velocity=speeds)
-def test_integrated_walker_with_four_bodies_obeys_lagranges_equations(lagrange, theta, omega, velocity):
+def test_integrated_walker_with_four_bodies_obeys_lagrange_equations(lagrange, theta, omega, velocity):
     M, bias, weight = lagrange(theta, omega, velocity, GRAVITY)
     expected = np.linalg.solve(M, -(bias + weight).ravel())
     rate = rate_of(on_ground(flying_walker(), IN_THE_AIR), (0.0, 5.0, *theta, *velocity, *omega))
@@ -159,28 +159,28 @@ def test_levers_lead_from_any_root_to_any_point(theta):
     np.testing.assert_allclose(between(toe, head), between(foot, head) - between(foot, toe), atol=1e-14)
 
 
-def test_a_body_that_no_hinge_holds_is_refused():
+def test_body_without_a_hinge_is_rejected():
     loose = Assembly((Body("leg", 1.0, (0.0, 0.0)), Body("hat", 1.0, (0.0, 0.0))), joints=())
     with pytest.raises(ValueError, match="no hinges lead from body 'leg' to body 'hat'"):
         tree_about_centre(loose)
 
 
-def test_a_hinge_to_a_body_that_does_not_exist_is_refused():
+def test_hinge_to_a_missing_body_is_rejected():
     with pytest.raises(KeyError, match="no body named 'torsoo'; bodies: leg"):
         Assembly((Body("leg", 1.0, (0.0, 0.0)),), (Revolute("hip", "leg", (0.0, 0.0), "torsoo", (0.0, 0.0)),))
 
 
-def test_two_bodies_of_one_name_are_refused():
+def test_bodies_of_equal_name_are_rejected():
     with pytest.raises(ValueError, match="duplicate body name"):
         Assembly((Body("leg", 1.0, (0.0, 0.0)), Body("leg", 2.0, (0.0, 0.0))), joints=())
 
 
-def test_a_root_on_an_unknown_body_is_refused():
+def test_root_on_an_unknown_body_is_rejected():
     with pytest.raises(KeyError, match="tail"):
         mass_matrix_and_bias(kneed.KNEED, Anchor("tail", (0.0, 0.0)), (0.0,) * 4, (0.0,) * 4, GRAVITY)
 
 
-def test_a_closed_loop_is_refused():
+def test_closed_loop_is_rejected():
     """A tree has one hinge fewer than bodies: a loop's second way round would be ignored in silence."""
     bodies = tuple(Body(name, 1.0, (0.0, 0.0)) for name in ("a", "b", "c"))
     loop = tuple(
@@ -191,11 +191,11 @@ def test_a_closed_loop_is_refused():
         Assembly(bodies, loop)
 
 
-def test_a_walker_without_two_feet_is_refused():
+def test_walker_without_two_feet_is_rejected():
     one_legged = Assembly(kneed.KNEED.bodies, kneed.KNEED.joints, feet=kneed.KNEED.feet[:1])
     with pytest.raises(ValueError, match="two feet"):
         contact_walker(one_legged, NormalLaw(1.0, 1.0, 0.0, 1.0), Frictionless(), 9.81, 0.0)
 
 
-def test_a_foot_of_zero_length_has_no_lever_at_the_root():
+def test_foot_of_zero_length_has_no_lever_at_the_root():
     assert not levers(kneed.KNEED, kneed.STANCE_POINT, kneed.STANCE_POINT).any()

@@ -62,7 +62,7 @@ def momentum(points):
 
 
 @driven
-def test_a_swing_gains_what_the_torque_gives_and_the_damper_takes(assembly, model, free):
+def test_energy_change_of_a_swing_equals_the_work_of_torque_and_damper(assembly, model, free):
     y, n = state_of(model, BENT, free), len(model.arm_x)
 
     def with_work(_, x):
@@ -78,7 +78,7 @@ def test_a_swing_gains_what_the_torque_gives_and_the_damper_takes(assembly, mode
 
 
 @driven
-def test_torques_at_the_hip_turn_both_legs_and_nothing_else(assembly, model, free):
+def test_hip_torques_act_on_both_legs_and_nothing_else(assembly, model, free):
     """Angular momentum about the foothold changes as gravity has it; a push forward swings the free leg forward."""
     passive = model.changed(hip=0.0)
     y, n = state_of(model, BENT, free), len(model.arm_x)
@@ -98,7 +98,7 @@ def test_torques_at_the_hip_turn_both_legs_and_nothing_else(assembly, model, fre
 
 
 @driven
-def test_a_push_off_acts_from_the_trailing_foots_contact_through_the_hip(assembly, model, free):
+def test_push_off_acts_along_the_line_from_trailing_contact_to_hip(assembly, model, free):
     y = both_feet_down(model, free)
     after = heel_strike(model, y)
     points, spins, foot = in_motion(assembly, model, y, np.zeros(2))
@@ -142,7 +142,7 @@ def test_a_push_off_acts_from_the_trailing_foots_contact_through_the_hip(assembl
 
 
 @driven
-def test_a_push_off_works_on_the_walker_free_of_the_ground_just_before_the_strike(assembly, model, free):
+def test_push_off_acts_on_the_free_walker_just_before_the_strike(assembly, model, free):
     """Mass by mass: what an impulse at the trailing contact point changes, with the knees locked and the torso held."""
     y, n = np.array(both_feet_down(model, free)), len(model.arm_x)
     Z = model.E[STRAIGHT][:, np.diag(model.E[STRAIGHT]) != 0.0]
@@ -172,7 +172,7 @@ def test_a_push_off_works_on_the_walker_free_of_the_ground_just_before_the_strik
 
 
 @driven
-def test_the_driven_strikes_and_swings_derivatives_are_their_slopes(assembly, model, free):
+def test_derivatives_of_driven_strikes_and_swings_equal_their_slopes(assembly, model, free):
     y, h = both_feet_down(model, free), 1e-5
     n = len(model.arm_x)
     angles = state_linked(model, AT_STRIKE, (*np.linspace(0.3, -0.2, n), *np.linspace(-0.5, 0.7, n)))
@@ -186,7 +186,7 @@ def test_the_driven_strikes_and_swings_derivatives_are_their_slopes(assembly, mo
 
 
 @driven
-def test_the_unit_walker_is_driven_alike(assembly, model, free):
+def test_unit_walker_has_the_scaled_drives(assembly, model, free):
     unit, units = unit_walker(model)
     n = len(model.arm_x)
 

@@ -173,7 +173,7 @@ def test_kinetic_energy_is_the_sum_over_masses(assembly, slope, free):
 
 
 @for_each_type
-def test_a_heel_strike_keeps_angular_momentum_about_the_new_foothold_and_gains_no_energy(assembly, slope, free):
+def test_heel_strike_conserves_angular_momentum_and_gains_no_energy(assembly, slope, free):
     model = standing(assembly, G, slope)
     y = both_feet_down(model, free)
     after = heel_strike(model, y)
@@ -190,7 +190,7 @@ def test_a_heel_strike_keeps_angular_momentum_about_the_new_foothold_and_gains_n
 
 @settings(max_examples=EXAMPLES)
 @given(walker=kneed, slope=slopes, free=numbers)
-def test_a_knee_strike_keeps_angular_momentum_about_the_foothold_and_gains_no_energy(walker, slope, free):
+def test_knee_strike_conserves_angular_momentum_and_gains_no_energy(walker, slope, free):
     assembly = assembly_of(walker, rigid=True)
     model = standing(assembly, G, slope)
     y = state_of(model, BENT, (*free[:2], free[0], *free[3:]))
@@ -235,7 +235,7 @@ def mapped(assembly: Assembly, place, of_mass=lambda m: m, of_inertia=lambda i: 
 
 
 @for_each_type
-def test_the_mirror_image_moves_as_the_mirror_image(assembly, slope, free):
+def test_mirrored_walker_moves_as_the_mirror_image(assembly, slope, free):
     model = standing(assembly, G, slope)
     mirror = standing(mapped(assembly, lambda _, at: (-at[0], at[1])), G, -slope)
     y, struck = state_of(model, BENT, free), both_feet_down(model, free)
@@ -249,7 +249,7 @@ def test_the_mirror_image_moves_as_the_mirror_image(assembly, slope, free):
 
 
 @for_each_type
-def test_a_twin_of_another_size_and_mass_moves_alike(assembly, slope, free):
+def test_scaled_twin_moves_alike(assembly, slope, free):
     long, heavy = 3.7, 0.2
     model = standing(assembly, G, slope)
     twin = standing(
@@ -295,7 +295,7 @@ def by_parts(assembly, radius_m, leg_length_m):
 
 
 @for_each_type
-def test_a_walker_by_its_parts_in_frames_of_their_own_is_that_of_its_type(assembly, slope, free):
+def test_walker_built_from_parts_equals_that_of_its_type(assembly, slope, free):
     model = standing(assembly, G, slope)
     # one and the same shift for like bodies of both legs
     shifts = dict(

@@ -98,7 +98,7 @@ def kneed_state(numbers):
 
 
 @given(free)
-def test_a_rolling_kneed_walker_with_a_torso_moves_as_lagrange_says(lagrange, numbers):
+def test_rolling_kneed_walker_with_torso_obeys_lagrange_equations(lagrange, numbers):
     y = kneed_state(numbers)
     psi = np.array(numbers[:3]) + SLOPE
     M, rest, T, V = lagrange[0](psi, numbers[3:])
@@ -115,7 +115,7 @@ def test_a_rolling_kneed_walker_with_a_torso_moves_as_lagrange_says(lagrange, nu
 
 
 @given(free)
-def test_a_straight_leg_moves_as_one_body(lagrange, numbers):
+def test_straight_leg_moves_as_one_body(lagrange, numbers):
     """Lagrange's equations with thigh and shank held together: their sum, for one angle."""
     thigh, stance, _, d_thigh, d_stance, _ = numbers
     y = kneed_state((thigh, stance, thigh, d_thigh, d_stance, d_thigh))
@@ -128,7 +128,7 @@ def test_a_straight_leg_moves_as_one_body(lagrange, numbers):
 
 
 @given(st.tuples(angle, angle, rate, rate), st.sampled_from([CORRECTED, AS_PRINTED]))
-def test_the_assembled_compass_swings_by_appendix_a(y, sign):
+def test_assembled_compass_swings_as_in_appendix_a(y, sign):
     walker = PAPER._replace(c21_sign=sign, leg_inertia=0.1)
     model = assembled(walker)
     assert rates(model, BENT, y) == pytest.approx(accelerations(walker, *y), rel=1e-12, abs=1e-12)
@@ -169,7 +169,7 @@ def angular_momentum(parts, spins, about):
 
 
 @given(st.tuples(angle, rate, rate))
-def test_heel_strike_keeps_the_momenta_that_no_impulse_acts_on(numbers):
+def test_heel_strike_conserves_momenta_without_external_impulse(numbers):
     """Of the whole about the new contact point; of the trailing leg about the hip, and half of the torso's."""
     stance, d_stance, d_thigh = numbers
     thigh = -2.0 * (SLOPE + KNEED.lean) - stance
@@ -189,7 +189,7 @@ def test_heel_strike_keeps_the_momenta_that_no_impulse_acts_on(numbers):
 
 
 @given(free)
-def test_a_knee_strike_keeps_what_the_knee_does_not_touch_and_loses_energy(numbers):
+def test_knee_strike_conserves_the_other_momenta_and_loses_energy(numbers):
     """Generalised momenta of the stance leg, and of thigh and shank together, are those of Lagrange's equations."""
     thigh, stance, _, *speeds = numbers
     y = kneed_state((thigh, stance, thigh, *speeds))
@@ -216,7 +216,7 @@ def differences(f, y, h=1e-5, along=None):
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
 @given(numbers=free)
-def test_the_jacobian_is_the_slope_of_the_rates(phase, numbers):
+def test_jacobian_equals_the_slope_of_the_rates(phase, numbers):
     y = np.array(kneed_state(numbers))
     J = np.full((8, 8), np.nan)
     mode_jacobian(Mode(KNEED, phase), 0.0, y, J)
@@ -227,7 +227,7 @@ def test_the_jacobian_is_the_slope_of_the_rates(phase, numbers):
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
 @given(numbers=free)
-def test_columns_behind_a_state_change_by_the_jacobian(phase, numbers):
+def test_tangent_columns_change_at_the_rate_of_the_jacobian(phase, numbers):
     y, directions = np.array(kneed_state(numbers)), np.random.default_rng(0).normal(size=(3, 8))
     J, f = np.zeros((8, 8)), np.full(32, np.nan)
     mode_jacobian(Mode(KNEED, phase), 0.0, y, J)
@@ -238,7 +238,7 @@ def test_columns_behind_a_state_change_by_the_jacobian(phase, numbers):
 
 
 @given(numbers=free)
-def test_a_straight_leg_moves_as_a_leg_made_in_one_piece(numbers):
+def test_locked_leg_moves_like_a_leg_of_one_piece(numbers):
     """Thigh and shank as one limb, by the parallel axes of their masses."""
     mass, below = THIGH.mass_kg + SHANK.mass_kg, THIGH.length_m + SHANK.mass_below_m
     ahead = (THIGH.mass_kg * THIGH.mass_ahead_m + SHANK.mass_kg * SHANK.mass_ahead_m) / mass
@@ -256,7 +256,7 @@ def test_a_straight_leg_moves_as_a_leg_made_in_one_piece(numbers):
 
 @pytest.mark.parametrize("strike", [heel_strike, knee_strike])
 @given(numbers=free)
-def test_the_derivative_of_a_strike_is_its_slope(strike, numbers):
+def test_strike_derivative_equals_its_slope(strike, numbers):
     y = np.array(kneed_state(numbers))
     found = np.array(strike(KNEED, y, np.eye(8))[8:]).reshape(8, 8).T
     slopes = differences(lambda x: strike(KNEED, x), y)
@@ -264,7 +264,7 @@ def test_the_derivative_of_a_strike_is_its_slope(strike, numbers):
 
 
 @pytest.mark.parametrize("leg", [SWING, STANCE])
-def test_both_feet_touch_where_straight_legs_lean_alike(leg):
+def test_both_feet_touch_if_the_legs_lean_symmetrically(leg):
     lean = ON_STRAIGHT_LEGS.lean
     y = apply_couplings(ON_STRAIGHT_LEGS, STRAIGHT, (0.3 - 2.0 * (SLOPE + lean), -0.3) if leg else (0.2, 0.1))
     both = y[SWING] + y[STANCE] + 2.0 * (SLOPE + lean)
@@ -276,7 +276,7 @@ def test_both_feet_touch_where_straight_legs_lean_alike(leg):
     (1, lambda e: straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc(e))),
     (1, lambda e: with_torso(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), e, 0.3, 0.0)),
 ])  # fmt: skip
-def test_what_goes_to_zero_leaves_the_compass(order, walker):
+def test_vanishing_radius_and_torso_leave_the_compass(order, walker):
     """Radius and torso mass: the rates of the legs come back linearly."""
     y = (0.2, -0.1, -0.8, -1.1)
     compass = standing(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), G, SLOPE)
@@ -303,7 +303,7 @@ def compiled_strikes(model, y, heel, knee):
 
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
-def test_compiled_code_reads_no_scratch_that_was_not_written(phase):
+def test_compiled_code_reads_no_uninitialised_scratch(phase):
     """In Python unwritten scratch is no number, and what is compiled says the same."""
     y = np.random.default_rng(1).uniform(-0.5, 0.5, 24)
     results = []
@@ -315,7 +315,7 @@ def test_compiled_code_reads_no_scratch_that_was_not_written(phase):
     np.testing.assert_allclose(results[0], results[1], rtol=1e-11, atol=1e-11)
 
 
-def test_a_walker_cannot_be_changed_by_those_who_walk_it():
+def test_walking_does_not_modify_the_walker():
     with pytest.raises(ValueError, match="read-only"):
         KNEED.slope = 0.1
     steeper = KNEED.changed(slope=0.1)

@@ -48,14 +48,14 @@ def walked(walker, z, steps):
     return take_walk(walker.model, tolerances, state_on_section(walker.model, z), steps)
 
 
-def test_the_only_attractor_of_a_gentle_slope_is_its_gait(gentle):
+def test_only_attractor_on_a_gentle_slope_is_the_gait(gentle):
     assert [cycle.period for cycle in gentle.cycles] == [1]
     assert not gentle.aperiodic
     assert gentle.cycles[0].points[0] == pytest.approx(GAIT, abs=1e-6)
     assert 0.0 < gentle.cycles[0].reach <= CAPTURE
 
 
-def test_past_the_first_flip_steps_repeat_in_pairs():
+def test_steps_repeat_in_pairs_past_the_first_flip():
     found = find_attractors(STEEPER, around(STEEP_GAIT), seed=0)
     assert [cycle.period for cycle in found.cycles] == [2]
     walk = walked(STEEPER, found.cycles[0].points[0], 2)
@@ -63,13 +63,13 @@ def test_past_the_first_flip_steps_repeat_in_pairs():
     assert np.abs(walk.after[0, 1:] - found.cycles[0].points[0]).max() > 0.01
 
 
-def test_where_steps_never_repeat_there_is_no_cycle():
+def test_aperiodic_walk_has_no_cycle():
     found = find_attractors(STEEPEST, around(STEEP_GAIT), seed=0)
     assert found.aperiodic
     assert found.cycles == ()
 
 
-def test_walks_one_by_one_fare_as_those_in_lanes_do_but_at_edges(gentle):
+def test_single_walks_agree_with_lanes_except_at_basin_edges(gentle):
     window = Window((0, 2), (0.15, -0.33), (0.2, -0.25), (12, 12), tuple(GAIT))
     starts = window.starts(np.arange(window.size))
     lanes, alone = (walk_to_attractor(walker, gentle, starts, 40) for walker in (UNIT, UNIT.model))
@@ -81,7 +81,7 @@ def test_walks_one_by_one_fare_as_those_in_lanes_do_but_at_edges(gentle):
     np.testing.assert_allclose(alone.last[walked], lanes.last[walked], atol=2.0 * CAPTURE)
 
 
-def test_cells_fare_as_their_walks_do_but_at_edges(gentle):
+def test_cells_agree_with_single_walks_except_at_basin_edges(gentle):
     window = Window((0, 2), (0.15, -0.33), (0.2, -0.25), (32, 32), tuple(GAIT))
     found = walk_to_attractor(UNIT, gentle, window.starts(np.arange(window.size)), 100)
     inner = np.setdiff1d(np.arange(window.size), edge_cells(found.outcome.reshape(window.cells)))
@@ -98,19 +98,19 @@ def test_cells_fare_as_their_walks_do_but_at_edges(gentle):
     assert 10 < np.count_nonzero(found.attractor[chosen] == 0) < 50
 
 
-def test_a_walk_that_reaches_nothing_ends_after_the_most_steps():
+def test_walk_that_reaches_no_attractor_ends_after_max_steps():
     found = walk_to_attractor(UNIT, Attractors(), GAIT[None, :], 7)
     assert (found.outcome[0], found.steps[0], found.attractor[0]) == (Outcome.WALKED, 7, UNREACHED)
     assert found.last[0] == pytest.approx(GAIT, abs=1e-6)
 
 
-def test_the_nearest_attractor_counts():
+def test_nearest_attractor_is_chosen():
     far, near = PeriodicAttractor(np.array([[1.0, 0.0, 0.0]]), 0.5), PeriodicAttractor(GAIT[None, :], 1e-3)
     found = walk_to_attractor(UNIT, Attractors((far, near)), GAIT[None, :], 7)
     assert (found.steps[0], found.attractor[0]) == (1, 1)
 
 
-def test_a_window_has_its_cells_in_rows_and_their_middles_inside():
+def test_window_lists_cell_centres_row_by_row():
     window = Window((2, 0), (0.0, 10.0), (1.0, 14.0), (2, 4), (7.0, 8.0, 9.0))
     z = window.starts(np.arange(window.size))
     assert z[:, 1].tolist() == [8.0] * 8
@@ -120,7 +120,7 @@ def test_a_window_has_its_cells_in_rows_and_their_middles_inside():
     assert parts[:, [2, 0]].tolist() == [[0.125, 10.25], [0.125, 10.75], [0.375, 10.25], [0.375, 10.75]]
 
 
-def test_edges_lie_on_both_sides_of_a_change():
+def test_edge_cells_are_on_both_sides_of_a_change():
     classes = np.zeros((4, 4), int)
     classes[1, 1] = 1
     assert edge_cells(classes).tolist() == [1, 4, 5, 6, 9]

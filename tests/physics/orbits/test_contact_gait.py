@@ -37,11 +37,11 @@ def gait():
     return answer_of().gait
 
 
-def test_energy_lost_by_channel_is_the_height_lost(gait):
+def test_energy_losses_add_up_to_the_lost_height(gait):
     assert gait.step.dissipated_J.sum() == pytest.approx(gait.step.driven.gravity, rel=1e-7)
 
 
-def test_a_long_walk_on_pads_of_its_own_pitch_settles_on_the_gait(gait):
+def test_long_walk_on_matching_pads_settles_on_the_gait(gait):
     config = config_at_one_degree("contact.pad_pitch=own")
     scene: ContactScene = contact_scene(config, RIGID_STEP, gait.step.length_m)
     walk = scene.walk(start_state(scene, RIGID_STATE), 40, Tolerances("radau5", 1e-8, 1e-10, 10**8))
@@ -51,14 +51,14 @@ def test_a_long_walk_on_pads_of_its_own_pitch_settles_on_the_gait(gait):
     assert walk.slip_m[-2] == pytest.approx(gait.step.slip_m, abs=1e-7)
 
 
-def test_the_long_walk_approaches_it_as_the_multipliers_say(gait):
+def test_multipliers_give_the_rate_of_approach_of_a_long_walk(gait):
     assert gait.stable
     assert abs(gait.multipliers[0]) == pytest.approx(0.54, abs=0.01)
     # three disturbances die within the step that they are made in: the stance foot holds height and angle
     assert np.all(np.abs(gait.multipliers[3:]) < 1e-6)
 
 
-def test_a_gait_beyond_the_reach_of_walking_is_followed_from_rigid_ground():
+def test_gait_that_walking_does_not_reach_is_continued_from_rigid_ground():
     config = loader.load(Path("paper"), ["slope_deg=4"], None).config
     rigid = find_gaits(rigid_walker(config, "corrected"), config.seed).gait
     assert rigid is not None
@@ -76,14 +76,14 @@ def test_a_gait_beyond_the_reach_of_walking_is_followed_from_rigid_ground():
         (("contact.static_friction=0.05", "contact.dynamic_friction=0.04"), "start"),
     ],
 )
-def test_ground_without_a_gait_is_said_in_words(sets, word):
+def test_ground_without_a_gait_is_explained(sets, word):
     answer = answer_of(*sets)
     assert answer.gait is None
     assert word in answer.reason
     assert answer.advice
 
 
-def test_a_search_that_fails_says_what_came_in_its_way(gait, monkeypatch):
+def test_failed_search_states_its_reason(gait, monkeypatch):
     backward = replace(gait, steps=(replace(gait.step, length_m=-0.1),))
     monkeypatch.setattr(search, "gait_near", lambda *_: backward)
     said = solve_gait_on(None, None)

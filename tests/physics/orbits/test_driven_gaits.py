@@ -52,7 +52,7 @@ KUO = {
 
 
 @pytest.mark.parametrize("name", KUO)
-def test_kuos_gaits(name):
+def test_gaits_of_kuo_are_reproduced(name):
     (push, spring, slope), (angle, rate, period), multipliers = KUO[name]
     simplest = walker_of("simplest", push_off=push)
     foot_mass = float(simplest.A[SWING, SWING])
@@ -67,7 +67,7 @@ def test_kuos_gaits(name):
 LEVEL = (-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402)
 
 
-def test_the_papers_compass_on_the_level():
+def test_paper_compass_walks_on_level_ground():
     """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
     walker = on_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.0, 0.0)), 0.0)
     gait = find_gaits(walker).gait
@@ -85,7 +85,7 @@ DRIVEN = {
 
 
 @pytest.mark.parametrize("name", DRIVEN)
-def test_a_driven_step_maps_derivative_is_its_slope(name):
+def test_derivative_of_a_driven_step_map_equals_its_slope(name):
     walker, _ = unit_walker(on_slope(walker_of(name, **DRIVEN[name]), 0.0))
     gait = find_gaits(walker).gait
     shooting, section = RigidStepper(walker, EXACT_STEPS), strike_section(walker)
@@ -99,7 +99,7 @@ NEAR = 0.03  # of m sqrt(g L): a push-off that level gaits of most walkers go wi
 
 
 @pytest.mark.parametrize("name", ["paper", "rigid-only", "contact-si", "torso", "round-feet", "simplest"])
-def test_a_walker_that_is_pushed_off_has_a_stable_gait_on_the_level(name):
+def test_push_off_gives_a_stable_gait_on_level_ground(name):
     walker = on_slope(walker_of(name), 0.0)
     gait = find_gaits(walker.changed(push_off=NEAR * unit_walker(walker)[1].impulse)).gait
     assert gait.stable
@@ -107,7 +107,7 @@ def test_a_walker_that_is_pushed_off_has_a_stable_gait_on_the_level(name):
 
 
 @pytest.mark.parametrize("slope", [0.0, -0.1])
-def test_torques_that_turn_gravity_walk_a_passive_gait_on_any_slope(slope):
+def test_gravity_shaping_torques_give_the_passive_gait_on_any_slope(slope):
     """Controlled symmetry: Spong, Bullo (2005)."""
     passive = walker_of("paper")
     gait, turned = find_gaits(passive).gait, on_slope(passive, slope)
@@ -132,20 +132,20 @@ def test_torques_that_turn_gravity_walk_a_passive_gait_on_any_slope(slope):
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "torso", "kneed", "kneed-round-feet", "simplest"])
-def test_a_passive_gaits_cost_of_transport_is_the_slopes_sine(name):
+def test_cost_of_transport_of_a_passive_gait_is_the_sine_of_the_slope(name):
     walker = walker_of(name)
     gait = find_gaits(walker).gait
     assert gait.cost_of_transport == pytest.approx(math.sin(walker.slope), rel=1e-10)
     assert gait.work["gravity"] > gait.work["push_off"] == gait.work["hip"] == 0.0
 
 
-def test_a_value_without_a_walker_has_no_cost_of_transport():
+def test_parameter_value_without_a_walker_has_no_cost_of_transport():
     walker = walker_of("paper")
     step_map = RigidMap(lambda _: None, 1.0, walker)
     assert step_map.cost_of_transport(np.array(find_gaits(walker).gait.z), 0.0) is None
 
 
-def test_kuos_walker_spends_half_the_square_of_its_push_off_over_its_mass():
+def test_push_off_of_kuos_walker_costs_impulse_squared_over_twice_its_mass():
     """Kuo (2002): the push-off comes before the strike, and legs without mass move the hip alone."""
     config = loader.load(Path("kuo")).config
     gait = find_gaits(rigid_walker(config)).gait
@@ -154,7 +154,7 @@ def test_kuos_walker_spends_half_the_square_of_its_push_off_over_its_mass():
     assert gait.cost_of_transport == pytest.approx(0.0253083, abs=5e-8)
 
 
-def test_uphill_what_gravity_takes_is_no_income():
+def test_work_against_gravity_uphill_is_not_counted_as_input():
     walker = on_slope(walker_of("paper", push_off=4.0), -0.005)
     walk = take_walk(walker, EXACT_STEPS, find_gaits(walker).gait.state, 2)
     assert walk.driven.gravity < 0.0
@@ -167,7 +167,7 @@ DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "hip": (10.0, 0.0, 0.3)}}
 
 
 @pytest.mark.parametrize("name", DRIVES)
-def test_the_energies_of_a_driven_walk_balance(name):
+def test_energies_of_a_driven_walk_balance(name):
     """And what is given in a gait's step is what its strikes take; a spring gives back what it takes."""
     walker = on_slope(walker_of(name, **DRIVES[name]), 0.0)
     gait = find_gaits(walker).gait
@@ -179,7 +179,7 @@ def test_the_energies_of_a_driven_walk_balance(name):
     assert take_walk(walker, EXACT_STEPS, off, 2).energy_balance_residual < 1e-11 * weight
 
 
-def test_a_hips_damper_takes_the_integral_of_its_power():
+def test_hip_damper_dissipates_the_integral_of_its_power():
     walker = on_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.1, 0.0)), 0.0)
     walk = take_walk(walker, EXACT_STEPS, LEVEL, 1, sampled=True)
     y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
@@ -196,7 +196,7 @@ TURNED = {
 
 
 @pytest.mark.parametrize("name", TURNED)
-def test_a_hip_torques_positive_work_is_the_integral_of_its_positive_power(name):
+def test_positive_work_of_a_hip_torque_is_the_integral_of_positive_power(name):
     """Late in the swing the legs turn back; with knees the knee strike reverses the rate between the thighs at once."""
     walker = on_slope(walker_of(name, **TURNED[name]), 0.0)
     start = find_gaits(walker).gait.state
@@ -209,7 +209,7 @@ def test_a_hip_torques_positive_work_is_the_integral_of_its_positive_power(name)
     assert driven.hip_torque == pytest.approx(driven.hip, rel=1e-9)
 
 
-def test_a_costs_derivative_across_a_knee_strike_is_the_slope_of_independent_costs():
+def test_cost_derivative_across_a_knee_strike_equals_an_independent_slope():
     """By the hip's spring, of a walker whose knee strike reverses the rate between its thighs."""
 
     def driven(spring):
@@ -234,7 +234,7 @@ def test_a_costs_derivative_across_a_knee_strike_is_the_slope_of_independent_cos
 HIP = ("walker.hip.spring_N_m_per_rad=10", "walker.hip.damping_N_m_s_per_rad=0.4", "walker.hip.torque_N_m=1.5")
 
 
-def test_the_contact_step_maps_derivative_has_the_torques_change_of_legs():
+def test_contact_step_derivative_includes_the_change_of_driven_leg():
     """At a touch the torque leaps from one leg to the other: forgotten, that shows in the third digit."""
     config = loader.load(Path("paper"), ["slope_deg=0.9", *HIP]).config
     scene = contact_scene(config, RIGID_STEP, RIGID_STEP)
@@ -243,6 +243,6 @@ def test_the_contact_step_maps_derivative_has_the_torques_change_of_legs():
     np.testing.assert_allclose(found, slope, rtol=0.0, atol=AGREEMENT)
 
 
-def test_a_drive_far_too_strong_for_the_gaits_that_there_are_without_it_is_not_said_to_be_for_want_of_one():
+def test_excessive_drive_is_not_reported_as_a_missing_drive():
     walker = walker_of("paper", hip=(0.0, 0.0, 1e8))
     assert "the passive gait at 0.0174 rad is lost at 0% of the way" in find_gaits(walker).reason

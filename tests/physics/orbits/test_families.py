@@ -208,9 +208,7 @@ def multiplier_by_differences(step, z, slope):
     ],
     ids=["compass", "simplest"],
 )
-def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences(
-    walker_at, step, span, coordinates, printed
-):
+def test_first_flip_agrees_with_an_independent_integration(walker_at, step, span, coordinates, printed):
     branch = next(b for b in family(walker_at, *span, 8) if b.period == 1 and any(p.stable for p in b.points))
     (flip,) = branch.bifurcations
     z = coordinates(flip.point.x[:-1], flip.value)
@@ -224,7 +222,7 @@ def test_the_first_flip_agrees_with_another_integrator_and_newton_on_differences
     assert flip.value == pytest.approx(printed, rel=6e-3)  # Goswami et al. 1996, Garcia et al. 1998
 
 
-def test_the_cascade_of_the_compass_is_followed_by_itself():
+def test_compass_cascade_is_followed_automatically():
     flips = flips_of(compass_family())
     assert np.degrees(flips[(1, "flip")]) == pytest.approx(4.39, abs=5e-3)  # 0.02 deg above what is printed
     assert np.degrees(flips[(2, "flip")]) == pytest.approx(4.9, abs=0.03)  # Goswami et al. 1996
@@ -233,7 +231,7 @@ def test_the_cascade_of_the_compass_is_followed_by_itself():
     assert abs(ratios[-1] - 4.669) < 0.02
 
 
-def test_located_flips_have_their_multiplier_at_minus_one_and_their_branch_begins_there():
+def test_branches_begin_at_flips_with_multiplier_minus_one():
     branches = compass_family()
     for branch in branches:
         for one in branch.bifurcations:
@@ -242,7 +240,7 @@ def test_located_flips_have_their_multiplier_at_minus_one_and_their_branch_begin
             assert len(children) == (2 * branch.period <= 8)
 
 
-def test_every_point_of_a_branch_is_a_gait_of_so_many_steps_and_of_no_fewer():
+def test_every_point_of_a_branch_has_its_minimal_period():
     step_map = map_of(paper_walker, 0.1)
     for branch in compass_family():
         for point in branch.points[:: max(1, len(branch.points) // 4)]:
@@ -251,7 +249,7 @@ def test_every_point_of_a_branch_is_a_gait_of_so_many_steps_and_of_no_fewer():
             assert all(np.max(np.abs(step.z - point.z)) > 1e-6 for step in cycle.steps[:-1])
 
 
-def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_does():
+def test_branches_are_stable_between_bifurcations_and_end_with_the_span():
     branches = compass_family()
     flips = flips_of(branches)
     stable = next(b for b in branches if b.period == 1 and b.stable_ranges)
@@ -261,14 +259,14 @@ def test_branches_are_stable_between_their_bifurcations_and_end_where_the_span_d
     assert doubled.stable_ranges == ((flips[(1, "flip")], flips[(2, "flip")]),)
 
 
-def test_a_doubled_branch_is_followed_away_from_its_flip():
+def test_doubled_branch_is_followed_away_from_its_flip():
     for branch in compass_family():
         if branch.period > 1:
             parted = [np.linalg.norm(half_cycle_difference(point)) for point in branch.points[:3]]
             assert 0.0 < parted[0] < parted[1] < parted[2]
 
 
-def test_the_equations_of_a_gait_have_no_value_where_no_walker_has_the_parameters_next_value():
+def test_gait_equations_have_no_value_beyond_valid_parameters():
     seed = seeds_at(paper_walker, 0.03)[0]
     step_map = map_of(lambda value: paper_walker(value) if value == 0.03 else None, 1.0)
     here = GaitEquations(step_map, 1, 1.0)(np.append(seed.z, 0.03))
@@ -285,13 +283,13 @@ def between_the_first_flip_and_the_branch_beyond_it():
     return follower, Seed(walked.last, slope, 2)
 
 
-def test_a_gait_just_beyond_a_flip_is_on_the_branch_that_begins_there():
+def test_gait_just_beyond_a_flip_is_on_the_new_branch():
     follower, seed = between_the_first_flip_and_the_branch_beyond_it()
     known = compass_family()
     assert follower.family([seed], 2, known) == known
 
 
-def test_a_branch_that_was_entered_elsewhere_begins_at_its_flip_and_has_no_gait_of_half_as_many_steps():
+def test_branch_entered_elsewhere_begins_at_its_flip_without_shorter_gaits():
     follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.07, 0.08))
     one, doubled = follower.family([seeds_at(paper_walker, 0.072)[-1]], 2)
     (flip,) = (each for each in one.bifurcations if each.kind == "flip")
@@ -303,14 +301,14 @@ def test_a_branch_that_was_entered_elsewhere_begins_at_its_flip_and_has_no_gait_
     assert min(np.abs(half_cycle_difference(point)).max() for point in again.points) > 1e-6
 
 
-def test_no_branch_is_followed_from_a_flip_that_another_one_has_closed_on():
+def test_no_branch_is_followed_twice_from_a_shared_flip():
     follower, seed = between_the_first_flip_and_the_branch_beyond_it()
     branches = follower.family([seed, *seeds_at(paper_walker, 0.07)], 2)
     assert [branch.period for branch in branches] == [2, 1, 1]
     assert any(end.reason.startswith("closes") for end in branches[0].ends)
 
 
-def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to():
+def test_walk_beyond_the_first_flip_settles_on_the_doubled_branch():
     step_map = map_of(paper_walker, 0.1)
     one, two = (next(b for b in compass_family() if b.period == n and b.stable_ranges) for n in (1, 2))
     slope = float(np.mean(two.stable_ranges[0]))
@@ -321,7 +319,7 @@ def test_a_walk_beyond_the_first_flip_settles_on_the_branch_that_was_switched_to
     assert follower.lies_on(two, gait_near(step_map, there.last, slope, Effort(1e-12), 2))
 
 
-def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
+def test_lyapunov_exponent_is_positive_in_chaos_and_negative_on_a_stable_gait():
     step_map = map_of(paper_walker, 0.1)
     one = next(b for b in compass_family() if b.period == 1 and b.stable_ranges)
     gait = next(point for point in one.points if point.value > 0.03)
@@ -334,7 +332,7 @@ def test_neighbours_part_on_the_chaotic_attractor_and_meet_on_a_stable_gait():
 
 
 @pytest.mark.parametrize("lasting", [0.0, 5.0, 20.0], ids="correlated over {:g} steps".format)
-def test_a_standard_error_covers_the_error_whether_or_not_steps_are_correlated(lasting):
+def test_standard_error_covers_the_error_even_for_correlated_steps(lasting):
     """Of means of normal noise whose correlation falls e-fold in so many steps: the mean is 0."""
     kept, noise = np.exp(-1.0 / lasting) if lasting else 0.0, np.random.default_rng(1).standard_normal((400, 6000))
     for step in range(1, noise.shape[1]):
@@ -346,7 +344,7 @@ def test_a_standard_error_covers_the_error_whether_or_not_steps_are_correlated(l
     assert np.mean(np.array(off) > 2.0) < 0.077 + 2.0 * np.sqrt(0.077 * 0.923 / 400)
 
 
-def test_the_exponent_of_chaos_agrees_with_that_of_a_walk_fifty_times_as_long():
+def test_exponent_agrees_with_that_of_a_walk_fifty_times_longer():
     follower = BranchFollower(map_of(paper_walker, 0.01), ValueSpan(0.0, 0.1))
     start = seeds_at(paper_walker, 0.07)[-1].z  # the longer gait, stable there
     attractor = sweep_attractor(follower.step_map, start, np.linspace(0.07, np.radians(5.1856), 60), 300, 50).found[-1]
@@ -356,7 +354,7 @@ def test_the_exponent_of_chaos_agrees_with_that_of_a_walk_fifty_times_as_long():
 
 
 @pytest.mark.parametrize("beyond", [2e-6, 1.6e-5])
-def test_just_beyond_a_flip_neighbours_meet_on_the_new_gait_however_slowly_the_old_one_is_left(beyond):
+def test_exponent_just_beyond_a_flip_is_negative(beyond):
     step_map = map_of(paper_walker, 0.1)
     two = next(b for b in compass_family() if b.period == 2 and b.stable_ranges)
     flip = next(one for one in two.bifurcations if one.kind == "flip")
@@ -364,7 +362,7 @@ def test_just_beyond_a_flip_neighbours_meet_on_the_new_gait_however_slowly_the_o
     assert exponent.exponent < -3.0 * exponent.uncertainty
 
 
-def test_a_gait_of_three_steps_is_born_in_a_fold():
+def test_three_step_gait_appears_at_a_fold():
     follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1))
     start = period_three_start(follower)
     (branch,) = [b for b in follower.family([start], 3) if b.period == 3]
@@ -384,7 +382,7 @@ SIX_STEPS = [
 
 
 @pytest.mark.parametrize(("least", "most", "seed"), [(0.009, 0.0185, 0), (0.012, 0.019, 1), (0.012, 0.019, 2)])
-def test_six_step_gaits_of_the_simplest_walker_begin_at_a_fold_and_none_repeats_sooner(least, most, seed):
+def test_six_step_gaits_of_the_simplest_walker_begin_at_a_fold(least, most, seed):
     follower = BranchFollower(map_of(simplest_walker, most - least), ValueSpan(least, most))
     slope, z = SIX_STEPS[seed]
     (branch,) = follower.family([Seed(np.array(z), slope, 6)], 6)
@@ -397,13 +395,13 @@ def test_six_step_gaits_of_the_simplest_walker_begin_at_a_fold_and_none_repeats_
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_a_family_that_is_found_on_both_arms_of_its_fold_is_listed_once(order):
+def test_family_found_on_both_sides_of_its_fold_is_listed_once(order):
     follower = BranchFollower(map_of(simplest_walker, 0.007), ValueSpan(0.012, 0.019))
     (branch,) = follower.family([Seed(np.array(z), slope, 6) for slope, z in SIX_STEPS[1:][::order]], 6)
     assert {one.kind for one in branch.bifurcations} == {"fold", "flip"}
 
 
-def test_curves_of_flips_pass_through_flips_located_for_other_masses():
+def test_flip_curves_pass_through_flips_located_for_other_masses():
     def map_at(hip_mass):
         return map_of(lambda slope: paper_walker(slope)._replace(hip_mass=hip_mass), 0.1)
 
@@ -420,7 +418,7 @@ def test_curves_of_flips_pass_through_flips_located_for_other_masses():
     assert curve.first[index] == pytest.approx(elsewhere.value, abs=1e-5)  # the curve's end is interpolated
 
 
-def test_a_branch_ends_where_no_walker_has_the_parameters_value():
+def test_branch_ends_at_the_last_valid_parameter_value():
     def walker_at(mass):
         return paper_walker(0.05)._replace(hip_mass=mass) if mass < 13.0 else None
 
@@ -431,7 +429,7 @@ def test_a_branch_ends_where_no_walker_has_the_parameters_value():
 
 
 @pytest.mark.parametrize("first", [8.0, 10.0])
-def test_a_span_that_begins_where_the_walkers_do_is_followed_to_its_end(first):
+def test_span_that_begins_at_the_first_valid_value_is_followed_to_its_end(first):
     def walker_at(mass):
         return paper_walker(0.05)._replace(hip_mass=mass) if mass >= 8.0 else None
 
@@ -442,18 +440,18 @@ def test_a_span_that_begins_where_the_walkers_do_is_followed_to_its_end(first):
     assert np.all(np.diff(branch.values) > 1e-3)
 
 
-def test_a_branch_that_ends_in_a_push_off_that_lasts_too_long_says_so():
+def test_branch_that_ends_in_an_overlong_push_off_says_so():
     assert describe_loss(NotConverged(Outcome.REJECTED)) == "its push-off is not over when the feet pass each other"
     assert describe_loss(NotConverged(Outcome.FELL)).startswith("fell: ")
 
 
-def test_a_branch_that_uses_up_its_points_says_so():
+def test_branch_that_exhausts_its_points_says_so():
     follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), most=5)
     branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
     assert all(end.reason == "the limit of 5 points is reached" for end in branch.ends)
 
 
-def test_a_closed_branch_is_gone_round_once_wherever_it_is_begun():
+def test_closed_branch_is_traced_once_from_any_start():
     """The compass pushed uphill has gaits between two impulses alone, on one closed curve."""
     uphill = on_slope(assembled(paper_walker(0.0)), np.radians(-0.25))
     pushed = RigidMap(lambda impulse: uphill.changed(push_off=impulse), 7.0, uphill)
@@ -480,7 +478,7 @@ class Circle:
         return Evaluated(Outcome.WALKED, np.array([x @ x - 1.0]), 2.0 * x[None, :], None)
 
 
-def test_continuation_goes_round_a_circle_and_finds_where_it_folds():
+def test_continuation_traces_a_circle_and_finds_its_folds():
     control = StepControl(first=0.1, longest=0.3, turn=0.9)
     point = correct(Circle(), np.array([0.6, 0.8]), np.array([0.8, -0.6]), 1e-14)
     folds, gone, length = [], 0.0, control.first
@@ -494,7 +492,7 @@ def test_continuation_goes_round_a_circle_and_finds_where_it_folds():
     assert np.sort([fold[0] for fold in folds])[[0, -1]] == pytest.approx([-1.0, 1.0], abs=1e-14)
 
 
-def test_the_action_on_pairs_has_products_of_multipliers_as_its_own():
+def test_bialternate_product_has_products_of_multipliers_as_eigenvalues():
     DP = np.random.default_rng(0).standard_normal((5, 5))
     values = np.linalg.eigvals(DP)
     products = [values[i] * values[j] for i in range(5) for j in range(i)]
@@ -503,13 +501,13 @@ def test_the_action_on_pairs_has_products_of_multipliers_as_its_own():
     assert np.all(np.diff(np.abs(multipliers_of(DP))) <= 1e-12)
 
 
-def test_what_repeats_itself_has_a_period_and_what_does_not_has_none():
+def test_only_repeating_sequences_have_a_period():
     cycle = np.tile([[0.1, 0.2], [0.3, 0.1], [0.2, 0.5]], (8, 1))
     assert find_period(cycle) == 3
     assert find_period(np.random.default_rng(0).standard_normal((30, 2))) == 0
 
 
-def test_neighbours_may_part_where_an_exponent_beside_is_positive():
+def test_neighbours_may_diverge_next_to_a_positive_exponent():
     exponents = [Lyapunov(4.0, -0.2, 0.01), Lyapunov(5.0, -0.1, 0.01), Lyapunov(6.0, 0.3, 0.01)]
     assert not may_diverge(exponents, 4.5)
     assert not may_diverge(exponents, 4.0)
@@ -518,7 +516,7 @@ def test_neighbours_may_part_where_an_exponent_beside_is_positive():
     assert may_diverge([], 4.0)
 
 
-def test_what_still_settles_has_the_period_that_it_comes_to():
+def test_slowly_settling_walk_has_the_period_of_its_limit():
     settling = np.tile([[0.1, 0.2], [0.3, 0.1]], (48, 1)) + 5e-4 * 0.99 ** np.arange(96)[:, None]
     assert find_period(settling) == 2
     drifting = np.tile([[0.1, 0.2], [0.3, 0.1]], (48, 1)) + 1e-4 * 1.05 ** np.arange(96)[:, None]
@@ -538,7 +536,7 @@ class LostBeyond:
 
 
 @pytest.mark.parametrize("values", [11, 14])
-def test_where_an_attractor_is_lost_does_not_hang_on_the_values_that_are_looked_at(values):
+def test_loss_of_an_attractor_does_not_depend_on_the_grid(values):
     found = sweep_attractor(LostBeyond(7.13), np.zeros(1), np.linspace(2.0, 8.0, values), 4, 8)
     spacing = 6.0 / (values - 1)
     assert 0.0 < found.lost_at - 7.13 <= spacing / 2**6
@@ -546,6 +544,6 @@ def test_where_an_attractor_is_lost_does_not_hang_on_the_values_that_are_looked_
     assert found.reason == "fell"
 
 
-def test_an_attractor_that_is_not_there_at_the_first_value_is_lost_there():
+def test_attractor_missing_at_the_first_value_is_lost_there():
     found = sweep_attractor(LostBeyond(1.0), np.zeros(1), [2.0, 3.0], 4, 8)
     assert (found.found, found.lost_at) == ((), 2.0)

@@ -91,7 +91,7 @@ KNOWN = {
 
 
 @pytest.mark.parametrize("degrees", KNOWN)
-def test_gait_has_its_known_state_period_length_and_multipliers(degrees):
+def test_gait_has_the_known_state_period_length_and_multipliers(degrees):
     state, period, length, pair, single = KNOWN[degrees]
     gait = find_gaits(on_slope(degrees)).gait
     assert gait.state == pytest.approx(state, abs=6e-8)
@@ -113,14 +113,14 @@ def test_gait_loses_stability_by_period_doubling_a_little_above_the_published_sl
     assert after.multipliers[0] == pytest.approx(-1.0, abs=2e-3)
 
 
-def test_corrected_gait_at_the_papers_slope():
+def test_corrected_gait_at_the_slope_of_the_paper_is_reproduced():
     gait = find_gaits(PAPER).gait
     assert gait.state == pytest.approx((-0.204200, 0.169400, -0.605819, -0.861041), abs=6e-7)
     assert gait.period == pytest.approx(0.703597, abs=6e-7)
     assert gait.energy == pytest.approx(150.241, abs=6e-4)
 
 
-def test_equations_as_printed_have_the_papers_fixed_point():
+def test_printed_equations_have_the_fixed_point_of_the_paper():
     gait = find_gaits(PRINTED).gait
     assert gait.state == pytest.approx((-0.202216, 0.167416, -0.600581, -0.846575), abs=6e-7)
     assert gait.period == pytest.approx(0.706384, abs=6e-7)
@@ -129,7 +129,7 @@ def test_equations_as_printed_have_the_papers_fixed_point():
     assert [np.trunc(100 * value) / 100 for value in gait.state[2:]] == [-0.60, -0.84]
 
 
-def test_energy_as_printed_is_that_of_table_3():
+def test_energy_with_printed_equations_is_that_of_table_3():
     gait = find_gaits(PRINTED).gait
     assert gait.energy == pytest.approx(150.142, abs=6e-4)
     assert gait.energy_drift == pytest.approx(150.183 - 150.054, abs=1e-3)
@@ -143,24 +143,24 @@ def test_every_gait_is_solved_to_rounding(walker):
         assert gait.residual <= 1e-11
 
 
-def test_both_ways_of_searching_find_the_gait():
+def test_both_search_strategies_find_the_gait():
     search = find_gaits(PAPER)
     assert {LONG_PERIOD, RANDOM_START} <= set(search.gait.found_by)
     assert search.random_hits[search.chosen] > 0
 
 
-def test_the_short_period_gait_is_found_too_and_is_unstable():
+def test_short_period_gait_is_found_and_unstable():
     search = find_gaits(PAPER)
     short = next(gait for gait in search.gaits if SHORT_PERIOD in gait.found_by)
     assert short.period < search.gait.period
     assert not short.stable
 
 
-def test_the_same_seed_draws_the_same_starts():
+def test_same_seed_draws_the_same_starts():
     assert find_gaits(PAPER, seed=3) == find_gaits(PAPER, seed=3)
 
 
-def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
+def test_following_a_seed_costs_at_most_thirty_steps():
     walker = Search(assembled(PAPER)).walker
     step_map = over_slope(walker, SEARCH_TOLERANCES)
     counted = step_map._exact = Counted(walker, SEARCH_TOLERANCES)
@@ -171,19 +171,19 @@ def test_following_a_seed_costs_as_much_as_a_few_dozen_steps():
 
 
 @pytest.mark.parametrize("degrees", [0.0, -1.0, -40.0])
-def test_no_gait_where_the_slope_does_not_descend(degrees):
+def test_there_is_no_gait_without_descending_slope(degrees):
     search = find_gaits(on_slope(degrees))
     assert search.gait is None
     assert "standing still is no gait" in search.reason
 
 
-def test_as_printed_equations_have_no_gait_on_the_level_either():
+def test_printed_equations_have_no_gait_on_level_ground():
     search = find_gaits(on_slope(0.0, PRINTED))
     assert search.gait is None
     assert "none of 1100 random starting values" in search.reason
 
 
-def test_no_gait_where_the_ground_would_have_to_pull():
+def test_gait_that_needs_a_pulling_ground_is_excluded():
     search = find_gaits(on_slope(20.0))
     assert search.gait is None
     assert "pull" in search.reason
@@ -203,7 +203,7 @@ PAPER_WALKER, ROUND, KNEED = (load(Path(name)).config.walker for name in ("paper
     [(PULLED, 11.514, 0.44654), (PAPER_WALKER, 9.81, 1.0), (ROUND, 9.81, 0.57), (KNEED, 9.81, 2.9)],
     ids=["torso", "compass", "round-feet", "kneed"],
 )
-def test_the_impulse_of_a_strike_is_the_change_of_the_masses_momentum(walker, gravity, degrees):
+def test_strike_impulse_equals_the_momentum_change_of_the_masses(walker, gravity, degrees):
     assembly, slope = assembly_of(walker, rigid=True), np.radians(degrees)
     model = standing(assembly, gravity, slope)
     for gait in find_gaits_of_model(model).gaits:
@@ -218,7 +218,7 @@ def test_the_impulse_of_a_strike_is_the_change_of_the_masses_momentum(walker, gr
         assert any("in a strike" in one for one in gait.objections) == (gait.min_normal_impulse < 0.0)
 
 
-def test_a_gait_whose_strike_would_have_to_pull_is_not_walked():
+def test_gait_whose_strike_needs_a_pull_is_excluded():
     search = find_gaits_of_model(standing(assembly_of(PULLED, rigid=True), 11.514, np.radians(0.44654)))
     (pulled,) = (gait for gait in search.gaits if gait.objections)
     assert pulled.spectral_radius == pytest.approx(2.391, abs=1e-3)
@@ -226,7 +226,7 @@ def test_a_gait_whose_strike_would_have_to_pull_is_not_walked():
     assert search.gait is not pulled
 
 
-def test_a_gait_whose_feet_meet_on_the_ground_in_mid_swing_is_not_walked():
+def test_gait_whose_feet_meet_on_the_ground_is_excluded():
     config = load(Path("level"), ["walker.hip.spring_N_m_per_rad=20"]).config
     walker = rigid_walker(config)
     *others, symmetric = find_gaits_of_model(walker).gaits
@@ -239,7 +239,7 @@ def test_a_gait_whose_feet_meet_on_the_ground_in_mid_swing_is_not_walked():
     assert step.lengths_m[0] < 1e-6 * symmetric.step_length  # the swing foot strikes on its way back
 
 
-def test_however_unstable_a_gait_is_it_can_be_walked():
+def test_strongly_unstable_gait_can_be_simulated():
     search = find_gaits(on_slope(15.0))
     assert search.gait is not None
     assert search.gait.spectral_radius > 10.0
@@ -258,7 +258,7 @@ SIMPLEST = {
 
 @pytest.mark.parametrize("name", SIMPLEST)
 @pytest.mark.parametrize("foot_mass", [1e-7, 1e-10])
-def test_simplest_walker_has_its_published_gaits(foot_mass, name):
+def test_simplest_walker_has_the_published_gaits(foot_mass, name):
     angle, velocity, period, multiplier = SIMPLEST[name]
     walker = RigidWalker(1.0, 0.0, foot_mass, 1.0, 0.0, 1.0, 0.009, CORRECTED)
     gait = next(gait for gait in find_gaits(walker).gaits if name in gait.found_by)
@@ -269,7 +269,7 @@ def test_simplest_walker_has_its_published_gaits(foot_mass, name):
     assert gait.multipliers[0] == pytest.approx(multiplier, abs=3e-6)
 
 
-def test_none_found_is_said_with_how_it_was_sought():
+def test_missing_gait_is_reported_with_the_search_effort():
     search = find_gaits(PAPER._replace(leg_inertia=1e9))
     assert search.gait is None
     assert search.reason.startswith("none found: ")
@@ -288,13 +288,13 @@ def test_none_found_is_said_with_how_it_was_sought():
         {"leg_mass": 1e-6, "hip_mass": 1e6, "leg_inertia": 1e-9},
     ],
 )
-def test_degenerate_walkers_are_searched_without_a_mishap(changes):
+def test_degenerate_walkers_are_searched_without_errors(changes):
     for gait in find_gaits(PAPER._replace(**changes)).gaits:
         assert np.isfinite(gait.state).all()
         assert gait.residual <= 1e-11
 
 
-def test_a_slope_with_unstable_gaits_only_says_so():
+def test_slope_with_only_unstable_gaits_says_so():
     search = find_gaits(on_slope(5.0))
     assert not search.gait.stable
     assert "no gait is stable" in search.reason
@@ -322,7 +322,7 @@ def gait_with(radius, pull=0.0):
     )
 
 
-def test_the_stable_gait_is_chosen_and_one_that_cannot_be_walked_never():
+def test_stable_walkable_gait_is_chosen():
     assert choose_gait((gait_with(2.0), gait_with(0.5)))[0] == 1
     assert choose_gait((gait_with(2.0), gait_with(0.5, pull=200.0)))[0] == 0
     assert choose_gait((gait_with(0.5, pull=200.0),))[0] is None
@@ -354,7 +354,7 @@ def test_scaled_walkers_walk_alike(length, mass, gravity, degrees):
 @given(
     st.floats(0.3, 0.7), st.floats(0.5, 5.0), st.floats(0.0, 0.05), st.floats(0.1, 3.0), st.sampled_from([-1.0, 1.0])
 )
-def test_gaits_of_other_walkers_repeat_themselves(fraction, hip, inertia, degrees, sign):
+def test_gaits_of_random_walkers_are_periodic(fraction, hip, inertia, degrees, sign):
     walker = RigidWalker(1.0, fraction, 5.0, 5.0 * hip, 5.0 * inertia, 9.81, np.deg2rad(degrees), sign)
     for gait in find_gaits(walker).gaits:
         z = np.array(gait.state[1:])
@@ -364,7 +364,7 @@ def test_gaits_of_other_walkers_repeat_themselves(fraction, hip, inertia, degree
         assert np.abs(step.z[0] - z).max() < 1e-11 * np.sqrt(9.81)
 
 
-def test_newton_gives_up_where_no_step_is_taken():
+def test_newton_gives_up_if_no_step_is_taken():
     map_ = shooting(PAPER)
     found = solve(map_, PAPER, [0.17, 3.0, 3.0], 1e-12)
     assert isinstance(found, NotConverged)
@@ -372,14 +372,14 @@ def test_newton_gives_up_where_no_step_is_taken():
     assert map_.steps == 1
 
 
-def test_newton_stops_when_only_rounding_is_left():
+def test_newton_stops_at_rounding_level():
     map_ = shooting(PAPER)
     found = solve(map_, PAPER, [0.168, -0.61, -0.86], 1e-16)
     assert found.evaluated.residual < 1e-14
     assert map_.steps <= 8
 
 
-def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
+def test_gait_does_not_depend_on_earlier_searches():
     def starts_from_seeds(degrees):
         search = Search(assembled(on_slope(degrees)))
         search.follow_seeds()
@@ -391,7 +391,7 @@ def test_a_gait_is_the_same_whatever_slopes_were_asked_before():
     assert starts_from_seeds(2.0) == after_others
 
 
-def test_gaits_sought_in_threads_at_once_are_those_sought_one_after_the_other():
+def test_parallel_searches_find_the_same_gaits_as_sequential_ones():
     walkers = [on_slope(degrees) for degrees in np.linspace(0.5, 4.0, 24)]
     alone = [find_gaits(walker) for walker in walkers]
     slope_branches.cache_clear()
@@ -409,7 +409,7 @@ def led(map_, walker, starts, gaits=()):
 
 
 @pytest.mark.parametrize("walker", [PAPER, PRINTED, on_slope(4.0)])
-def test_a_start_is_followed_by_the_moves_of_newtons_method(walker):
+def test_prediction_for_a_start_follows_newton_iterations(walker):
     map_ = shooting(walker)
     gait = np.array(find_gaits(walker).gait.state)[[1, 2, 3]]
     near = gait * [[1.02, 0.96, 1.03]]
@@ -419,7 +419,7 @@ def test_a_start_is_followed_by_the_moves_of_newtons_method(walker):
     assert int(map_.memory.varied.counts[RHS]) == map_.evaluations
 
 
-def test_a_start_near_a_known_gait_is_followed_no_further():
+def test_start_near_a_known_gait_is_not_followed_further():
     map_ = shooting(PAPER)
     gaits = [np.array(gait.state)[[1, 2, 3]] for gait in find_gaits(PAPER).gaits]
     derivatives = [map_.walk(strike_section(assembled(PAPER)), gait).DP[0] for gait in gaits]
@@ -429,13 +429,13 @@ def test_a_start_near_a_known_gait_is_followed_no_further():
     np.testing.assert_array_equal(starts, before)
 
 
-def test_a_start_that_does_not_walk_or_comes_to_stand_leads_nowhere():
+def test_start_that_falls_or_stops_leads_to_no_gait():
     together = -PAPER.slope + 1e-4
     assert led(shooting(PAPER), PAPER, np.array([[0.17, 3.0, 3.0], [together, 0.0, -1e-4]])) == [NO_GAIT, NO_GAIT]
 
 
 @pytest.mark.parametrize("degrees", [0.5445378151260504, 2.7453781512605043, 7.147058823529412])
-def test_what_is_known_of_two_gaits_hides_no_third_that_a_start_leads_to(degrees):
+def test_knowing_two_gaits_does_not_hide_a_third(degrees):
     walker = assembled(on_slope(degrees))
     ignorant = Search(walker)
     ignorant.draw(np.random.default_rng(0), 100)

@@ -26,7 +26,7 @@ def flat_arc():
     return Counted(np.arctan, lambda x: 1.0 / (1.0 + x * x))
 
 
-def test_a_move_that_overshoots_is_halved_where_that_is_asked_for():
+def test_overshooting_newton_step_is_halved_on_request():
     # beyond 1.39 Newton's method on the arc tangent runs away
     damped = newton(flat_arc(), np.array([3.0]), Effort(1e-14, 60, 2.0**-8))
     assert isinstance(damped, Solution)
@@ -34,7 +34,7 @@ def test_a_move_that_overshoots_is_halved_where_that_is_asked_for():
     assert isinstance(newton(flat_arc(), np.array([3.0]), Effort(1e-14)), NotConverged)
 
 
-def test_a_move_that_leads_where_there_is_no_value_is_halved_or_told():
+def test_newton_step_without_a_value_is_halved_or_reported():
     def root():
         return Counted(lambda x: np.sqrt(x) - 0.1, lambda x: 0.5 / np.sqrt(x))
 
@@ -43,19 +43,19 @@ def test_a_move_that_leads_where_there_is_no_value_is_halved_or_told():
     assert newton(root(), np.array([1.0]), Effort(1e-12)) == NotConverged(Outcome.FELL)
 
 
-def test_it_stops_at_rounding_with_the_better_of_two_points():
+def test_newton_stops_at_rounding_with_the_better_of_two_points():
     noise = iter([1e-3, 3e-13, 2e-13, 4e-13])
     found = newton(Counted(lambda _: next(noise), lambda _: 1.0), np.array([0.0]), Effort(1e-14))
     assert found.evaluated.value[0] == 2e-13
 
 
-def test_a_singular_matrix_is_told():
+def test_singular_matrix_is_reported():
     assert newton(Counted(lambda _: 1.0, lambda _: 0.0), np.array([0.0]), Effort(1e-12)) == NotConverged(
         Outcome.WALKED, True
     )
 
 
-def test_it_evaluates_no_more_often_than_it_may():
+def test_newton_respects_its_evaluation_limit():
     runaway = flat_arc()
     newton(runaway, np.array([3.0]), Effort(1e-14, 5, 1e-3, 1e9))
     assert runaway.evaluations == 5

@@ -49,7 +49,7 @@ def solved(model, z):
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_the_gait_of_a_published_walker(name):
+def test_gait_of_a_published_walker_is_reproduced(name):
     parts, slope, gravity, (angle, stance, swing), period, multipliers = PUBLISHED[name]
     massless = stance * (1.0 - math.cos(2.0 * angle))  # the trailing foot's momentum about the hip is lost
     z, gait = solved(
@@ -66,7 +66,7 @@ def test_the_gait_of_a_published_walker(name):
         assert np.abs(eigenvalues - wanted).min() < 1e-5
 
 
-def test_the_knee_strikes_when_the_published_one_does():
+def test_knee_strikes_at_the_published_time():
     parts, slope, gravity, (angle, stance, swing), *_ = PUBLISHED["kneed"]
     model = standing(parts, gravity, slope)
     z, _ = solved(model, np.array([angle - slope, swing, stance]))
@@ -80,7 +80,7 @@ def test_the_knee_strikes_when_the_published_one_does():
 
 
 @pytest.mark.parametrize("at_strike", ["locked", "free"])
-def test_the_step_maps_derivative_is_its_slope_through_the_knee_strike(at_strike):
+def test_step_derivative_through_the_knee_strike_equals_its_slope(at_strike):
     model = standing(HSU_CHEN, 9.81, 0.0504, at_strike == "locked")
     shooting = RigidStepper(model, TIGHT)
     z = np.array([0.1881, -0.06, -1.11, -0.06])[: len(model.section_indices)]
@@ -94,21 +94,21 @@ def test_the_step_maps_derivative_is_its_slope_through_the_knee_strike(at_strike
         assert DP[:, j] == pytest.approx(slope, abs=1e-8)
 
 
-def test_a_search_finds_the_kneed_gait_without_being_told_where():
+def test_kneed_gait_is_found_without_a_guess():
     search = find_gaits(standing(HSU_CHEN, 9.81, 0.0504))
     assert search.gait is not None
     assert search.gait.state[1] + 0.0504 == pytest.approx(0.2385854603, abs=1e-8)
     assert search.gait.knee_strike == pytest.approx(0.348612, abs=1e-6)
 
 
-def test_a_search_finds_the_round_footed_gait_from_the_small_slope():
+def test_round_footed_gait_is_found_from_small_slopes():
     search = find_gaits(standing(ROUND_FEET, 9.81, 0.01))
     assert search.gait is not None
     assert search.gait.period == pytest.approx(0.450270, abs=1e-6)
     assert any("seed" in by for by in search.gait.found_by)
 
 
-def test_a_vanishing_torso_leaves_the_compass_gait_linearly():
+def test_compass_gait_is_the_linear_limit_of_a_vanishing_torso():
     compass = find_gaits(standing(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), 9.81, 0.0174)).gait
     errors = []
     for mass in (1e-2, 1e-3):

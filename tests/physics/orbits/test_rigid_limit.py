@@ -38,7 +38,7 @@ def distances(periods, ratio):
 
 @pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("ratio", [2.0, 10.0])
-def test_the_order_and_the_limit_of_a_power_law_are_found(order, ratio):
+def test_order_and_limit_of_a_power_law_are_recovered(order, ratio):
     made = distances([0.7 + 0.01 * ratio ** (-order * i) for i in range(6)], ratio)
     assert observed_orders(made) == pytest.approx(np.full(4, order), rel=1e-4)
     limit = extrapolate(made)
@@ -47,7 +47,7 @@ def test_the_order_and_the_limit_of_a_power_law_are_found(order, ratio):
     assert limit.uncertainty < 1e-9
 
 
-def test_a_series_that_does_not_converge_has_no_limit():
+def test_series_that_does_not_converge_has_no_limit():
     assert extrapolate(distances([0.7, 0.71, 0.73, 0.77], 2.0)) is None
     assert extrapolate(distances([0.7, 0.71], 2.0)) is None
 
@@ -59,12 +59,12 @@ def test_changes_below_the_numerical_error_do_not_spoil_the_limit():
 
 
 @pytest.mark.parametrize("name", [ALL_SERIES, STICTION_SERIES])
-def test_a_series_begins_at_the_configs_own_contact(name):
+def test_series_begins_at_the_contact_of_the_config(name):
     walker = contact_scene(load().config, 0.37).walker
     assert with_scaled_laws(walker, *series_settings(name)[0][2:]) == walker
 
 
-def test_full_damping_stays_where_the_static_penetration_is():
+def test_full_damping_penetration_scales_with_static_penetration():
     walker = contact_scene(load().config, 0.37).walker
     changed = with_scaled_laws(walker, *series_settings(ALL_SERIES)[4][2:])
     before, after = walker.normal, changed.normal
@@ -73,7 +73,7 @@ def test_full_damping_stays_where_the_static_penetration_is():
     assert ratio == pytest.approx(static[1] / static[0])
 
 
-def test_the_gait_of_a_walker_that_is_pushed_off_comes_to_the_rigid_one_in_first_order():
+def test_gait_with_push_off_converges_to_the_rigid_one_in_first_order():
     """As the ground stiffens and the pulse shortens; where it stays as long no gait is near."""
     config = load(Path("level"), ["contact.terrain=after-mid-swing", "walker.foot_radius_m=1e-6"]).config
     rigid = find_gaits(rigid_walker(config, config.equations)).gait
@@ -96,7 +96,7 @@ def test_the_gait_of_a_walker_that_is_pushed_off_comes_to_the_rigid_one_in_first
     )
 
 
-def test_only_the_way_to_the_limit_shortens_a_push_off_and_only_beyond_the_configs_contact():
+def test_push_off_is_shortened_only_in_the_series_to_the_rigid_limit():
     walker = contact_scene(load(Path("level")).config, 0.4).walker
     for name, shortened in ((ALL_SERIES, True), (STICTION_SERIES, False)):
         durations = [apply_setting(walker, one).whole.push_off_duration for one in series_settings(name)]

@@ -62,7 +62,7 @@ def on_compliant_ground(name, key="slope_rad", changes=()):
 # ---- the norm ------------------------------------------------------------------------------------------------------
 
 
-def test_the_simplest_walkers_norm_is_that_of_two_other_codes():
+def test_sensitivity_norm_of_the_simplest_walker_agrees_with_two_other_codes():
     """Floor drop to step period, gamma .009, l = g = 1: direct part and norm."""
     answer = sensitivity(standpoint("simplest"), "floor-drop")
     units = standpoint("simplest").units
@@ -73,7 +73,7 @@ def test_the_simplest_walkers_norm_is_that_of_two_other_codes():
 
 @pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
 @pytest.mark.parametrize("name", ["slope-3deg", "kneed", "round-feet", "torso"])
-def test_the_norm_is_the_brute_sum_over_walks(name, disturbance):
+def test_sensitivity_norm_equals_a_brute_force_sum(name, disturbance):
     """Every step of a long walk from a gait that was disturbed a little either way, summed."""
     at = standpoint(name)
     unit, steps = at.unit_of(disturbance), 60
@@ -88,7 +88,7 @@ def test_the_norm_is_the_brute_sum_over_walks(name, disturbance):
 
 @pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
 @pytest.mark.parametrize("name", ["paper", "kneed"])
-def test_the_norm_on_compliant_ground_is_the_brute_sum_over_walks(name, disturbance):
+def test_sensitivity_norm_on_compliant_ground_equals_a_brute_force_sum(name, disturbance):
     """Quotients that reach over more than the ground gives way to are 0.5 % off for a kneed walker."""
     at = on_compliant_ground(name)
     size, steps = 2e-6 * at.unit_of(disturbance), 40
@@ -100,7 +100,7 @@ def test_the_norm_on_compliant_ground_is_the_brute_sum_over_walks(name, disturba
     assert (answer.error < 1e-5 * answer.norm).all()
 
 
-def test_the_norm_by_the_lyapunov_equation_is_the_sum_and_an_unstable_gait_has_none():
+def test_lyapunov_equation_gives_the_norm_of_stable_gaits_only():
     generator = np.random.default_rng(3)
     for d in (1, 3, 5):
         A = generator.normal(size=(d, d))
@@ -113,7 +113,7 @@ def test_the_norm_by_the_lyapunov_equation_is_the_sum_and_an_unstable_gait_has_n
         assert sensitivity_norm(A / 0.9 * 1.001, B, C, D) is None
 
 
-def test_a_push_at_the_hip_keeps_the_foot_and_gives_its_impulse_along_the_hips_lever():
+def test_hip_push_keeps_the_foot_fixed_and_acts_along_the_hip_lever():
     """The moment of momentum about the foot grows by the impulse times the hip's height, and by nothing else."""
     at = standpoint("slope-3deg")
     walker = at.step_map._unit_at(at.p).walker
@@ -127,7 +127,7 @@ def test_a_push_at_the_hip_keeps_the_foot_and_gives_its_impulse_along_the_hips_l
     assert momentum(walker, pushed)[0] > momentum(walker, y)[0]
 
 
-def test_a_push_at_the_hip_comes_after_the_release_of_the_trailing_knee():
+def test_hip_push_comes_after_the_release_of_the_trailing_knee():
     """It turns the free shank, whose moment of momentum about its knee stays; the norm is that of another code."""
     at = standpoint("kneed")
     walker = at.step_map._unit_at(at.p).walker
@@ -144,19 +144,19 @@ def test_a_push_at_the_hip_comes_after_the_release_of_the_trailing_knee():
 # ---- large disturbances --------------------------------------------------------------------------------------------
 
 
-def test_the_compass_at_three_degrees_stands_the_steps_that_are_known():
+def test_compass_at_three_degrees_survives_the_known_drops():
     at = standpoint("slope-3deg", tolerances=LONG_WALKS)
     down, up = (largest_disturbance(at, "floor-drop", sign, 50) for sign in (1.0, -1.0))
     assert down == pytest.approx(14.37e-3, rel=5e-3)
     assert up == pytest.approx(5.98e-3, rel=5e-3)
 
 
-def test_the_largest_is_below_the_first_that_falls_even_where_larger_ones_are_stood():
+def test_largest_disturbance_is_below_the_first_failing_one():
     assert largest_survived(lambda size: size < 0.0123456 or size > 0.02, 1.0) == pytest.approx(0.0123456, abs=1e-6)
     assert largest_survived(lambda size: True, 2.0) == 1.0
 
 
-def test_rough_ground_takes_the_compass_as_many_steps_as_is_known():
+def test_compass_takes_the_known_number_of_steps_on_rough_ground():
     """2 mm at 3 degrees: 18.4 steps."""
     at = standpoint("slope-3deg", tolerances=LONG_WALKS)
     seen = rough_walks(np.array([steps_on_rough_ground(at, 2e-3, (0, walk), 5000) for walk in range(200)]), 5000)
@@ -164,7 +164,7 @@ def test_rough_ground_takes_the_compass_as_many_steps_as_is_known():
     assert abs(seen.mean_steps - 18.4) < 4.0 * math.hypot(seen.standard_error, 0.7)
 
 
-def test_a_foot_that_lands_just_ahead_of_the_other_ends_a_walk_on_rough_ground():
+def test_too_short_landing_ends_a_walk_on_rough_ground():
     """The level compass, 1 mm: its fourth walk comes down once more after a sixth step, by a library's integrator."""
     at = standpoint("level")
     walker, units = at.step_map._unit_at(at.p)[:2]
@@ -194,7 +194,7 @@ def rimless_wheel(deviation_deg, walks, most, seed=0):
 
 
 @pytest.mark.parametrize(("deviation", "mean"), [(2.5, 412.0), (3.0, 114.0)])
-def test_mean_steps_of_the_rimless_wheel_are_those_published_whether_walks_are_cut_off_or_not(deviation, mean):
+def test_mean_steps_of_the_rimless_wheel_are_as_published(deviation, mean):
     """Byl and Tedrake, Metastable walking machines, IJRR 28 (2009), by the recomputed map."""
     for most, method in ((20_000, "all-failed"), (round(mean), "censored")):
         seen = rough_walks(rimless_wheel(deviation, 4000, most), most)
@@ -223,12 +223,12 @@ def expected_steps(deviation_deg, cells=300):
 
 
 @pytest.mark.parametrize(("deviation", "mean"), [(1.5, 6.54e5), (2.0, 4324.0), (2.5, 412.0), (3.0, 114.0)])
-def test_the_rimless_wheels_table_is_that_of_its_transitions_second_eigenvalue(deviation, mean):
+def test_mean_steps_of_the_rimless_wheel_follow_from_the_second_eigenvalue(deviation, mean):
     """Failure is absorbing, with the eigenvalue 1; the next one says how long the wheel goes on."""
     assert expected_steps(deviation) == pytest.approx(mean, rel=0.01)
 
 
-def test_walks_that_all_go_on_bound_the_mean_from_below():
+def test_unfinished_walks_give_a_lower_bound_of_the_mean():
     seen = rough_walks(np.full(20, 100.0), 100)
     assert (seen.method, seen.mean_steps, seen.standard_error, seen.capped) == ("lower-bound", 2000.0, None, 20)
 
@@ -239,7 +239,7 @@ KEYS = {"slope-3deg": ("slope_rad", "walker.hip_mass_kg", "gravity_m_s2"), "knee
 
 
 @pytest.mark.parametrize(("name", "key"), [(name, key) for name, keys in KEYS.items() for key in keys])
-def test_gradients_are_differences_of_converged_gaits(name, key):
+def test_gradients_equal_differences_of_converged_gaits(name, key):
     at = standpoint(name, key)
     found = gradients(at, abs(at.p))
 
@@ -258,7 +258,7 @@ def test_gradients_are_differences_of_converged_gaits(name, key):
 
 
 @pytest.mark.parametrize(("name", "key"), [("paper", "walker.foot_to_mass_m"), ("kneed", "walker.hip_mass_kg")])
-def test_gradients_on_compliant_ground_are_differences_of_converged_gaits(name, key):
+def test_gradients_on_compliant_ground_equal_differences_of_converged_gaits(name, key):
     """Also by measures that put a foot of the same section coordinates in the air, or millimetres deep."""
     at = on_compliant_ground(name, key)
     wanted = ("period_s", "step_length_m", "speed_m_s", "spectral_radius")
@@ -276,12 +276,12 @@ def test_gradients_on_compliant_ground_are_differences_of_converged_gaits(name, 
         assert abs(found[one].value - expected) < bound < 1e-2 * abs(expected), one
 
 
-def test_transport_on_compliant_ground_costs_the_slope_of_a_passive_walker():
+def test_passive_cost_of_transport_on_compliant_ground_is_the_slope():
     at = on_compliant_ground("kneed")
     assert gait_quantities(at, ("cost_of_transport",))["cost_of_transport"] == pytest.approx(math.sin(at.p), rel=1e-9)
 
 
-def test_gravity_scales_times_and_nothing_else():
+def test_gravity_only_rescales_time():
     at = standpoint("slope-3deg", "gravity_m_s2")
     numbers, found = gait_quantities(at), gradients(at, at.p)
     of_itself = {one: found[one].value * at.p / numbers[one] for one in GAIT_QUANTITIES}
@@ -291,7 +291,7 @@ def test_gravity_scales_times_and_nothing_else():
     assert of_itself["gait_sensitivity_norm"] == pytest.approx(-0.5, abs=1e-6)
 
 
-def test_a_slope_is_of_fourth_order_and_one_sided_at_a_wall():
+def test_difference_quotient_is_of_fourth_order_and_one_sided_at_a_wall():
     for wall in (-np.inf, -1e-12):
         off = [
             derivative(lambda x, wall=wall: np.array([math.exp(x)]) if x > wall else None, h)[0] - 1.0
@@ -302,14 +302,14 @@ def test_a_slope_is_of_fourth_order_and_one_sided_at_a_wall():
     assert derivative(lambda x: None, 1e-2) is None
 
 
-def test_a_walk_that_ends_has_fewer_steps_and_says_how():
+def test_failed_walk_has_fewer_steps_and_an_outcome():
     at = standpoint("slope-3deg")
     walk = walk_disturbed(at, "floor-drop", 0.2, 3)
     assert walk.outcome is Outcome.FELL
     assert walk.durations_s.size < 3
 
 
-def test_a_gradient_takes_the_step_whose_error_is_small():
+def test_gradient_chooses_a_step_of_small_error():
     """Twice the usual step leaves the range over which the level compass's gait changes smoothly with its hip."""
     at = on_compliant_ground("level", "walker.hip_mass_kg", ("contact.terrain=after-mid-swing",))
     found = gradients(at, abs(at.p), ("period_s",))["period_s"]

@@ -27,14 +27,14 @@ PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
 SIMPLEST = RigidWalker(1.0, 1e-9, 1e-9, 10.0, 0.0, 1.0, 0.0, CORRECTED)
 
 
-def test_simplest_walker_has_its_published_long_period_gait():
+def test_simplest_walker_has_the_published_long_period_gait():
     # Garcia et al. 1998: stance angle 0.970956 gamma^(1/3), period 3.812092
     long, _ = seeds(SIMPLEST)
     assert long.period == pytest.approx(3.812092, abs=1e-6)
     assert (long.z[0] + long.slope) / np.cbrt(long.slope) == pytest.approx(0.970956, abs=1e-6)
 
 
-def test_simplest_walker_has_its_published_short_period():
+def test_simplest_walker_has_the_published_short_period():
     # Garcia et al. 1998: the swing leg's half period, pi
     _, short = seeds(SIMPLEST)
     assert short.period == pytest.approx(np.pi, abs=1e-6)
@@ -48,7 +48,7 @@ def test_long_period_of_massless_legs_solves_its_own_equation():
 
 @pytest.mark.parametrize("sign", [CORRECTED, AS_PRINTED])
 @pytest.mark.parametrize(("name", "power"), [(LONG_PERIOD, 1 / 3), (SHORT_PERIOD, 1.0)])
-def test_gaits_at_small_slopes_grow_as_the_theory_says(name, power, sign):
+def test_gaits_at_small_slopes_scale_as_in_theory(name, power, sign):
     walker = PAPER._replace(c21_sign=sign)
     seed = next(seed for seed in seeds(walker) if seed.name == name)
     errors = []
@@ -64,6 +64,6 @@ def test_gaits_at_small_slopes_grow_as_the_theory_says(name, power, sign):
     assert errors[1] < 0.3 * errors[0]
 
 
-def test_seed_does_not_depend_on_the_walkers_own_slope():
+def test_seed_does_not_depend_on_the_slope_of_the_walker():
     flat, steep = seeds(PAPER._replace(slope=0.0)), seeds(PAPER._replace(slope=0.3))
     assert [(seed.slope, *seed.z) for seed in flat] == [(seed.slope, *seed.z) for seed in steep]

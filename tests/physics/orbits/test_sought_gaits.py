@@ -39,7 +39,7 @@ def found():
     return find_gaits(with_torso())
 
 
-def test_an_unstable_gait_is_found_where_few_starts_walk(found):
+def test_unstable_gait_is_found_even_if_few_starts_walk(found):
     (gait,) = found.gaits
     assert not gait.stable
     assert gait.spectral_radius == pytest.approx(3.664, abs=5e-4)
@@ -50,13 +50,13 @@ def test_an_unstable_gait_is_found_where_few_starts_walk(found):
     assert gait.period == pytest.approx(1.3290071109, abs=1e-9)
 
 
-def test_more_starts_are_drawn_only_where_the_first_find_nothing():
+def test_more_starts_are_drawn_only_if_the_first_find_nothing():
     few, enough = (find_gaits(with_torso(), settings=SearchSettings(random_starts=count)) for count in (2, 100))
     assert len(few.gaits) == len(enough.gaits) == 1
     assert (few.random_starts, enough.random_starts) == (1002, 100)
 
 
-def test_newton_from_starts_all_around_and_another_integrator_come_to_the_same_gait(found):
+def test_random_starts_with_an_independent_integration_find_the_same_gait(found):
     walker, gait = by_hand(), found.gaits[0]
     z = np.array([gait.state[1], gait.state[4], gait.state[5]])
     generator = np.random.default_rng(0)
@@ -70,7 +70,7 @@ def test_newton_from_starts_all_around_and_another_integrator_come_to_the_same_g
     assert (period, knee) == pytest.approx((gait.period, gait.knee_strike), abs=1e-8)
 
 
-def test_a_point_foot_ahead_of_the_shank_takes_the_steps_of_another_integrator():
+def test_point_foot_ahead_of_the_shank_agrees_with_an_independent_integration():
     slope, ahead, torso = math.radians(2.5), 0.03, (1.0, 0.4, 0.01)
     walker = Kneed(
         type="kneed",
@@ -93,7 +93,7 @@ def test_a_point_foot_ahead_of_the_shank_takes_the_steps_of_another_integrator()
         assert gait.step_length == pytest.approx(2.0 * math.hypot(1.0, ahead) * math.sin(z[0] + slope + hand.lean))
 
 
-def test_a_knee_that_is_released_into_extension_is_not_caught_by_rounding(found):
+def test_rounding_does_not_lock_a_knee_released_into_extension(found):
     walker, _ = unit_walker(with_torso())
     starts = np.random.default_rng(1).uniform(MIN_START[:3], MAX_START[:3], (2000, 3))
     starts[:, 0] = 0.5 * starts[:, 0] - walker.slope

@@ -69,7 +69,7 @@ def beside_the_gait(walker, offset):
 
 @pytest.mark.parametrize("offset", OFF_THE_GAIT)
 @pytest.mark.parametrize("name", WALKERS)
-def test_rigid_step_maps_derivative_is_its_slope(name, offset):
+def test_rigid_step_derivative_equals_its_slope(name, offset):
     """Through the swing by the variational equations, through the heel strike by the saltation."""
     walker = WALKERS[name]
     step_map, z = unit_map(walker), beside_the_gait(walker, offset)
@@ -118,7 +118,7 @@ def stepped(scene, z, tolerance):
 
 
 @pytest.mark.parametrize("z", [NEAR_THE_GAIT, NEAR_THE_GAIT + ASIDE], ids=["at the gait", "off it"])
-def test_contact_step_maps_derivative_is_its_slope(scene, z):
+def test_contact_step_derivative_equals_its_slope(scene, z):
     """Through touches, releases and every other switching point of the force law, where the Jacobian jumps."""
     slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, z, STEPS)
     np.testing.assert_allclose(stepped(scene, z, 1e-12).DP, slope, rtol=0.0, atol=AGREEMENT)

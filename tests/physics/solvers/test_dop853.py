@@ -47,7 +47,7 @@ def defects(weights, order):
     return rooted_trees.defects(A, weights, order)
 
 
-def test_there_are_as_many_trees_as_cayley_counted():
+def test_number_of_trees_agrees_with_cayley():
     assert [len(rooted_trees.trees(order)) for order in range(1, 9)] == [1, 1, 2, 4, 9, 20, 48, 115]
 
 
@@ -58,17 +58,17 @@ def test_stages_are_consistent():
 
 
 @pytest.mark.parametrize("order", range(1, 9))
-def test_solution_fulfils_every_condition_up_to_order_8(order):
+def test_solution_meets_every_order_condition_up_to_8(order):
     # coefficients have 30 digits on paper and 16 here, products grow to some tens
     assert defects(B, order) == pytest.approx([0.0] * len(rooted_trees.trees(order)), abs=1e-14)
 
 
-def test_solution_is_not_of_order_9():
+def test_solution_fails_an_order_condition_of_order_9():
     assert max(map(abs, defects(B, 9))) > 1e-9
 
 
 @pytest.mark.parametrize(("error", "order"), [(tableau.ERROR_5, 5), (tableau.ERROR_3, 3)])
-def test_error_weights_compare_with_solutions_of_order_5_and_3(error, order):
+def test_error_weights_belong_to_solutions_of_order_5_and_3(error, order):
     embedded = B - np.array(error)
     for lower in range(1, order + 1):
         assert defects(embedded, lower) == pytest.approx([0.0] * len(rooted_trees.trees(lower)), abs=1e-14)
@@ -164,7 +164,7 @@ def test_dense_output_is_of_order_7():
 
 
 @pytest.mark.parametrize("fraction", [0.0, 1.0])
-def test_dense_output_meets_the_ends_of_the_step(fraction):
+def test_dense_output_interpolates_the_ends_of_the_step(fraction):
     end, sample = fixed_steps(6, fraction)
     expected = end if fraction == 1.0 else fixed_steps_until(5, 6)
     assert sample == pytest.approx(expected, abs=1e-15)
@@ -199,7 +199,7 @@ def test_tighter_tolerance_gives_smaller_error():
 
 
 @pytest.mark.parametrize("rtol", [1e-8, 1e-11])
-def test_scipys_dop853_needs_as_many_right_hand_sides_for_as_small_an_error(rtol):
+def test_scipy_dop853_needs_the_same_work_for_the_same_error(rtol):
     _, end, counts = orbit(rtol)
 
     def rate(t, y):
@@ -213,7 +213,7 @@ def test_scipys_dop853_needs_as_many_right_hand_sides_for_as_small_an_error(rtol
     assert ours < 10.0 * theirs
 
 
-def test_right_hand_sides_are_all_counted():
+def test_every_right_hand_side_is_counted():
     _, _, counts = orbit(1e-9)
     # two to begin with, twelve for each step tried, three for the last step's dense output
     assert counts[RHS] == 2 + 12 * (counts[ACCEPTED] + counts[REJECTED]) + 3
@@ -225,7 +225,7 @@ def test_budget_ends_the_integration():
     assert counts[BUDGET] <= counts[RHS] < 500 + 20
 
 
-def test_a_solution_that_ends_before_the_time_does_stops_with_the_smallest_step():
+def test_solution_with_a_singularity_stops_at_the_smallest_step():
     # two bodies that meet: the satellite starts in the moon's centre
     method = new_dop853(4, 1e-10, 1e-10, 10**6)
     inside_the_moon = (1.0 - ARENSTORF.moon, 0.0, 0.0, 0.0)
@@ -246,7 +246,7 @@ def there_and_back(method, system, y, h, middle, back):
     advance(method, system, 0.5 * h)
 
 
-def test_a_step_can_be_taken_back_and_taken_again_to_an_event():
+def test_step_can_be_repeated_up_to_an_event():
     method, middle, back = new_dop853(2, 1e-12, 1e-12, 10**6), np.zeros(2), np.zeros(2)
     there_and_back(method, Pair(), np.ones(2), 0.05, middle, back)
     assert tuple(back) == (1.0, 1.0)
@@ -270,7 +270,7 @@ def twice_derivative(system, t, y, f):
         f[at], f[at + 1] = y[at] * math.cos(t), -t * y[at + 1]
 
 
-def test_a_state_of_several_blocks_is_integrated_as_a_whole():
+def test_state_of_several_blocks_is_integrated_as_a_whole():
     method = new_dop853(6, 1e-12, 1e-12, 10**6)
     assert integrate(method, Twice(), np.ones(6), 1.5, 0.0, 1.0, np.zeros(6)) == STEP_DONE
     assert method.y.reshape(3, 2) == pytest.approx(np.tile(pair_solution(1.5), (3, 1)), abs=1e-10)

@@ -34,11 +34,11 @@ def with_roots(*roots, sign=1.0):
     return sign * Polynomial.fromroots(roots)
 
 
-def test_a_single_crossing_is_found():
+def test_single_crossing_is_found():
     assert crossing(with_roots(0.3)) == pytest.approx(0.3, abs=1e-14)
 
 
-def test_a_double_crossing_inside_one_step_is_found():
+def test_double_crossing_inside_one_step_is_found():
     event = with_roots(0.4, 0.41)
     assert event(0.0) > 0.0
     assert event(1.0) > 0.0
@@ -46,7 +46,7 @@ def test_a_double_crossing_inside_one_step_is_found():
     assert crossing(event, RISING) == pytest.approx(0.41, abs=1e-12)
 
 
-def test_a_triple_crossing_inside_one_step_is_found_one_after_another():
+def test_triple_crossing_inside_one_step_is_found_in_order():
     event = with_roots(0.2, 0.5, 0.50001)
     first = crossing(event)
     second = crossing(event, after=first + 1e-9)
@@ -55,59 +55,59 @@ def test_a_triple_crossing_inside_one_step_is_found_one_after_another():
     assert crossing(event, after=third + 1e-9) == NO_CROSSING
 
 
-def test_direction_chooses_among_crossings():
+def test_direction_selects_crossings():
     event = with_roots(0.2, 0.6, sign=-1.0)
     assert crossing(event, RISING) == pytest.approx(0.2, abs=1e-13)
     assert crossing(event, FALLING) == pytest.approx(0.6, abs=1e-13)
     assert crossing(with_roots(0.5), FALLING) == NO_CROSSING
 
 
-def test_a_signal_that_touches_zero_and_turns_back_does_not_cross():
+def test_touching_zero_without_sign_change_is_not_a_crossing():
     touching = with_roots(0.3, 0.3) * Polynomial([1.0, 0.5])
     assert crossing(touching + 1e-12) == NO_CROSSING
     assert crossing(-touching - 1e-12) == NO_CROSSING
 
 
-def test_a_zero_at_the_start_is_not_found_again():
+def test_zero_at_the_start_is_not_found_again():
     # what the event before left behind: zero but for rounding, of either sign
     for rounding in (0.0, 1e-17, -1e-17):
         event = with_roots(0.0, 1.5) + rounding
         assert crossing(event, zero_at_start=True) == NO_CROSSING
 
 
-def test_a_zero_at_the_start_does_not_hide_a_crossing_right_behind_it():
+def test_zero_at_the_start_does_not_hide_a_crossing_right_after_it():
     for behind in (0.5, 1e-3, 1e-7):
         assert crossing(with_roots(0.0, behind), zero_at_start=True) == pytest.approx(behind, rel=1e-6)
 
 
-def test_a_crossing_in_the_first_instant_is_found():
+def test_crossing_right_after_the_start_is_found():
     assert crossing(with_roots(1e-9)) == pytest.approx(1e-9, abs=1e-15)
 
 
-def test_a_crossing_at_the_end_belongs_to_one_step_only():
+def test_crossing_at_the_end_belongs_to_one_step_only():
     # the value at the step's end is the next step's first value: a sign change lies in one of the two
     before, after = with_roots(1.0 - 1e-13), with_roots(-1e-13)
     found = [crossing(before) <= 1.0, crossing(after) <= 1.0]
     assert found == [True, False]
 
 
-def test_each_of_several_signals_is_looked_at_by_itself():
+def test_event_functions_are_searched_independently():
     finder = finder_on(with_roots(0.7), with_roots(0.2), with_roots(1.2))
     found = [first_crossing(finder, row, EITHER, 0.0, False) for row in range(3)]
     assert found == pytest.approx([0.7, 0.2, NO_CROSSING], abs=1e-13)
 
 
-def test_a_signal_far_from_zero_crosses_nowhere():
+def test_event_function_far_from_zero_has_no_crossing():
     assert crossing(Polynomial([5.0, 0.1, -0.2])) == NO_CROSSING
     assert crossing(Polynomial([-5.0])) == NO_CROSSING
 
 
-def test_a_signal_that_is_zero_throughout_does_not_cross():
+def test_event_function_that_is_always_zero_has_no_crossing():
     assert crossing(Polynomial([0.0])) == NO_CROSSING
 
 
 @pytest.mark.parametrize("degree", [3, 5, 7])
-def test_finders_of_other_degrees_find_the_same(degree):
+def test_root_finders_of_other_degrees_agree(degree):
     finder = finder_on(with_roots(0.25, 0.5, 0.75), degree=degree)
     assert first_crossing(finder, 0, RISING, 0.3, False) == pytest.approx(0.75, abs=1e-12)
 
@@ -131,11 +131,11 @@ def test_every_crossing_is_found_in_order(thousandths, sign, direction):
 
 
 @pytest.mark.parametrize("left", [0.0, 1e-13, -1e-13])
-def test_the_way_from_zero_is_that_of_the_slope_whatever_an_event_left_there(left):
+def test_direction_from_zero_follows_the_slope_despite_an_event_residual(left):
     falls_then_rises = left + Polynomial([0.0, -1e-6, 1e-2])
     assert way_from_zero(finder_on(falls_then_rises), 0, 1e-12) == pytest.approx(-1e-6, rel=1e-5)
     assert way_from_zero(finder_on(left + Polynomial([0.0, 0.0, 1e-2])), 0, 1e-12) > 0.0
 
 
-def test_rounding_is_no_way_from_zero():
+def test_rounding_gives_no_direction_from_zero():
     assert way_from_zero(finder_on(Polynomial([0.0, 1e-16, -2e-16])), 0, 1e-12) == 0.0

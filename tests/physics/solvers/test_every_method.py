@@ -197,7 +197,7 @@ every_method = pytest.mark.parametrize("name", METHODS)
 
 
 @every_method
-def test_arenstorfs_orbit_closes(name):
+def test_arenstorf_orbit_closes_with_every_method(name):
     """Along the orbit changes of the place grow about 10^4 times, those of the velocity 10^6 times."""
     if name.startswith("cvode"):
         method = method_named(name).new(4, 1e-9, 1e-11, PLENTY)
@@ -226,7 +226,7 @@ def test_error_falls_with_the_tolerance(name, early):
 
 
 @every_method
-def test_observed_order(name):
+def test_observed_order_is_the_stated_one(name):
     """On a circle, where steps are equally long, the error falls with the steps to the power of minus the order.
 
     The fit runs from where the error per step is no more than a thousandth to where rounding and the tolerances of
@@ -242,14 +242,14 @@ def test_observed_order(name):
 
 
 @every_method
-def test_work_is_counted_and_rises_with_accuracy(name):
+def test_counted_work_rises_with_accuracy(name):
     loose, tight = (driven(name, rtol, 0.1 * PERIOD)[0].counts for rtol in (1e-4, 1e-8))
     assert 0 < loose[ACCEPTED] < tight[ACCEPTED]
     assert 0 < loose[RHS] < tight[RHS]
 
 
 @every_method
-def test_a_budget_ends_the_run(name):
+def test_budget_ends_the_run(name):
     method, status = driven(name, 1e-8, PERIOD, budget=100)
     assert status == OUT_OF_BUDGET
     assert method.counts[RHS] <= 130  # a step that has begun may be finished
@@ -272,7 +272,7 @@ def test_dense_output_agrees_with_a_run_that_ends_there(name):
 
 
 @every_method
-def test_a_step_taken_back_is_taken_again_up_to_an_event(name):
+def test_step_can_be_repeated_up_to_an_event(name):
     rtol = 1e-8
     method, _ = driven(name, rtol, 0.05 * PERIOD)
     event = 0.25 * method.clock[T_OLD] + 0.75 * method.clock[T]
@@ -283,7 +283,7 @@ def test_a_step_taken_back_is_taken_again_up_to_an_event(name):
 
 
 @every_method
-def test_steps_that_a_deadline_cuts_short_leave_no_gap_and_do_not_overlap(name):
+def test_steps_shortened_by_a_deadline_are_contiguous(name):
     """Deadlines every few thousandths of the orbit, and each third step taken back halfway, as events do."""
     rtol, t_end = 1e-8, 0.1 * PERIOD
     method = method_named(name).new(4, rtol, 1e-2 * rtol, PLENTY)
@@ -307,7 +307,7 @@ def test_steps_that_a_deadline_cuts_short_leave_no_gap_and_do_not_overlap(name):
 
 
 @every_method
-def test_the_same_run_gives_the_same_bits(name):
+def test_repeated_run_is_bitwise_equal(name):
     first, second = (driven(name, 1e-7, 0.1 * PERIOD)[0] for _ in range(2))
     assert first.y.tobytes() == second.y.tobytes()
     assert first.counts.tolist() == second.counts.tolist()

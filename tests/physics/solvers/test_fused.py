@@ -18,16 +18,16 @@ def compiled(a, b, c):
 
 
 @given(numbers, numbers, numbers)
-def test_compiled_code_rounds_once(a, b, c):
+def test_compiled_fma_rounds_once(a, b, c):
     exact = Fraction(a) * Fraction(b) + Fraction(c)
     assert compiled(a, b, c) == float(exact)
 
 
 @given(numbers, numbers, numbers)
-def test_python_computes_the_same_to_its_roundings(a, b, c):
+def test_python_fallback_agrees_to_rounding(a, b, c):
     assert abs(fused(a, b, c) - compiled(a, b, c)) <= 2.0 * np.finfo(float).eps * (abs(a * b) + abs(c)) + 1e-300
 
 
-def test_what_a_product_alone_would_round_away_is_kept():
+def test_fma_keeps_the_rounding_error_of_a_product():
     x = 1.0 + 2.0**-30
     assert compiled(x, x, -(x * x)) == 2.0**-60

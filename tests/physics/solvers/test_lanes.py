@@ -78,13 +78,13 @@ print((theirs() - before)["<built-in function add>"])
 """
 
 
-def test_an_import_alone_registers_no_operators_for_all_that_a_process_compiles():
+def test_importing_lanes_registers_no_global_operators():
     done = subprocess.run([sys.executable, "-c", IMPORT_ALL], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 0  # of those that are looked at
 
 
-def test_arithmetic_is_that_of_floats():
+def test_lane_arithmetic_equals_float_arithmetic():
     a, b = x = np.random.default_rng(0).normal(size=(2, WIDTH))
     out = np.zeros((5, WIDTH))
     assert arithmetic(x, out) == (False, True)
@@ -98,7 +98,7 @@ def test_arithmetic_is_that_of_floats():
     np.testing.assert_allclose(out, expected, rtol=1e-15, atol=1e-15)
 
 
-def test_what_is_not_a_number_is_not_chosen():
+def test_nan_is_not_selected():
     x = np.full((2, WIDTH), np.nan)
     out = np.zeros((5, WIDTH))
     assert arithmetic(x, out) == (False, False)
@@ -106,7 +106,7 @@ def test_what_is_not_a_number_is_not_chosen():
 
 
 @pytest.mark.parametrize("largest", [0.5, 1.57, 4.0, 1000.0])
-def test_sines_and_cosines_hold_sixteen_digits(largest):
+def test_sines_and_cosines_have_sixteen_digits(largest):
     out = np.zeros((2, WIDTH))
     generator = np.random.default_rng(1)
     for _ in range(50):
@@ -115,14 +115,14 @@ def test_sines_and_cosines_hold_sixteen_digits(largest):
         np.testing.assert_allclose(out, [np.sin(x[0]), np.cos(x[0])], rtol=0, atol=4e-16)
 
 
-def test_a_lane_does_not_feel_its_neighbours():
+def test_lanes_do_not_influence_each_other():
     alone, beside = np.zeros((2, WIDTH)), np.zeros((2, WIDTH))
     sines(np.full((1, WIDTH), 0.3), alone)
     sines(np.array([[0.3, *np.linspace(-9.0, 9.0, WIDTH - 1)]]), beside)
     assert (alone[:, 0] == beside[:, 0]).all()
 
 
-def test_equations_of_motion_are_those_of_a_walker_alone():
+def test_equations_of_motion_in_a_lane_equal_those_of_one_walker():
     y = np.random.default_rng(2).uniform(-2.0, 2.0, (4, WIDTH))
     out = np.zeros((4, WIDTH))
     rates(WALKER, y, out)
@@ -136,7 +136,7 @@ def test_equations_of_motion_are_those_of_a_walker_alone():
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3])
-def test_two_legs_written_out_move_as_the_bodies_of_the_rigid_model(radius):
+def test_explicit_two_leg_equations_equal_the_rigid_model(radius):
     model = MODEL.changed(radius=radius)
     y = np.random.default_rng(3).uniform(-2.0, 2.0, (4, WIDTH))
     out, expected = np.zeros((4, WIDTH)), np.zeros((4, WIDTH))

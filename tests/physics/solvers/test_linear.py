@@ -40,7 +40,7 @@ def check(A, b):
 
 
 @given(systems())
-def test_solution_fulfils_its_equations(system):
+def test_solution_satisfies_its_equations(system):
     A, b = system
     assume(np.linalg.matrix_rank(A) == b.size)
     assume(np.linalg.cond(A) < 1e12)
@@ -49,7 +49,7 @@ def test_solution_fulfils_its_equations(system):
     assert np.abs(x - expected).max() <= 1e-13 * np.linalg.cond(A) * (np.abs(expected).max() + 1e-300)
 
 
-def test_rows_are_exchanged_where_a_pivot_is_zero_or_tiny():
+def test_rows_are_exchanged_at_a_zero_or_tiny_pivot():
     """Without exchanges the first divides by zero and the second loses every digit."""
     for A in (np.array([[0.0, 1.0], [1.0, 1.0]]), np.array([[1e-20, 1.0], [1.0, 1.0]])):
         b = np.array([1.0, 2.0])
@@ -57,7 +57,7 @@ def test_rows_are_exchanged_where_a_pivot_is_zero_or_tiny():
         np.testing.assert_allclose(b, [1.0, 1.0], rtol=1e-15)
 
 
-def test_badly_scaled_rows_of_a_stiff_step_are_solved():
+def test_badly_scaled_system_of_a_stiff_step_is_solved():
     """gamma/h I - J as Radau meets it: one over a tiny step beside a contact stiffness."""
     A = np.diag([3.6e9] * 4) - np.array(
         [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, -1e2, -3.0, 0.0], [0.0, -1e8, 0.0, -4e4]]
@@ -66,7 +66,7 @@ def test_badly_scaled_rows_of_a_stiff_step_are_solved():
 
 
 @pytest.mark.parametrize("n", [1, 3])
-def test_a_singular_matrix_is_told(n):
+def test_singular_matrix_is_reported(n):
     A = np.ones((n, n)) if n > 1 else np.zeros((1, 1))
     assert not factor(A.copy(), np.zeros(n, np.int64), n)
     assert not factor(A.astype(complex), np.zeros(n, np.int64), n)

@@ -102,7 +102,7 @@ def test_no_undamped_oscillation_grows(omega):
 
 
 @pytest.mark.parametrize("z", [-1e4, -1e6, -1e9])
-def test_infinitely_stiff_parts_die_within_one_step(z):
+def test_infinitely_stiff_parts_vanish_within_one_step(z):
     """L-stable: R falls like 3 / |z|."""
     assert abs(one_step(complex(z))) == pytest.approx(3.0 / abs(z), rel=1e-2)
 
@@ -142,11 +142,11 @@ def curve_errors(pull):
     return [np.abs(fixed_steps(system, (0.0, 1.0), 1.5, h, 1.0).y - exact).max() for h in lengths]
 
 
-def test_order_five_on_a_curve_that_is_followed_softly():
+def test_mild_attraction_to_a_curve_gives_order_five():
     assert orders(curve_errors(-1.0)) == pytest.approx(5.0, abs=0.3)
 
 
-def test_a_curve_that_is_followed_stiffly_is_met_to_rounding():
+def test_stiff_attraction_to_a_curve_is_exact_to_rounding():
     """Stiffly accurate: the error falls with the stiffness, from the longest step on."""
     assert max(curve_errors(-1e12)) < 1e-13
 
@@ -205,7 +205,7 @@ def test_hires_ends_as_published(tol):
 # ---- a peer, and the work ------------------------------------------------------------------------------------------
 
 
-def test_scipys_radau_agrees_and_does_not_need_much_less():
+def test_scipy_radau_agrees_and_needs_similar_work():
     tol = 1e-8
 
     def fun(t, y):
@@ -232,7 +232,7 @@ def test_errors_fall_with_the_tolerance():
     assert errors[-1] < 1e-9
 
 
-def test_the_jacobian_is_the_systems_own():
+def test_analytic_jacobian_of_the_system_is_used():
     """None is differenced: told nothing, the method cannot take large steps."""
     told, untold = (Planar(LINEAR, -1e5, 0.0, part) for part in (1.0, 0.0))
     knowing = integrated(told, (1.0, 0.5), 1.0, 1e-6, 1e-6)
@@ -253,7 +253,7 @@ def test_work_is_counted():
 # ---- how it ends ---------------------------------------------------------------------------------------------------
 
 
-def test_a_budget_is_kept():
+def test_budget_is_respected():
     method = new_radau5(2, 1e-8, 1e-8, 500)
     assert drive(method, STIFF, 0.0, np.array([2.0, 0.0]), 0.0, 2.0) == OUT_OF_BUDGET
     assert 500 <= method.counts[RHS] < 500 + 3 * 7 + 3
@@ -268,12 +268,12 @@ def test_steps_that_shrink_to_rounding_end_the_run():
     assert np.all(np.isfinite(method.y))
 
 
-def test_a_state_that_is_not_finite_ends_the_run():
+def test_nonfinite_state_ends_the_run():
     method = new_radau5(2, 1e-8, 1e-8, 10**5)
     assert drive(method, SMOOTH, 0.0, np.array([math.nan, 0.0]), 0.0, 1.0) in (STEP_TOO_SMALL, OUT_OF_BUDGET)
 
 
-def test_a_step_taken_back_can_be_taken_up_to_an_event():
+def test_step_can_be_repeated_up_to_an_event():
     method = integrated(SMOOTH, (2.0, 0.0), 1.0, 1e-8, 1e-8)
     assert go_on(method, SMOOTH, 5.0) == STEP_DONE
     t_old, t_new, before = float(method.clock[T_OLD]), float(method.clock[T]), method.y_old.copy()
@@ -291,7 +291,7 @@ def test_a_step_taken_back_can_be_taken_up_to_an_event():
     assert method.clock[H_NEXT] > 0.0
 
 
-def test_the_same_run_gives_the_same_bits():
+def test_repeated_run_is_bitwise_equal():
     one, other = (integrated(STIFF, (2.0, 0.0), 2.0, 1e-7, 1e-7) for _ in range(2))
     np.testing.assert_array_equal(one.y, other.y)
     np.testing.assert_array_equal(one.counts, other.counts)

@@ -15,28 +15,28 @@ from walkerlab.physics.solvers.registry import CVODE_METHODS, METHODS, method_na
 OF_CVODE = {method.name for method in CVODE_METHODS}
 
 
-def test_a_config_may_name_every_method_and_no_other():
+def test_config_accepts_exactly_the_registered_methods():
     assert set(NAMES) == {*METHODS, *OF_CVODE}
 
 
-def test_cvode_is_there_if_its_package_is():
+def test_cvode_is_available_if_its_package_is():
     assert cvode.SUNDIALS_PACKAGE == CVODE_PACKAGE
     there = importlib.util.find_spec(cvode.SUNDIALS_PACKAGE) is not None
     assert set(METHODS) >= OF_CVODE if there else not set(METHODS) & OF_CVODE
 
 
-def test_an_unknown_method_is_an_error_that_names_the_known():
+def test_unknown_method_is_an_error_that_lists_the_known_ones():
     with pytest.raises(KeyError, match="dop853, radau5"):
         method_named("euler")
 
 
-def test_a_method_that_is_not_installed_says_what_to_install(monkeypatch):
+def test_method_that_is_not_installed_says_what_to_install(monkeypatch):
     monkeypatch.setattr(registry_module, "METHODS", {})
     with pytest.raises(KeyError, match="pip install scikit-sundae"):
         method_named("cvode-bdf")
 
 
-def test_libraries_are_loaded_only_where_they_are_used():
+def test_libraries_are_imported_only_when_used():
     loaded = "print('scipy.integrate' in sys.modules, 'sksundae' in sys.modules)"
     look = f"import sys, walkerlab.physics.solvers.registry; {loaded}"
     found = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)

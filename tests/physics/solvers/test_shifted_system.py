@@ -32,7 +32,7 @@ def solved(J, left, s, r):
 
 
 @given(motions(), shifts, st.data())
-def test_equations_of_motion_are_solved_in_half_their_size(J, s, data):
+def test_equations_of_motion_are_solved_at_half_their_size(J, s, data):
     n = J.shape[0]
     matrix = s * np.eye(n) - J
     assume(np.linalg.cond(matrix) < 1e8)
@@ -50,11 +50,11 @@ def test_equations_of_motion_are_solved_in_half_their_size(J, s, data):
     [np.zeros((3, 3)), np.array([[0.0, 2.0], [1.0, 0.0]]), np.array([[1e-9, 1.0], [1.0, 0.0]]), np.ones((1, 1))],
     ids=["odd", "scaled velocity", "not quite", "one equation"],
 )
-def test_other_systems_keep_their_size(J):
+def test_general_systems_are_solved_at_full_size(J):
     assert unknowns(J) == J.shape[0]
 
 
-def test_a_stiff_contact_step_is_solved_to_rounding():
+def test_stiff_contact_step_is_solved_to_rounding():
     """A foot on 1e9 N/m with 1e5 N s/m, and a step of a microsecond."""
     J = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [-40.0, 3.0, -0.1, 0.0], [2.0, -5e7, 0.0, -5e3]])
     x = np.array([0.1, 1e-6, -2.0, 1e-2])
@@ -64,7 +64,7 @@ def test_a_stiff_contact_step_is_solved_to_rounding():
 
 @pytest.mark.parametrize("damping", [1.0, 1e6, 1e12])
 @pytest.mark.parametrize("shift", [1.0, 1e3, 1e9])
-def test_velocities_keep_their_digits_where_damping_is_stiff(damping, shift):
+def test_velocities_keep_their_digits_under_stiff_damping(damping, shift):
     """They are then far smaller than shift times position, of which no difference may be taken."""
     J, r = np.array([[0.0, 1.0], [-1e6, -damping]]), np.array([1.0, 1.0])
     s, k, c = Fraction(shift), Fraction(10**6), Fraction(damping)
@@ -74,6 +74,6 @@ def test_velocities_keep_their_digits_where_damping_is_stiff(damping, shift):
     np.testing.assert_array_less(np.abs(solved(J, 1, shift, r) - exact), 1e-14 * np.abs(exact) + [1e-15 / shift, 0.0])
 
 
-def test_a_singular_matrix_is_told():
+def test_singular_matrix_is_reported():
     J = np.array([[0.0, 1.0], [4.0, 0.0]])
     assert not factor_shifted(J, 1, 2.0, np.zeros((2, 2)), np.zeros(2, np.int64))

@@ -57,7 +57,7 @@ def test_there_are_stiff_methods_of_more_than_one_library():
 
 @each_problem
 @each_method
-def test_it_ends_as_published_in_few_steps(name, problem):
+def test_stiff_method_ends_as_published_in_few_steps(name, problem):
     """A step's error is at most the tolerance and dies on the way; multistep methods add up a few dozen of them.
 
     An explicit method is bound to steps of about 2 / |eigenvalue|: a million for van der Pol's.
@@ -70,7 +70,7 @@ def test_it_ends_as_published_in_few_steps(name, problem):
 
 @each_problem
 @each_method
-def test_its_error_falls_with_the_tolerance(name, problem):
+def test_error_of_a_stiff_method_falls_with_the_tolerance(name, problem):
     """By half of the digits that the tolerance falls by at the least."""
     loose, tight = (error_of(name, problem, tolerance)[0] for tolerance in (1e-5, 1e-9))
     assert tight < 1e-2 * loose

@@ -49,13 +49,13 @@ TABLEAUS = {
 every_tableau = pytest.mark.parametrize("name", TABLEAUS)
 
 
-def test_every_method_of_one_order_has_its_tableau_here():
+def test_every_one_step_method_has_its_tableau_checked():
     """The others are multistep methods, which vary their order."""
     assert set(TABLEAUS) == {name for name, method in METHODS.items() if method.orders[0] == method.orders[1]}
 
 
 @every_tableau
-def test_stages_lie_where_their_weights_say(name):
+def test_stage_times_equal_the_row_sums(name):
     A, _, c = TABLEAUS[name]()
     assert A.sum(axis=1) == pytest.approx(c, abs=1e-14)
 
@@ -69,6 +69,6 @@ def test_every_condition_of_the_order_is_met(name):
 
 
 @every_tableau
-def test_some_condition_of_the_next_order_is_not(name):
+def test_method_fails_an_order_condition_of_the_next_order(name):
     A, b, _ = TABLEAUS[name]()
     assert max(map(abs, defects(A, b, METHODS[name].orders[1] + 1))) > 1e-9

@@ -59,7 +59,7 @@ def in_bits(monkeypatch):
     monkeypatch.setattr(RigidQuestion.__init__, "__defaults__", (50, 20, 0, (RTOL, ATOL)))
 
 
-def test_the_summary_counts_what_the_grid_shows(whole):
+def test_summary_counts_agree_with_the_grid(whole):
     cells, summary = whole.groups["basin"], whole.summary
     assert summary["plane"] == ["theta_2", "dtheta_2"]
     assert summary["cells"] == [16, 12]
@@ -78,7 +78,7 @@ def test_the_summary_counts_what_the_grid_shows(whole):
     assert ended == {name: many for name, many in summary["outcomes"].items() if name != "walked"}
 
 
-def test_cells_at_edges_are_shares_of_their_parts(whole):
+def test_edge_cells_store_the_share_of_walking_parts(whole):
     cells = whole.groups["basin"]
     walks = cells["outcome"] == Outcome.WALKED
     between = (cells["walking"] > 0.0) & (cells["walking"] < 1.0)
@@ -87,7 +87,7 @@ def test_cells_at_edges_are_shares_of_their_parts(whole):
     assert (cells["walking"][between] * 9).round(9).tolist() == (cells["walking"][between] * 9).round().tolist()
 
 
-def test_the_share_of_a_finer_grid_is_that_of_the_parts(tmp_path, whole):
+def test_walking_share_equals_that_of_a_finer_grid(tmp_path, whole):
     finer = run(tmp_path, *SMALL[1:3], "basin.cells=[48,36]", "basin.refine=1")
     shares = whole.groups["basin"]["walking"].ravel()
     between = (shares > 0.0) & (shares < 1.0)
@@ -95,7 +95,7 @@ def test_the_share_of_a_finer_grid_is_that_of_the_parts(tmp_path, whole):
     np.testing.assert_allclose(shares[between], blocks[between], atol=1e-12)
 
 
-def test_a_normal_distribution_in_the_middle_weighs_a_gait_there_more(whole):
+def test_normal_weights_favour_a_gait_in_the_middle(whole):
     window = basin.window_of(load(None, SMALL).config, GAIT["state"][1:])
     weights = basin.gaussian(window)
     assert weights.sum() == pytest.approx(1.0)
@@ -104,7 +104,7 @@ def test_a_normal_distribution_in_the_middle_weighs_a_gait_there_more(whole):
 
 
 @pytest.mark.usefixtures("in_bits")
-def test_a_run_that_was_cut_off_goes_on_and_comes_to_the_same(tmp_path, whole):
+def test_interrupted_run_resumes_with_the_same_result(tmp_path, whole):
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, progress=CutOff(3))
     kept = (tmp_path / "basin.parts").read_bytes().count(b"\n")
@@ -115,11 +115,11 @@ def test_a_run_that_was_cut_off_goes_on_and_comes_to_the_same(tmp_path, whole):
 
 
 @pytest.mark.usefixtures("in_bits")
-def test_two_processes_come_to_the_same_as_one(tmp_path, whole):
+def test_one_and_two_processes_give_the_same_result(tmp_path, whole):
     assert run(tmp_path, jobs=2).digest() == whole.digest()
 
 
-def test_a_grid_over_all_three_coordinates_holds_nothing(tmp_path):
+def test_grid_over_all_three_coordinates_fixes_none(tmp_path):
     found = run(
         tmp_path,
         "basin.plane=[theta_2,dtheta_1,dtheta_2]",
@@ -133,7 +133,7 @@ def test_a_grid_over_all_three_coordinates_holds_nothing(tmp_path):
     assert found.summary["outcomes"]["walked"] > 0
 
 
-def test_the_contact_model_settles_on_its_own_gait(tmp_path):
+def test_contact_walks_settle_on_the_contact_gait(tmp_path):
     found = run(
         tmp_path,
         "basin.model=contact",
@@ -149,12 +149,12 @@ def test_the_contact_model_settles_on_its_own_gait(tmp_path):
     assert (cells["outcome"][settled] == Outcome.WALKED).all()
 
 
-def test_contact_needs_a_contact_block(tmp_path):
+def test_contact_model_needs_a_contact_block(tmp_path):
     with pytest.raises(ConfigError, match="contact block"):
         run(tmp_path, "contact=null", "basin.model=contact")
 
 
-def test_walkers_with_more_coordinates_are_refused(tmp_path):
+def test_walkers_with_more_coordinates_are_rejected(tmp_path):
     free = load(Path("kneed"), ["walker.knee.at_heel_strike=free"]).config
     inputs = {"fixedpoint": Content({}, GAIT)}
     with pytest.raises(ConfigError, match="3 coordinates just after heel strike; this one has 4"):
@@ -163,7 +163,7 @@ def test_walkers_with_more_coordinates_are_refused(tmp_path):
         )
 
 
-def test_a_window_upside_down_is_refused(tmp_path):
+def test_reversed_window_bounds_are_rejected(tmp_path):
     with pytest.raises(ConfigError, match="is not below"):
         run(tmp_path, "basin.lower=[0.9,-1.0]")
 
@@ -178,12 +178,12 @@ def test_a_window_upside_down_is_refused(tmp_path):
         ("basin.model=both", "rigid"),
     ],
 )
-def test_a_bad_block_is_refused_in_words(setting, said):
+def test_invalid_basin_block_is_rejected(setting, said):
     with pytest.raises(ConfigError, match=said):
         load(None, [setting])
 
 
-def test_nothing_is_stale_without_it():
+def test_other_results_are_current_without_it():
     assert PIPELINE["basin"].only_by == "basin"
     assert all("basin" not in stage.inputs(load(None, ()).config) for stage in PIPELINE.stages)
     assert "basin" in PIPELINE["plot"].if_current

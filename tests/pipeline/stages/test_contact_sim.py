@@ -60,7 +60,7 @@ def paper():
     return run()
 
 
-def test_summary_has_the_fixed_keys(paper):
+def test_summary_has_the_expected_keys(paper):
     assert set(paper.summary) >= FIXED_KEYS
     json.dumps(paper.summary, allow_nan=False)
 
@@ -112,7 +112,7 @@ def test_feet_are_at_the_ends_of_the_legs(paper):
         np.testing.assert_allclose(trajectory["foot_height_m"][:, leg], height, atol=1e-13)
 
 
-def test_velocities_are_those_of_the_angles(paper):
+def test_velocities_are_the_rates_of_the_angles(paper):
     trajectory = paper["trajectory"]
     time, angle, velocity = trajectory["time"], trajectory["angle"], trajectory["velocity"]
     mean = 0.5 * (velocity[1:] + velocity[:-1])
@@ -122,7 +122,7 @@ def test_velocities_are_those_of_the_angles(paper):
     assert off.max() < 2.0
 
 
-def test_potential_energy_is_that_of_the_masses_over_the_foothold(paper):
+def test_potential_energy_is_measured_from_the_foothold(paper):
     trajectory, steps = paper["trajectory"], paper["steps"]
     step = np.searchsorted(steps["touch_time_s"], trajectory["time"], side="right")
     along = np.append(trajectory["foot_along_m"][0, 1], steps["touch_along_m"])[step]
@@ -137,7 +137,7 @@ def test_potential_energy_is_that_of_the_masses_over_the_foothold(paper):
     assert np.median(trajectory["mechanical_J"]) == pytest.approx(150.2, abs=0.5)
 
 
-def test_kinetic_energy_is_that_of_the_moving_masses(paper):
+def test_kinetic_energy_is_the_sum_over_masses(paper):
     trajectory = paper["trajectory"]
     time = trajectory["time"]
     rates = [(mass, np.gradient(along, time), np.gradient(height, time)) for mass, along, height in masses(trajectory)]
@@ -145,7 +145,7 @@ def test_kinetic_energy_is_that_of_the_moving_masses(paper):
     assert np.median(np.abs(expected - trajectory["kinetic_J"])) < 1e-3
 
 
-def test_books_balance_at_every_sample_and_only_lose(paper):
+def test_energy_balances_at_every_sample_and_losses_only_grow(paper):
     trajectory = paper["trajectory"]
     channels = ("dissipated_damping_J", "dissipated_friction_J", "lost_at_edges_J")
     lost = sum(trajectory[name] for name in channels)
@@ -158,7 +158,7 @@ def test_books_balance_at_every_sample_and_only_lose(paper):
     assert sum(total.values()) == pytest.approx(lost[-1], abs=0.05)
 
 
-def test_the_ground_carries_the_walker_and_never_pulls(paper):
+def test_ground_carries_the_walker_and_never_pulls(paper):
     trajectory = paper["trajectory"]
     normal, friction = trajectory["normal_force_N"], trajectory["friction_force_N"]
     assert normal.min() >= 0.0
@@ -169,7 +169,7 @@ def test_the_ground_carries_the_walker_and_never_pulls(paper):
     assert trajectory["penetration_m"].max() <= paper.summary["max_penetration_m"] * (1.0 + 1e-9)
 
 
-def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
+def test_equal_names_mean_the_same_in_both_models(paper):
     rigid = simulate.run(only(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
     for group, expected in SHARED.items():
         ours, theirs = (walk[group].variables for walk in (paper, rigid))
@@ -183,7 +183,7 @@ def test_the_rigid_walk_says_the_same_of_what_has_the_same_name(paper):
     assert {"touch_times_s", "step_periods_s", "step_lengths_m"} <= paper.summary.keys() & rigid.summary
 
 
-def test_a_knee_that_does_not_lock_is_a_gap():
+def test_missing_knee_lock_is_a_gap():
     kneed = step_columns([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
     np.testing.assert_array_equal(kneed["knee_strike_time_s"].values, [0.5, np.nan])
     times, along, strikes = np.array([[0.7, 1.4], [0.3, 0.6], [0.5, np.nan]])
@@ -193,7 +193,7 @@ def test_a_knee_that_does_not_lock_is_a_gap():
     assert walk.knee_strikes_s.tolist() == [0.5]
 
 
-def test_what_outputs_do_not_ask_for_is_left_out_and_changes_nothing(paper):
+def test_omitting_outputs_does_not_change_the_walk(paper):
     none, energies = run("outputs=[]"), run("outputs=[energies]")
     assert "trajectory" not in none.groups
     whys = [entry["why"] for entry in none.summary["left_out"]]
@@ -204,7 +204,7 @@ def test_what_outputs_do_not_ask_for_is_left_out_and_changes_nothing(paper):
     assert not names & {"angle", "normal_force_N"}
 
 
-def test_a_walk_that_ends_before_its_first_step_is_an_answer_that_can_be_stored(tmp_path):
+def test_walk_without_a_step_can_be_stored(tmp_path):
     content = run(STUMBLE)
     summary = content.summary
     assert summary["outcome"] != "walked"
@@ -220,13 +220,13 @@ def test_a_walk_that_ends_before_its_first_step_is_an_answer_that_can_be_stored(
     np.testing.assert_array_equal(stored, content["trajectory"]["angle"])
 
 
-def test_straight_legs_that_scuff_on_a_plane_are_told_what_to_do():
+def test_straight_legs_that_scuff_on_a_plane_get_advice():
     content = run("contact.terrain=plane", "outputs=[]")
     assert content.summary["outcome"] != "walked"
     assert "contact.terrain: after-mid-swing" in content.summary["advice"]
 
 
-def test_legs_of_point_masses_pass_each_other_with_a_hip_of_no_mass_as_with_one_of_next_to_none():
+def test_massless_hip_is_the_limit_of_a_tiny_hip_mass():
     """At the instant at which the feet pass, an event of this terrain, no mass resists a motion of the hip alone."""
     asked = "start=[-0.126905, 0.092105, -1.065008, -1.176315]", "contact.terrain=after-mid-swing", "strides=1"
     none, little = (run(f"walker.hip_mass_kg={mass}", *asked, "outputs=[]", inputs=()) for mass in (0, 1e-5))
@@ -235,19 +235,19 @@ def test_legs_of_point_masses_pass_each_other_with_a_hip_of_no_mass_as_with_one_
     np.testing.assert_allclose(none.summary["step_lengths_m"], little.summary["step_lengths_m"], atol=1e-5)
 
 
-def test_a_start_of_ones_own_needs_no_gait_where_the_pads_do_not():
+def test_given_start_needs_no_gait_unless_the_pads_do():
     """The step that pads and steps are measured by is then that of the start itself."""
     content = run("start=[-0.2042, 0.1694, -0.6, -0.86]", "contact.pad_pitch=0.3714", "outputs=[]", inputs=())
     assert content.summary["outcome"] == "walked"
     assert content.summary["pitch_m"] == 0.3714
 
 
-def test_without_a_gait_or_a_start_there_is_nothing_to_walk_from():
+def test_contact_walk_needs_a_gait_or_a_start():
     with pytest.raises(ValueError, match="neither"):
         run(inputs=())
 
 
-def test_an_exhausted_budget_is_no_answer_and_keeps_what_was_walked(monkeypatch):
+def test_exhausted_budget_is_no_answer_but_keeps_the_partial_walk(monkeypatch):
     monkeypatch.setattr(contact, "BUDGET_PER_STEP", 1000)
     with pytest.raises(NoAnswer) as caught:
         run()
@@ -258,7 +258,7 @@ def test_an_exhausted_budget_is_no_answer_and_keeps_what_was_walked(monkeypatch)
     assert "rtol" in caught.value.advice
 
 
-def test_a_step_whose_foot_did_not_lift_has_a_gap_and_is_not_in_the_mean(monkeypatch):
+def test_step_without_a_foot_lift_has_no_slip_value(monkeypatch):
     whole = run("strides=1")
     # ten more right-hand sides than to the last touch, of hundreds to the lift
     monkeypatch.setattr(contact, "BUDGET_PER_STEP", whole.summary["rhs_evaluations"] // 2 + 5)
@@ -271,7 +271,7 @@ def test_a_step_whose_foot_did_not_lift_has_a_gap_and_is_not_in_the_mean(monkeyp
     assert np.isfinite(cut["steps"]["touch_time_s"]).all()
 
 
-def test_a_pinned_walk_that_scuffs_feels_the_ground_and_its_energy_balances():
+def test_pinned_walk_that_scuffs_touches_the_ground_and_balances_energy():
     """The rigid gait on 3 degrees: pulled down by its scuffing foot it falls before its first step."""
     gait = Content({}, {"state": [-0.3233886, 0.2186688, -0.3773739, -1.0923836], "step_length_m": 0.5354454})
     scuffing = ("contact.stance=pinned", "contact.terrain=plane", "slope_deg=3")
@@ -283,7 +283,7 @@ def test_a_pinned_walk_that_scuffs_feels_the_ground_and_its_energy_balances():
 
 
 @pytest.mark.parametrize(("atol", "told"), [("1e-7", True), ("1e-9", False)])
-def test_a_tolerance_that_leaves_friction_to_chance_is_told(atol, told):
+def test_tolerance_too_loose_for_friction_is_reported(atol, told):
     class Listener(Silent):
         def note(self, text):
             notes.append(text)
@@ -295,14 +295,14 @@ def test_a_tolerance_that_leaves_friction_to_chance_is_told(atol, told):
     assert any("stiction_velocity" in note and "lower solver.contact.atol" in note for note in notes) is told
 
 
-def test_a_budget_that_ends_before_the_first_sample_is_no_answer_either(monkeypatch):
+def test_budget_exhausted_before_the_first_sample_is_no_answer(monkeypatch):
     monkeypatch.setattr(contact, "BUDGET_PER_STEP", 0)
     with pytest.raises(NoAnswer) as caught:
         run()
     assert caught.value.partial["trajectory"]["time"].size == 0
 
 
-def test_a_pinned_first_step_says_what_it_does_without():
+def test_pinned_first_step_lists_its_omissions():
     content = run("contact.stance=pinned", "solver.contact.method=scipy-radau", "strides=1")
     assert content.summary["outcome"] == "walked"
     assert any("pinned" in entry["why"] for entry in content.summary["left_out"])
@@ -313,13 +313,13 @@ def test_a_pinned_first_step_says_what_it_does_without():
     assert stance_force.max() < 1e-9  # the hinge carries it, not the ground
 
 
-def test_the_same_config_gives_the_same_bits(paper):
+def test_equal_configs_give_bitwise_equal_results(paper):
     again = run()
     assert again.summary == paper.summary
     np.testing.assert_array_equal(again["trajectory"]["angle"], paper["trajectory"]["angle"])
 
 
-def test_a_start_in_mid_step_goes_on_as_the_whole_walk_does():
+def test_mid_step_start_continues_the_whole_walk():
     free = ("contact.terrain=after-mid-swing", "strides=1", "outputs=[]")
     slope = ("slope_rad=0.0525", *free)
     middle = run("start={instant: mid-step, state: [0, 0, 2.0, -0.4]}", *slope, inputs=()).summary
@@ -341,7 +341,7 @@ def simulate_from(state, time_s, slope_rad):
     return [float(x) for rows in samples for x in rows[0] + share * (rows[1] - rows[0])]
 
 
-def test_the_pad_pitch_has_no_effect_where_there_are_no_pads():
+def test_pad_pitch_has_no_effect_without_pads():
     start = "start=[-0.2042, 0.1694, -0.605819, -0.861041]"
     walks = [
         run(start, "contact.terrain=after-mid-swing", "strides=1", *pitch, inputs=()).summary["touch_times_s"]

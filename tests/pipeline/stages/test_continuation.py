@@ -51,7 +51,7 @@ def in_degrees():
     return follow("over=slope_deg", "from=4", "to=4.8", "periods=2")
 
 
-def test_values_are_in_the_unit_of_the_key_that_was_asked_for(in_degrees):
+def test_values_are_in_the_unit_of_the_requested_key(in_degrees):
     (in_radians,) = [
         one["value"]
         for one in follow(f"from={math.radians(4)}", f"to={math.radians(4.6)}", "periods=1").summary["bifurcations"]
@@ -63,7 +63,7 @@ def test_values_are_in_the_unit_of_the_key_that_was_asked_for(in_degrees):
     assert first == pytest.approx(math.degrees(in_radians), abs=1e-9)
 
 
-def test_a_spring_is_followed_from_none_on_and_a_gait_that_goes_on_neither_way_is_no_branch():
+def test_spring_is_followed_from_zero_and_isolated_gaits_are_no_branch():
     sets = {"over": "walker.hip.spring_N_m_per_rad", "from": 0, "to": 40, "periods": 1}
     asked = load(Path("level"), [f"continuation.{key}={value}" for key, value in sets.items()]).config
     summary = continuation.run(only(asked, PIPELINE["continuation"].takes), {}, Silent(), again=False).summary
@@ -76,7 +76,7 @@ def test_a_spring_is_followed_from_none_on_and_a_gait_that_goes_on_neither_way_i
     assert alone["why"].endswith("Newton's method finds no further gait")  # not that there is no walker
 
 
-def test_the_summary_has_its_keys_and_the_artifact_a_group_for_each_branch(in_degrees):
+def test_artifact_has_a_group_for_each_branch(in_degrees):
     said = in_degrees.summary
     assert set(said) >= {"branches", "bifurcations", "lyapunov", "over", "unit"}
     for number, branch in enumerate(said["branches"]):
@@ -91,7 +91,7 @@ def test_the_summary_has_its_keys_and_the_artifact_a_group_for_each_branch(in_de
         assert set(one) >= {"value", "exponent", "uncertainty"}
 
 
-def test_a_sample_of_gaits_is_walked_again_and_how_many_is_told(in_degrees):
+def test_number_of_recomputed_gaits_is_reported(in_degrees):
     error = in_degrees.summary["numerical_error"]["rigid"]
     assert (error["walked_again"], error["ended_otherwise"]) == (16, 0)
     assert error["of"] == sum(branch["points"] for branch in in_degrees.summary["branches"])
@@ -101,7 +101,7 @@ def test_a_sample_of_gaits_is_walked_again_and_how_many_is_told(in_degrees):
     assert error["by"] == "ten times tighter tolerances"
 
 
-def test_families_that_are_only_looked_at_are_the_same_without_a_numerical_error():
+def test_families_without_error_estimate_are_otherwise_equal():
     asked = config("over=slope_deg", "from=1", "to=1.5", "periods=1")
     memory = MemoryResults()
     looked_at, whole = (answer_in_memory(asked, "continuation", memory, again=again) for again in (False, True))
@@ -109,7 +109,7 @@ def test_families_that_are_only_looked_at_are_the_same_without_a_numerical_error
     assert looked_at.summary == {**whole.summary, "numerical_error": {}}
 
 
-def test_what_newtons_method_leaves_over_is_part_of_the_numerical_error():
+def test_newton_residual_is_part_of_the_numerical_error():
     """A gait whose start is off: its own step has another period than the gait, whatever the tolerances."""
     step_map = rigid_map(config(), parameter_of("slope_deg", config()), 1.0)
     gait = gait_near(step_map, np.array([0.22, -0.12, -0.35]), 3.0, Effort(1e-13))
@@ -124,7 +124,7 @@ def test_what_newtons_method_leaves_over_is_part_of_the_numerical_error():
     assert told["step_period_s"] > 1e-9
 
 
-def test_the_end_of_a_branch_that_the_walker_makes_is_told_in_words():
+def test_end_of_a_branch_by_the_walker_is_explained():
     end = SimpleNamespace(value=5.0, reason="slid: the stance foot slides away")
     branch = SimpleNamespace(period=1, ends=(SimpleNamespace(value=0.2, reason="end of the span"), end), crossings=())
     followed = SimpleNamespace(model="contact", branches=(branch,))
@@ -137,7 +137,7 @@ def test_the_end_of_a_branch_that_the_walker_makes_is_told_in_words():
 
 
 @pytest.mark.parametrize(("tripped", "side"), [((0.0, 1.0), "Above"), ((1.0, 0.0), "Below")])
-def test_pads_that_trip_a_gait_are_told_from_its_own_limits(tripped, side):
+def test_pads_that_end_a_gait_are_distinguished_from_its_limits(tripped, side):
     monitor = SimpleNamespace(name="tripped", limit=0.5)
     points = [SimpleNamespace(value=value, monitors=[one]) for value, one in zip((4.0, 4.2), tripped, strict=True)]
     crossing = SimpleNamespace(monitor=monitor, value=4.1)
@@ -149,13 +149,13 @@ def test_pads_that_trip_a_gait_are_told_from_its_own_limits(tripped, side):
     assert "the pads end walks there, not the gait" in row["said"]
 
 
-def test_the_summary_has_where_the_gait_that_walks_first_doubles_its_period(in_degrees):
+def test_summary_states_the_first_period_doubling(in_degrees):
     said = in_degrees.summary
     (walks,) = [branch for branch in said["branches"] if branch["period"] == 1 and branch["stable_range"]]
     assert said["first_doubling"] == {"rigid": walks["stable_range"][1]}
 
 
-def test_a_flip_of_a_gait_that_is_unstable_on_both_sides_is_no_first_doubling():
+def test_flip_of_an_unstable_gait_is_not_the_first_doubling():
     walks = SimpleNamespace(period=1, stable_ranges=((1.0, 4.0),), bifurcations=(flip_at(4.0),))
     unstable = SimpleNamespace(period=1, stable_ranges=(), bifurcations=(flip_at(1.5),))
     doubled = SimpleNamespace(period=2, stable_ranges=((2.0, 3.0),), bifurcations=(flip_at(3.0),))
@@ -167,7 +167,7 @@ def flip_at(value):
     return SimpleNamespace(kind="flip", value=value)
 
 
-def test_where_a_cascade_still_doubles_what_has_not_settled_is_not_called_aperiodic():
+def test_unsettled_walks_in_a_cascade_are_not_called_aperiodic():
     # flips of the contact model; walks just beyond a flip take long to settle
     flips, ranges = (4.097, 4.632, 4.734), ((0.2, 4.097), (4.097, 4.632), (4.632, 4.734))
     branches = [
@@ -181,7 +181,7 @@ def test_where_a_cascade_still_doubles_what_has_not_settled_is_not_called_aperio
     assert attractor_summary(followed)["aperiodic_from"] == 4.76
 
 
-def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_degrees):
+def test_stored_doubled_branch_begins_at_the_flip_of_its_parent(in_degrees):
     said = in_degrees.summary
     (number,) = [i for i, branch in enumerate(said["branches"]) if branch["period"] == 2]
     group = in_degrees[f"rigid/branch_{number}"]
@@ -190,7 +190,7 @@ def test_the_doubled_branch_begins_at_its_parents_flip_in_the_artifact_too(in_de
     assert np.ptp(group["mark_step_period"][0]) == 0.0
 
 
-def test_a_doubled_branch_that_begins_with_another_step_than_its_parent_has_the_flip_in_its_own_order():
+def test_doubled_branch_lists_the_flip_in_its_own_step_order():
     gait = SimpleNamespace(periods_s=np.array([0.5, 0.6, 0.7]), angles=np.array([0.1, 0.2, 0.3]))
     flip = SimpleNamespace(kind="flip", value=6.0, gait=gait)
     parent = SimpleNamespace(period=3, bifurcations=(flip,))
@@ -201,7 +201,7 @@ def test_a_doubled_branch_that_begins_with_another_step_than_its_parent_has_the_
     assert mark.angles.tolist() == [0.2, 0.3, 0.1, 0.2, 0.3, 0.1]
 
 
-def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value(monkeypatch):
+def test_flip_curve_passes_through_the_flip_of_the_config(monkeypatch):
     monkeypatch.setattr(plane_of_gaits, "PLANE_CELLS", (2, 2))  # the plane beside them is not looked at
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
@@ -213,7 +213,7 @@ def test_curves_over_a_second_key_pass_through_the_flip_at_the_configs_own_value
     assert np.interp(10.0, curve["second"][order], curve["value"][order]) == pytest.approx(flip, abs=1e-9)
 
 
-def test_regions_of_the_plane_meet_at_the_curve_of_the_flip(monkeypatch):
+def test_regions_of_the_plane_meet_at_the_flip_curve(monkeypatch):
     monkeypatch.setattr(plane_of_gaits, "PLANE_CELLS", (10, 3))
     found = follow(
         "over=slope_deg", "from=4", "to=4.8", "periods=1",
@@ -227,13 +227,13 @@ def test_regions_of_the_plane_meet_at_the_curve_of_the_flip(monkeypatch):
 
 
 @pytest.mark.parametrize(("name", "unit"), [("paper", "mm/s"), ("contact-si", "m/s")])
-def test_the_unit_of_a_contact_key_is_that_of_the_config(name, unit):
+def test_unit_of_a_contact_key_is_that_of_the_config(name, unit):
     config = load(Path(name)).config
     assert parameter_of("contact.stiction_velocity", config).unit == unit
     assert parameter_of("walker.hip_mass_kg", config).unit == "kg"
 
 
-def test_what_follows_from_a_key_follows_it():
+def test_derived_values_follow_their_key():
     own = config("walker={leg_length_m: 1.0}")
     longer = parameter_of("walker.leg_length_m", own).config_at(own, 1.4)
     assert longer.walker.foot_to_mass_m == 0.7  # half of the length, unless it is given
@@ -250,7 +250,7 @@ def test_what_follows_from_a_key_follows_it():
         ("walker.hip_mass_kg", {"rigid", "contact"}),
     ],
 )
-def test_a_key_touches_the_models_that_change_with_it(over, models):
+def test_key_affects_only_models_that_depend_on_it(over, models):
     own = config()
     parameter = parameter_of(over, own)
     span = ValueSpan(*(factor * parameter.value_in(own) for factor in (1.0, 1.1)))
@@ -279,7 +279,7 @@ def test_a_key_touches_the_models_that_change_with_it(over, models):
         (["second.over=contact.stiffness", "second.from=1", "second.to=1e6"], "does not affect the rigid model"),
     ],
 )  # fmt: skip
-def test_bad_questions_end_in_words(sets, said):
+def test_invalid_questions_are_rejected(sets, said):
     with pytest.raises(ConfigError, match=re.escape(said)) as refused:
         follow(*sets)
     assert refused.value.advice
@@ -299,7 +299,7 @@ def beyond_the_first_flip():
     return follow_coarsely("over=slope_deg", "from=4.9", "to=5.25")
 
 
-def test_a_span_that_begins_beyond_the_first_flip_has_the_flips_of_one_that_begins_before(beyond_the_first_flip):
+def test_span_starting_beyond_the_first_flip_finds_the_same_flips(beyond_the_first_flip):
     wider = follow_coarsely("over=slope_deg", "from=4.2", "to=5.25")
     for steps in (2, 4):
         (flip,), (wanted,) = (flips_of(said, steps) for said in (beyond_the_first_flip, wider))
@@ -308,7 +308,7 @@ def test_a_span_that_begins_beyond_the_first_flip_has_the_flips_of_one_that_begi
     assert (doubled["from"], doubled["to"]) == pytest.approx((4.9, 5.25))
 
 
-def test_a_span_that_begins_beyond_the_first_flip_has_its_chaos(beyond_the_first_flip):
+def test_span_starting_beyond_the_first_flip_finds_chaos(beyond_the_first_flip):
     (attractor,) = beyond_the_first_flip["attractors"]
     # the cascade's flips accumulate at 5.03922 deg, and walks are looked at every 0.01
     assert 5.0392 < attractor["aperiodic_from"] < 5.06
@@ -319,13 +319,13 @@ def test_a_span_that_begins_beyond_the_first_flip_has_its_chaos(beyond_the_first
 
 
 @pytest.mark.parametrize(("least", "settled"), [(4.95, 4), (5.1, 0)])
-def test_gaits_of_fewer_steps_than_walks_settle_on_are_found_too(least, settled):
+def test_gaits_with_fewer_steps_than_the_attractor_are_found(least, settled):
     said = follow_coarsely("over=slope_deg", f"from={least}", "to=5.15")
     assert {one["period"] for one in said["branches"] if one["from"] == least} >= {1, 2, 4}
     assert settled in said["attractors"][0]["periods"]
 
 
-def test_an_attractor_that_only_the_end_of_a_span_has_is_followed_downwards():
+def test_attractor_at_the_end_of_a_span_is_followed_downwards():
     # on this slope the lighter the legs are the further the cascade has gone, until walks fall
     said = follow_coarsely("over=walker.leg_mass_kg", "slope_deg=5.1", "from=3.8", "to=7")
     assert {one["period"] for one in said["branches"]} >= {1, 2}
@@ -339,17 +339,17 @@ def flips_of(said, steps):
     return [one["value"] for one in said["bifurcations"] if (one["kind"], one["period"]) == ("flip", steps)]
 
 
-def test_a_span_without_a_gait_has_no_answer():
+def test_span_without_a_gait_has_no_answer():
     with pytest.raises(NoAnswer, match="no gait was found with slope_deg from -3 to -1 deg"):
         follow("over=slope_deg", "from=-3", "to=-1")
 
 
-def test_a_span_runs_upward():
+def test_span_must_run_upward():
     with pytest.raises(ConfigError, match="must be above `from`"):
         config("from=0.2", "to=0.1")
 
 
-def test_gaits_of_the_rigid_model_are_stored_walking_and_come_back_to_where_they_began(in_degrees):
+def test_stored_motion_of_rigid_gaits_is_periodic(in_degrees):
     moving = {path: group for path, group in in_degrees.groups.items() if "/motion_" in path}
     assert {int(group.attrs["steps"]) for group in moving.values()} == {1, 2}
     for path, group in moving.items():

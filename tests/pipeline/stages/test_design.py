@@ -45,7 +45,7 @@ def gait_at(name, *changes):
     return find_gaits(rigid_walker(config, config.equations)).gait
 
 
-def test_the_optimum_is_that_of_a_brute_grid():
+def test_optimum_equals_that_of_a_grid_search():
     """The least spectral radius over the hip's mass, on a grid of 46 walkers."""
     found = run(
         "slope-3deg", "design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=3"
@@ -61,14 +61,14 @@ def test_the_optimum_is_that_of_a_brute_grid():
     )
 
 
-def test_a_search_far_from_the_configs_own_numbers_is_on_the_gait_that_is_sought_there():
+def test_design_search_uses_the_gait_at_its_own_parameters():
     """From a hip of 10 kg Newton's method comes to an unstable gait of the walker of 50 kg, with multiplier 4.55."""
     asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [49.9, 50]}", "design.starts=1")
     found = run("slope-3deg", *asked)
     assert found["value"] == pytest.approx(gait_at("slope-3deg", "walker.hip_mass_kg=50").spectral_radius, rel=1e-3)
 
 
-def test_searches_that_were_cut_off_go_on_where_they_stopped(tmp_path):
+def test_interrupted_design_searches_resume(tmp_path):
     asked = ("design.minimise=spectral_radius", "design.over={walker.hip_mass_kg: [5, 50]}", "design.starts=2")
     whole = run("slope-3deg", *asked, checkpoint=Checkpoint(tmp_path / "parts", "key"))
     kept = Checkpoint(tmp_path / "parts", "key")
@@ -81,7 +81,7 @@ def test_searches_that_were_cut_off_go_on_where_they_stopped(tmp_path):
     assert again["value"] == pytest.approx(whole["value"], rel=1e-9)
 
 
-def test_other_numbers_are_kept_within_their_bounds_and_a_bound_that_is_reached_is_said():
+def test_constraints_are_kept_and_active_bounds_reported():
     found = run(
         "slope-3deg", "design.maximise=speed_m_s", "design.over={slope_deg: [1, 4]}",
         "design.keep={step_length_m: [0.3, 0.5]}", "design.starts=2",
@@ -95,7 +95,7 @@ def test_other_numbers_are_kept_within_their_bounds_and_a_bound_that_is_reached_
     assert free["value"] > free["start_value"]
 
 
-def test_drawn_starts_end_in_one_place_or_are_said_not_to():
+def test_random_starts_agree_on_one_optimum():
     asked = ("design.minimise=gait_sensitivity_norm", "design.over={walker.foot_to_mass_m: [0.4, 0.6]}")
     found = run("slope-3deg", *asked, "design.starts=4", "seed=5")
     assert found["optima"] == 1
@@ -111,7 +111,7 @@ def bowls(x):
     return Point({"f": depth + (u - low) ** 2, "g": u}, {"f": np.array([2.0 * (u - low)]), "g": np.array([1.0])})
 
 
-def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_are():
+def test_searches_avoid_points_without_a_gait_and_count_optima():
     question = DesignProblem("f", 1.0, np.array([0.0]), np.array([1.0]), {}, bowls)
     found = search_from_starts(question, np.array([0.1]), 12, seed=1)
     assert found[0].x[0] == pytest.approx(0.8, abs=1e-6)
@@ -136,12 +136,12 @@ def test_searches_go_round_places_without_a_gait_and_tell_how_many_optima_there_
         ),
     ],
 )  # fmt: skip
-def test_bad_questions_end_in_words(changes, said):
+def test_invalid_questions_are_rejected(changes, said):
     with pytest.raises(ConfigError, match=said):
         run("rigid-only", *changes)
 
 
-def test_numbers_that_the_config_refuses_are_places_without_a_gait():
+def test_values_that_the_config_rejects_have_no_gait():
     """A leg's mass lies on the leg."""
     over = "design.over={walker.leg_length_m: [0.6, 1.1], walker.foot_to_mass_m: [0.3, 0.9]}"
     found = run("rigid-only", "design.minimise=period_s", over, "design.starts=2")
@@ -149,13 +149,13 @@ def test_numbers_that_the_config_refuses_are_places_without_a_gait():
 
 
 @pytest.mark.parametrize("key", ["contact.damping", "push_off.duration_s"])
-def test_a_number_that_the_model_does_not_read_is_refused_in_words(key):
+def test_parameter_that_the_model_does_not_use_is_rejected(key):
     """Every value of it is as good as any other."""
     with pytest.raises(ConfigError, match=f"{key} does not affect the rigid model"):
         run("paper", "design.minimise=period_s", f"design.over={{{key}: [1, 2]}}")
 
 
-def test_bounds_that_no_walker_keeps_are_no_answer():
+def test_impossible_bounds_give_no_answer():
     with pytest.raises(NoAnswer, match="satisfies the constraints") as raised:
         run("slope-3deg", "design.minimise=period_s", "design.over={slope_deg: [2, 3]}",
             "design.keep={step_length_m: [2, 3]}", "design.starts=2")  # fmt: skip
@@ -176,12 +176,12 @@ def contact_gait(name):
 
 
 @pytest.mark.parametrize("name", ["slope-3deg", "level"])
-def test_a_contact_gaits_cost_of_transport_is_what_the_ground_takes_over_weight_and_distance(name):
+def test_contact_cost_of_transport_is_ground_loss_per_weight_and_distance(name):
     _, _, step, cost = contact_gait(name)
     assert cost == pytest.approx(step.dissipated_J.sum() / (20.0 * 9.81 * step.length_m), rel=1e-7)
 
 
-def test_a_settled_walk_with_knees_and_torque_costs_what_its_gait_does():
+def test_settled_kneed_walk_costs_as_much_as_its_gait():
     config, gait, _, cost = contact_gait("kneed-level")
     scene, costs, ways = contact_scene(config, gait.step_length), [], []
     for steps in (14, 15):
@@ -198,7 +198,7 @@ def largest_at(slope_deg):
     return {name: largest_disturbance(subject.at(exact=False), *LARGEST[name], 50) for name in LARGEST}
 
 
-def test_the_largest_step_up_is_maximised_and_robustness_is_compared_with_the_starts():
+def test_largest_step_up_is_maximised_and_compared_with_the_start():
     found = run(
         "slope-3deg", "design.maximise=largest_step_up_m", "design.over={slope_deg: [3, 3.8]}", "design.starts=1"
     )
@@ -213,14 +213,14 @@ def test_the_largest_step_up_is_maximised_and_robustness_is_compared_with_the_st
         assert rows[name]["best"] == pytest.approx(best[name], rel=1e-3)
 
 
-def test_a_largest_push_is_kept_within_its_bounds():
+def test_bounds_on_the_largest_push_are_kept():
     asked = ("design.minimise=speed_m_s", "design.over={slope_deg: [1, 2.5]}", "design.starts=1")
     found = run("slope-3deg", *asked, "design.keep={largest_push_backward_N_s: [0.75, 9]}")
     assert found["best"]["slope_deg"] == pytest.approx(1.52, abs=0.03)
     assert largest_at(found["best"]["slope_deg"])["largest_push_backward_N_s"] == pytest.approx(0.75, abs=1e-4)
 
 
-def test_an_optimum_that_is_less_robust_than_the_start_says_in_what():
+def test_loss_of_robustness_at_the_optimum_is_reported():
     rows = [
         {"quantity": "gait_sensitivity_norm", "start": 16.3, "best": 7.2},
         {"quantity": "largest_step_down_m", "start": 0.0129, "best": 0.0226},

@@ -41,12 +41,12 @@ def energy_of(content):
     return trajectory["time"].values, trajectory["mechanical_J"].values, steps
 
 
-def test_at_the_start_both_models_have_one_energy(walks):
+def test_both_models_start_with_the_same_energy(walks):
     first = [energy_of(walks[stage])[1][0] for stage in ("simulate", "contact-sim")]
     assert first[0] == pytest.approx(first[1], abs=1e-9 * abs(first[0]))
 
 
-def test_the_rigid_energy_is_constant_between_impacts_and_the_contact_one_never_rises_within_a_step(walks):
+def test_rigid_energy_is_constant_between_impacts_and_contact_energy_never_rises(walks):
     time, energy, steps = energy_of(walks["simulate"])
     impacts = np.sort(
         np.concatenate([steps[name].values for name in ("touch_time_s", "knee_strike_time_s") if name in steps])

@@ -105,7 +105,7 @@ def followed(asked):
         return (), error.message
 
 
-def test_continuation_follows_every_number_in_the_models_that_have_it_or_says_why_not(walker, config, keys):
+def test_continuation_accepts_every_parameter_or_explains_why_not(walker, config, keys):
     every = (RIGID,) if config.contact is None else (RIGID, CONTACT)
     for key in keys:
         models, refused = followed(question(config, key, "rigid" if len(every) == 1 else "both"))
@@ -114,7 +114,7 @@ def test_continuation_follows_every_number_in_the_models_that_have_it_or_says_wh
         assert RIGID in models or refused or key.startswith((*ONLY_CONTACT, "walker.foot_radius_m"))
 
 
-def test_a_second_number_is_followed_or_refused_too(walker, config, keys):
+def test_second_continuation_parameter_is_accepted_or_rejected(walker, config, keys):
     first = question(config, "gravity_m_s2", "rigid")
     for key in keys:
         span = question(config, key, "rigid").span
@@ -140,7 +140,7 @@ def subject(config, fixedpoint):
     return next(robustness.subjects(taken, {"fixedpoint": fixedpoint}, Silent()))
 
 
-def test_design_knows_the_gait_and_its_gradient_over_every_number(walker, config, keys, fixedpoint, subject):
+def test_design_has_gait_and_gradient_for_every_parameter(walker, config, keys, fixedpoint, subject):
     taken = only(config, PIPELINE["design"].takes)
     for key in keys:
         parameter, asked = parameter_of(key, taken), Design(minimise="period_s", over={key: [0.0, 1.0]})
@@ -171,7 +171,7 @@ def gradients_by(key, config, subject, known):
     return known[same]
 
 
-def test_robustness_differentiates_the_gait_by_every_number(walker, config, keys, subject, known):
+def test_robustness_has_derivatives_for_every_parameter(walker, config, keys, subject, known):
     read = set(robustness.numbers_read(subject))
     assert read <= set(keys)
     assert not any(key.startswith(ONLY_CONTACT) for key in read)
@@ -187,7 +187,7 @@ def test_robustness_differentiates_the_gait_by_every_number(walker, config, keys
                 assert abs(effect) < 1e-6, f"the rigid model does not read {key}"
 
 
-def test_sweeps_take_every_number(config, keys):
+def test_sweeps_accept_every_parameter(config, keys):
     for key in keys:
         asked = question(config, key, "rigid")
         ends = (asked.span.least, asked.span.most)

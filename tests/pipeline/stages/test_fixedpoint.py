@@ -39,7 +39,7 @@ def paper():
     return run()
 
 
-def test_summary_has_the_fixed_keys_and_both_sets_of_equations(paper):
+def test_summary_has_the_expected_keys_and_both_sets_of_equations(paper):
     assert set(paper.summary) >= FIXED_KEYS
     assert set(paper.summary["equation_sets"]) == {"corrected", "as-printed"}
     for name, one in paper.summary["equation_sets"].items():
@@ -48,7 +48,7 @@ def test_summary_has_the_fixed_keys_and_both_sets_of_equations(paper):
     json.dumps(paper.summary, allow_nan=False)
 
 
-def test_main_set_is_the_configs(paper):
+def test_main_equations_are_those_of_the_config(paper):
     assert paper.summary["equations"] == "corrected"
     printed = run(equations="as-printed").summary
     assert printed["state"] == paper.summary["equation_sets"]["as-printed"]["state"]
@@ -76,7 +76,7 @@ def test_all_gaits_are_stored_with_the_chosen_one_marked(paper, equations):
     assert (group["residual"] <= 1e-11).all()
 
 
-def test_the_result_is_the_same_every_time(paper):
+def test_result_is_reproducible(paper):
     assert run().digest() == paper.digest()
 
 
@@ -96,7 +96,7 @@ def test_another_seed_finds_the_same_gait(paper):
         (1.5, "no gait was found at", "long-period seed is lost at a slope of", "walkerlab continuation"),
     ],
 )
-def test_a_slope_without_a_gait_has_no_answer_in_words(slope, begins, said, advised):
+def test_slope_without_a_gait_is_explained(slope, begins, said, advised):
     with pytest.raises(NoAnswer, match=f"{begins} a slope of") as caught:
         run(slope_rad=slope)
     assert said in caught.value.message
@@ -104,13 +104,13 @@ def test_a_slope_without_a_gait_has_no_answer_in_words(slope, begins, said, advi
     assert caught.value.partial.summary["equation_sets"]["corrected"]["reason"] in caught.value.message
 
 
-def test_a_drive_that_no_gait_goes_with_is_what_to_change():
+def test_drive_without_a_gait_is_named_as_the_cause():
     driven = Config.model_validate({"slope_rad": 0.0, "push_off": {"impulse_N_s": 60.0}})
     assert "too strong or too weak on this slope: try another push_off.impulse_N_s" in fixedpoint.advice(driven)
     sprung = Config.model_validate({"slope_rad": 0.0, "walker": {"hip": {"spring_N_m_per_rad": 5.0}}})
     assert "or drive the walker (push_off.impulse_N_s" in fixedpoint.advice(sprung)
 
 
-def test_an_impossible_walker_has_no_answer_in_words():
+def test_impossible_walker_is_explained():
     with pytest.raises(NoAnswer, match="random starting values"):
         run(walker={"leg_inertia_kg_m2": 1e9})

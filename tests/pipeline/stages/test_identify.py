@@ -70,7 +70,7 @@ def identified(table, gait):
     return identify.run(taken(*ask(table, fit, "walker.hip_mass_kg=9")), gait, Silent())
 
 
-def test_parameters_of_a_noisy_transient_are_recovered_within_their_bars(identified):
+def test_parameters_of_a_noisy_transient_are_recovered_within_error_bars(identified):
     truth = load(Path("paper"), ()).config
     values = {row["key"]: row for row in identified.summary["estimates"]}
     for key, value in (("slope_deg", np.degrees(truth.slope_rad)), ("walker.hip_mass_kg", truth.walker.hip_mass_kg)):
@@ -79,7 +79,7 @@ def test_parameters_of_a_noisy_transient_are_recovered_within_their_bars(identif
     assert not values["walker.hip_mass_kg"]["at_bound"]
 
 
-def test_the_summary_has_the_fixed_keys_and_is_json(identified):
+def test_summary_has_the_expected_keys_and_is_json(identified):
     summary = identified.summary
     assert set(summary) >= FIXED_KEYS
     json.dumps(summary, allow_nan=False)
@@ -94,7 +94,7 @@ def test_the_summary_has_the_fixed_keys_and_is_json(identified):
     assert np.allclose(np.diag(summary["correlations"]["matrix"]), 1.0)
 
 
-def test_the_answer_says_masses_as_a_builder_does(identified):
+def test_answer_states_masses_in_plain_words(identified):
     text = " ".join(" ".join(answer("identify", identified.summary)).split())
     assert "The hip weighs " in text
     assert " kg if the legs weigh 5 kg each" in text
@@ -102,7 +102,7 @@ def test_the_answer_says_masses_as_a_builder_does(identified):
     assert " degrees" in text
 
 
-def test_stored_steps_are_those_of_the_file(identified, table):
+def test_stored_steps_equal_those_of_the_file(identified, table):
     columns = np.loadtxt(table, delimiter=",", skiprows=1).T
     steps = identified.groups["steps"]
     assert np.allclose(steps["measured_step_period_s"], columns[0], rtol=1e-12)
@@ -133,7 +133,7 @@ def test_two_masses_of_a_rigid_walk_are_reported_as_one_combination(table, gait)
     assert "No walk would separate them; a value known beforehand (--prior) would." in text
 
 
-def test_a_weighed_leg_determines_the_hip(table, gait):
+def test_known_leg_mass_determines_the_hip_mass(table, gait):
     fit = "identify.fit={walker.leg_mass_kg: null, walker.hip_mass_kg: null}"
     changes = ask(table, fit, "identify.prior={walker.leg_mass_kg: [5, 0.05]}")
     rows = {row["key"]: row for row in identify.run(taken(*changes), gait, Silent()).summary["estimates"]}
@@ -142,7 +142,7 @@ def test_a_weighed_leg_determines_the_hip(table, gait):
     assert rows["walker.hip_mass_kg"]["standard_error"] == pytest.approx(0.1, rel=0.1)
 
 
-def test_lengths_in_millimetres_taken_for_metres_are_a_misfit(table, gait, tmp_path):
+def test_millimetres_read_as_metres_are_a_misfit(table, gait, tmp_path):
     rows = np.loadtxt(table, delimiter=",", skiprows=1) * (1.0, 1e3)
     path = tmp_path / "mm.csv"
     path.write_text("period_s,length_m\n" + "\n".join(f"{p},{q}" for p, q in rows))
@@ -162,7 +162,7 @@ def test_columns_and_units_are_mapped(table, tmp_path):
     assert np.allclose(np.column_stack((steps.periods_s, steps.lengths_m)), 1e-3 * rows)
 
 
-def test_a_changed_file_changes_the_key_of_the_result(tmp_path):
+def test_changing_the_file_changes_the_result_key(tmp_path):
     path = tmp_path / "steps.csv"
     config = load(Path("paper"), ask(path, "identify.fit={slope_deg: null}")).config
     assert digests(config) == {"identify.data": NO_FILE}
@@ -237,19 +237,19 @@ def refused(folder, monkeypatch, *options):
 
 
 @pytest.mark.parametrize("options", DAMAGED_OPTIONS, ids=" ".join)
-def test_a_damaged_option_is_refused(options, tmp_path, monkeypatch):
+def test_malformed_option_is_rejected(options, tmp_path, monkeypatch):
     (tmp_path / "steps.csv").write_text(GOOD)
     refused(tmp_path, monkeypatch, "--data", "steps.csv", *options)
 
 
 @pytest.mark.parametrize("data", DAMAGED_FILES, ids=repr)
-def test_a_damaged_file_is_refused_by_its_name(data, tmp_path, monkeypatch):
+def test_damaged_file_is_rejected_by_name(data, tmp_path, monkeypatch):
     (tmp_path / "steps.csv").write_bytes(data)
     assert "steps.csv" in refused(tmp_path, monkeypatch, "--data", "steps.csv", *FIT)
 
 
 @pytest.mark.parametrize("path", ["nowhere.csv", ".", "", "steps.csv/x"])
-def test_a_missing_file_is_refused(path, tmp_path, monkeypatch):
+def test_missing_file_is_rejected(path, tmp_path, monkeypatch):
     (tmp_path / "steps.csv").write_text(GOOD)
     refused(tmp_path, monkeypatch, "--data", path, *FIT)
 
@@ -273,7 +273,7 @@ def damaged(text, rng):
 
 
 @pytest.mark.parametrize("level", ["steps", "angles"])
-def test_a_randomly_damaged_file_is_read_or_refused(level, tmp_path):
+def test_randomly_damaged_file_is_read_or_rejected(level, tmp_path):
     rng, path = np.random.default_rng(11), tmp_path / "walk.csv"
     times = np.arange(0.0, 3.0, 0.02)
     swing = 0.2 * np.sin(2.0 * np.pi * times / 1.4)
@@ -292,7 +292,7 @@ def test_a_randomly_damaged_file_is_read_or_refused(level, tmp_path):
     assert all(str(path) in str(problem) and problem.advice for problem in problems)
 
 
-def test_a_misfit_is_an_answer_that_proposes_no_next_step(tmp_path, monkeypatch):
+def test_misfit_suggests_no_next_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("steps.csv").write_text(GOOD)
     done = CliRunner().invoke(program(), ["identify", "--data", "steps.csv", *FIT])
@@ -302,14 +302,14 @@ def test_a_misfit_is_an_answer_that_proposes_no_next_step(tmp_path, monkeypatch)
     assert "next: " not in done.output
 
 
-def test_a_misspelt_key_is_answered_with_the_nearest(tmp_path):
+def test_misspelt_key_suggests_the_nearest(tmp_path):
     path = tmp_path / "steps.csv"
     path.write_text(GOOD)
     with pytest.raises(ConfigError, match=r"identify\.fit: walker\.hip_mas_kg .*did you mean walker\.hip_mass_kg"):
         identify.refuse(taken(*ask(path, "identify.fit={walker.hip_mas_kg: null}")))
 
 
-def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
+def test_report_section_begins_with_the_estimates(identified):
     part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
     assert part is not None
     assert part.finding.startswith("The hip weighs ")
@@ -317,7 +317,7 @@ def test_the_page_has_a_section_that_begins_with_the_estimates(identified):
     assert captions == ["Estimates", "Fit to the measurements", "If a fixed parameter is off"]
 
 
-def test_a_table_of_periods_alone_is_read(tmp_path):
+def test_table_of_periods_alone_is_read(tmp_path):
     path = tmp_path / "stopwatch.csv"
     path.write_text("period_s\n0.70\n0.71\n0.70\n")
     measured = read_measured(taken(*ask(path)).identify, taken())
@@ -325,7 +325,7 @@ def test_a_table_of_periods_alone_is_read(tmp_path):
     assert measured.lengths_m is None
 
 
-def test_the_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
+def test_noise_of_a_quantity_never_exceeds_its_size(tmp_path, gait):
     """Lengths that repeat to the last digit leave no noise to them, and would leave any to the periods."""
     path = tmp_path / "table.csv"
     path.write_text("period_s,length_m\n" + "".join(f"{(0.59, 0.77)[k % 2]},0.0171\n" for k in range(10)))
@@ -358,7 +358,7 @@ def written_angles(path, transient, offset):
     return path
 
 
-def test_an_offset_of_the_sensors_is_estimated_with_the_walker(transient, gait, tmp_path):
+def test_offset_of_the_sensors_is_estimated_with_the_walker(transient, gait, tmp_path):
     path = written_angles(tmp_path / "off.csv", transient, 0.02)
     changes = ask(path, "identify.level=angles", "identify.fit={slope_deg: null}", "slope_deg=1.2")
     summary = identify.run(taken(*changes, "identify.nuisance=[angle_offset_rad]"), gait, Silent()).summary
@@ -370,7 +370,7 @@ def test_an_offset_of_the_sensors_is_estimated_with_the_walker(transient, gait, 
     assert "The angle offset is 0.0" in text
 
 
-def test_an_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path):
+def test_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path):
     path = written_angles(tmp_path / "off.csv", transient, 0.02)
     changes = ask(path, "identify.level=angles", "identify.fit={walker.hip_mass_kg: null}")
     summary = identify.run(taken(*changes), gait, Silent()).summary
@@ -378,7 +378,7 @@ def test_an_offset_that_is_not_estimated_is_mentioned(transient, gait, tmp_path)
     assert "--nuisance angle_offset_rad" in " ".join(" ".join(answer("identify", summary)).split())
 
 
-def test_the_identified_gaits_sensitivity_has_an_error(table, gait):
+def test_sensitivity_of_the_identified_gait_has_an_error(table, gait):
     fit = "identify.fit={slope_deg: null}"
     summary = identify.run(taken(*ask(table, fit, "identify.robustness=true")), gait, Silent()).summary
     norm = summary["gait"]["drop_sensitivity_s_m"]
@@ -387,7 +387,7 @@ def test_the_identified_gaits_sensitivity_has_an_error(table, gait):
     assert "a sensitivity norm (period for a drop of the floor) of 25" in " ".join(answer("identify", summary))
 
 
-def test_a_prior_that_the_walk_contradicts_is_named(table, gait):
+def test_prior_that_the_walk_contradicts_is_named(table, gait):
     fit, prior = "identify.fit={slope_deg: null}", "identify.prior={walker.leg_length_m: [1.1, 0.01]}"
     summary = identify.run(taken(*ask(table, fit, prior)), gait, Silent()).summary
     assert summary["prior"][0]["distance"] > 3.0
@@ -395,7 +395,7 @@ def test_a_prior_that_the_walk_contradicts_is_named(table, gait):
     assert "The walk contradicts the prior of the leg length, 1.100 ± 0.010 m, by " in text
 
 
-def test_both_motions_are_where_the_walk_was(from_angles, transient):
+def test_measured_and_identified_motion_follow_the_walk(from_angles, transient):
     walk = transient.groups["trajectory"]
     for name in ("identified_motion", "measured_motion"):
         motion = from_angles.groups[name]
@@ -407,7 +407,7 @@ def test_both_motions_are_where_the_walk_was(from_angles, transient):
         assert motion["foot_height_m"].min() > -2e-3
 
 
-def test_the_page_overlays_the_measured_walk_on_the_identified_one(from_angles):
+def test_page_overlays_the_measured_and_the_identified_walk(from_angles):
     (player,) = (
         block
         for block in section(Results(load(Path("paper"), ()).config, {"identify": from_angles})).blocks
@@ -425,13 +425,13 @@ def test_steps_alone_are_not_overlaid(identified):
     assert not any(isinstance(block, Player) for block in part.blocks)
 
 
-def test_worst_combinations_spread_as_the_covariance(identified):
+def test_worst_combinations_reproduce_the_covariance(identified):
     moves = identified.groups["worst"]["moves"]
     # of two parameters, both combinations are the whole covariance
     assert np.allclose(moves.T @ moves, identified.groups["covariance"]["covariance"], rtol=1e-9)
 
 
-def test_the_noise_is_at_least_the_rounding_of_the_file(tmp_path, gait):
+def test_noise_is_at_least_the_rounding_of_the_file(tmp_path, gait):
     path = tmp_path / "stopwatch.csv"
     path.write_text("T [ms]\n" + "\n".join(["730", "740", "730", "740", "730", "740"]))
     changes = ask(path, "identify.columns={period_s: T}", "identify.units={time: ms}", "identify.fit={slope_deg: null}")
@@ -463,14 +463,14 @@ class Counting(Silent):
         self.phases[-1][2] += n
 
 
-def test_each_fit_shows_its_rounds(table, gait):
+def test_each_fit_lists_its_rounds(table, gait):
     progress = Counting()
     identify.run(taken(*ask(table, "identify.fit={slope_deg: null}", "identify.starts=2")), gait, progress)
     assert [label for label, _, _ in progress.phases] == ["rigid model, start 1 of 2", "rigid model, start 2 of 2"]
     assert all(0 < done <= total for _, total, done in progress.phases)
 
 
-def test_an_exhausted_budget_is_no_answer_and_keeps_the_best_so_far(table, gait):
+def test_exhausted_fit_budget_is_no_answer_but_keeps_the_best_fit(table, gait):
     changes = ask(table, "identify.fit={slope_deg: null}", "slope_deg=1.3", "identify.max_walks=1")
     with pytest.raises(NoAnswer) as caught:
         identify.run(taken(*changes), gait, Silent())
@@ -478,7 +478,7 @@ def test_an_exhausted_budget_is_no_answer_and_keeps_the_best_so_far(table, gait)
     assert caught.value.partial.summary["models"][0]["fit"] == "not-converged"
 
 
-def test_the_answer_gives_the_reasons_for_doubt_and_still_uses_the_estimates(table, gait):
+def test_doubts_are_listed_and_the_estimates_still_used(table, gait):
     changes = ask(table, "identify.fit={slope_deg: null}", "identify.prior={walker.leg_length_m: [1.1, 0.01]}")
     summary = identify.run(taken(*changes), gait, Silent()).summary
     assert summary["models"][0]["fit"] == "fits-but"

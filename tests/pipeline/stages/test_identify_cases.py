@@ -15,7 +15,7 @@ def identify(name, fit, level, **options):
     return walkerlab.identify(DOCS / "downloads" / name, "paper", fit, level=level, **options).summary
 
 
-def test_the_rigid_model_fits_the_film_with_a_hip_too_light():
+def test_rigid_model_fits_the_film_with_too_light_a_hip():
     prior = {"walker.leg_length_m": [1.0, 0.001]}
     fit = ["slope_deg", "walker.hip_mass_kg"]
     summary = identify("film.csv", fit, "angles", prior=prior, nuisance=["clock_rate"])
@@ -56,7 +56,7 @@ def stated_like(sentence):
         ),
     ],
 )
-def test_no_walker_explains_a_person_or_the_papers_tables(name, level, fit):
+def test_no_walker_fits_a_person_or_the_tables_of_the_paper(name, level, fit):
     summary = identify(name, fit, level)
     verdict = summary["models"][0]
     assert verdict["fit"] == "misfit"
@@ -65,11 +65,11 @@ def test_no_walker_explains_a_person_or_the_papers_tables(name, level, fit):
     )
 
 
-def test_the_person_takes_a_step_of_six_tenths_of_a_second():
+def test_steps_of_the_person_take_six_tenths_of_a_second():
     walk = walkerlab.read_walk(DOCS / "downloads" / "treadmill.csv")
     assert walk.summary["steps"] == 3
     assert walk.summary["step_periods_s"] == pytest.approx([0.597] * 3, abs=0.02)
 
 
-def test_the_page_repeats_the_answer_word_for_word():
+def test_page_repeats_the_answer_word_for_word():
     assert len(re.findall(r"No choice of slope_deg", PAGE)) == 2

@@ -21,7 +21,7 @@ LABELS = {
 
 
 @pytest.mark.parametrize("labels", LABELS.values(), ids=LABELS)
-def test_a_name_that_ends_in_a_unit_ends_in_its_own(labels):
+def test_unit_suffix_of_a_name_agrees_with_its_unit(labels):
     assert labels
     for field, label in labels.items():
         assert unit_by_name(label.name or field) in ("1", label.unit)
@@ -35,7 +35,7 @@ def test_a_name_that_ends_in_a_unit_ends_in_its_own(labels):
         ("dissipated_J.friction", "J"), ("gaits.0.period_s", "s"), ("bodies_kg.height_m", "m"),
     ],
 )  # fmt: skip
-def test_the_longest_ending_that_is_a_unit_tells_it(name, unit):
+def test_unit_is_read_from_the_longest_matching_suffix(name, unit):
     assert unit_by_name(name) == unit
 
 
@@ -43,14 +43,14 @@ def test_the_longest_ending_that_is_a_unit_tells_it(name, unit):
     ("name", "label"),
     [("walker.thigh.mass_kg", "thigh mass"), ("work_per_step_J.hip_torque", "work per step hip torque"), ("s", "s")],
 )
-def test_an_axis_label_names_no_unit(name, label):
+def test_axis_labels_contain_no_unit(name, label):
     assert axis_label(name) == label
 
 
 @pytest.mark.parametrize(
     ("stage", "name", "parts"), [("fixedpoint", "work_per_step_J", 5), ("contact-sim", "dissipated_J", 3)]
 )
-def test_every_part_of_an_energy_in_a_sweep_is_in_joules(stage, name, parts, tmp_path):
+def test_parts_of_an_energy_in_a_sweep_are_in_joules(stage, name, parts, tmp_path):
     swept = walkerlab.sweep(stage, {"slope_deg": [1.0]}, set={"strides": 1}, runs=tmp_path, jobs=1)
     units = [swept[key].attrs["units"] for key in swept if key.startswith(f"{name}.")]
     assert units == ["J"] * parts

@@ -31,7 +31,7 @@ def walk(stage, *sets, **options):
 @pytest.mark.parametrize(
     ("stage", "model", "keys"), [("simulate", "rigid", KEYS), ("contact-sim", "contact", KEYS | OF_FEET)]
 )
-def test_the_error_is_of_the_size_of_that_against_a_far_tighter_walk(stage, model, keys):
+def test_error_estimate_agrees_with_a_far_tighter_walk(stage, model, keys):
     loose = walk(stage, f"solver.{model}.rtol=1e-4", f"solver.{model}.atol=1e-6", "outputs=[]", "strides=2")
     right = walk(stage, f"solver.{model}.rtol=1e-10", f"solver.{model}.atol=1e-12", "outputs=[]", "strides=2")
     error = loose["numerical_error"]
@@ -45,7 +45,7 @@ def test_the_error_is_of_the_size_of_that_against_a_far_tighter_walk(stage, mode
         assert right["numerical_error"][key] < 1e-3 * true
 
 
-def test_the_error_of_a_hip_torques_cost_is_of_the_size_of_that_against_a_far_tighter_walk():
+def test_error_estimate_of_a_hip_torque_cost_agrees_with_a_far_tighter_walk():
     driven = ("walker.hip.torque_N_m=0.3", "outputs=[]", "strides=2")
     loose = walk("simulate", "solver.rigid.rtol=1e-4", "solver.rigid.atol=1e-6", *driven)
     right = walk("simulate", "solver.rigid.rtol=1e-10", "solver.rigid.atol=1e-12", *driven)
@@ -55,7 +55,7 @@ def test_the_error_of_a_hip_torques_cost_is_of_the_size_of_that_against_a_far_ti
     assert "cost_of_transport" not in walk("simulate", "outputs=[]", "strides=2")["numerical_error"]
 
 
-def test_tolerances_that_cannot_be_a_hundred_times_tighter_are_ten_times_tighter_or_give_way_to_another_method():
+def test_second_walk_falls_back_to_a_smaller_factor_or_another_method():
     assert [bound.ge for bound in SolverSettings.model_fields["rtol"].metadata if isinstance(bound, Ge)] == [LEAST_RTOL]
     usual, by = tightened(Tolerances("dop853", 1e-12, 1e-12, 1))
     assert (usual.rtol, usual.atol, by) == (pytest.approx(1e-14), 1e-14, "a hundred times tighter tolerances")
@@ -66,7 +66,7 @@ def test_tolerances_that_cannot_be_a_hundred_times_tighter_are_ten_times_tighter
     assert tightened(Tolerances("radau5", LEAST_RTOL, 1e-12, 1))[0].method == "dop853"
 
 
-def test_what_the_second_walk_changed_is_told_where_it_is_not_the_usual():
+def test_unusual_second_walk_is_reported():
     error = walk("simulate", "solver.rigid.rtol=1e-13", "solver.rigid.atol=1e-15", "outputs=[]")["numerical_error"]
     assert error["by"] == "ten times tighter tolerances"
     assert error["step_period_s"] < 1e-12
@@ -81,7 +81,7 @@ WALKED = {
 }
 
 
-def test_where_the_second_walk_ends_otherwise_there_is_a_reason_and_no_number():
+def test_second_walk_with_another_outcome_gives_a_reason_instead_of_an_error():
     fell = WALKED | {"outcome": "fell", "steps": 1}
     assert change(WALKED, fell) == {
         "reason": "with a hundred times tighter tolerances the walk ends differently: fell after 1 step"
@@ -89,7 +89,7 @@ def test_where_the_second_walk_ends_otherwise_there_is_a_reason_and_no_number():
     assert list(change(WALKED, WALKED | {"steps": 1}, by="another method, radau5")) == ["reason"]
 
 
-def test_the_largest_change_counts_wherever_it_is():
+def test_error_is_the_largest_change_anywhere():
     again = WALKED | {"step_periods_s": [0.7, 0.75], "step_lengths_m": [0.2, 0.3], "end_time_s": 1.45}
     expected = {"step_period_s": 0.05, "step_length_m": 0.1, "end_time_s": 0.05}
     found = change(WALKED, again)
@@ -101,7 +101,7 @@ def test_the_largest_change_counts_wherever_it_is():
     assert later == pytest.approx(expected | {"knee_strike_time_s": 0.3})
 
 
-def test_the_steps_of_a_cycle_are_compared_with_the_same_steps_whenever_they_come():
+def test_steps_of_a_cycle_are_matched_before_comparison():
     cycle, periods = [0.5, 0.9, 0.6, 0.8], {}
     for name, first in (("one", 0), ("other", 3)):
         periods[name] = [0.7, 0.7, *(cycle[(first + step) % 4] for step in range(16))]
@@ -113,7 +113,7 @@ def test_the_steps_of_a_cycle_are_compared_with_the_same_steps_whenever_they_com
 
 
 @pytest.mark.parametrize("stage", MODULES)
-def test_a_walk_without_a_step_has_an_end_alone(stage):
+def test_walk_without_a_step_has_only_an_end_error(stage):
     fallen = walk(stage, "start=[-0.1674, 0.1674, -0.4, -0.5]", "slope_rad=0", "contact.pad_pitch=0.3", "outputs=[]")
     assert fallen["outcome"] in ("fell", "off-pad")
     assert fallen["steps"] == 0
@@ -122,17 +122,17 @@ def test_a_walk_without_a_step_has_an_end_alone(stage):
     assert fallen["numerical_error"]["end_time_s"] < 1e-6
 
 
-def test_the_end_of_a_walk_of_all_steps_is_its_last_touch():
+def test_complete_walk_ends_at_its_last_touch():
     found = walk("simulate", "outputs=[]")
     assert found["end_time_s"] == found["touch_times_s"][-1]
 
 
 @pytest.mark.parametrize("stage", MODULES)
-def test_the_second_walk_can_be_left_out(stage):
+def test_second_walk_can_be_disabled(stage):
     assert "numerical_error" not in walk(stage, "outputs=[]", "strides=1", again=False)
 
 
-def test_a_walk_that_has_no_answer_is_not_walked_again(monkeypatch):
+def test_walk_without_an_answer_is_not_repeated(monkeypatch):
     monkeypatch.setattr(recorded_walk, "BUDGET_OF_A_STEP", 100)
     with pytest.raises(NoAnswer) as caught:
         walk("simulate")

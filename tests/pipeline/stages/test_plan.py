@@ -37,7 +37,7 @@ def content():
     return plan.run(taken(FIT, *SHORT, "plan.errors={slope_deg: 0.02, walker.leg_length_m: 1e-9}"), gait, Silent())
 
 
-def test_the_answer_names_the_simplest_measurement_and_the_steps_needed(content):
+def test_answer_names_the_simplest_measurement_and_the_steps_needed(content):
     text = " ".join(" ".join(str(line) for line in answer("plan", content.summary)).split())
     assert "The simplest measurement that determines every parameter in 6 steps: periods and lengths" in text
     assert "The slope to ± 0.02 degrees: " in text
@@ -46,7 +46,7 @@ def test_the_answer_names_the_simplest_measurement_and_the_steps_needed(content)
     assert "Assumed: periods measured to 0.002 s" in text
 
 
-def test_the_summary_is_json_with_a_row_for_each_measurement(content):
+def test_summary_is_json_with_a_row_per_measurement(content):
     json.dumps(content.summary, allow_nan=False)
     rows = content.summary["measurements"]
     assert len({(row["measurement"], row["start"]) for row in rows}) == len(rows) == 8
@@ -54,7 +54,7 @@ def test_the_summary_is_json_with_a_row_for_each_measurement(content):
     assert set(entry) == {"key", "standard_error", "unit", "wanted", "steps_needed"}
 
 
-def test_the_figure_and_the_page_show_the_errors(content):
+def test_figure_and_page_show_the_errors(content):
     figure = next(figure for figure in FIGURES if figure.stages == ("plan",))
     assert figure.why_left_out({"plan": content}, {}) is None
     assert figure.render({"plan": content}).png.startswith(b"\x89PNG")
@@ -74,12 +74,12 @@ def test_the_figure_and_the_page_show_the_errors(content):
         (("identify.fit={walker.colour: null}",), "walker.colour"),
     ],
 )
-def test_invalid_questions_are_refused(changes, message):
+def test_invalid_plans_are_rejected(changes, message):
     with pytest.raises(ConfigError, match=message):
         plan.refuse(taken(*changes))
 
 
-def test_an_error_that_is_not_positive_is_refused():
+def test_nonpositive_error_is_rejected():
     with pytest.raises(ConfigError, match="not a number above 0"):
         configured("plan.errors={slope_deg: -1}")
 

@@ -52,7 +52,7 @@ def written(folder, text, name="walk.csv"):
 
 
 @pytest.mark.parametrize(("model", "period", "length"), [("rigid", 1e-6, 1e-6), ("contact", 2e-4, 1e-3)])
-def test_a_walk_read_back_has_its_own_steps(tmp_path, model, period, length):
+def test_exported_walk_is_read_back_with_the_same_steps(tmp_path, model, period, length):
     """On compliant ground feet sink in and slip, so that touches by angles are a little later and shorter."""
     walk = simulated(model)
     read = walkerlab.read_walk(written(tmp_path, table(walk)))
@@ -64,7 +64,7 @@ def test_a_walk_read_back_has_its_own_steps(tmp_path, model, period, length):
     assert inside == pytest.approx(1.0, abs=0.02)
 
 
-def test_degrees_noise_drops_an_offset_and_swapped_legs_change_little(tmp_path):
+def test_degrees_noise_gaps_offsets_and_swapped_legs_change_little(tmp_path):
     walk = simulated("rigid")
     text = table(walk, math.degrees(1.0), "deg", noise=5e-4, every=2, delay=12.5, legs=(1, 0))
     read = walkerlab.read_walk(written(tmp_path, text))
@@ -75,7 +75,7 @@ def test_degrees_noise_drops_an_offset_and_swapped_legs_change_little(tmp_path):
 
 
 @pytest.mark.parametrize("delay", [100.0, 1.7e9])
-def test_a_clock_that_starts_anywhere_loses_no_step(tmp_path, delay):
+def test_start_of_the_clock_does_not_matter(tmp_path, delay):
     """Clocks of cameras count from when they were switched on, or from 1970."""
     lines = table(simulated("rigid"), every=4).splitlines()
     rows = [line.split(",", 1) for line in lines[1:]]
@@ -88,7 +88,7 @@ def test_a_clock_that_starts_anywhere_loses_no_step(tmp_path, delay):
 
 
 @pytest.mark.parametrize("factor", [1e-200, 1e9])
-def test_steps_of_an_impossible_duration_are_refused(tmp_path, factor):
+def test_steps_of_impossible_duration_are_rejected(tmp_path, factor):
     lines = table(simulated("rigid")).splitlines()
     rows = [line.split(",", 1) for line in lines[1:]]
     body = [f"{factor * float(time):.12g},{angles}" for time, angles in rows]
@@ -96,7 +96,7 @@ def test_steps_of_an_impossible_duration_are_refused(tmp_path, factor):
         walkerlab.read_walk(written(tmp_path, "\n".join([lines[0], *body])))
 
 
-def test_a_single_outlier_is_named_and_left_out(tmp_path):
+def test_single_outlier_is_reported_and_omitted(tmp_path):
     lines = table(simulated("rigid")).splitlines()
     time, _, other = lines[200].split(",")
     lines[200] = f"{time},3.0,{other}"
@@ -105,7 +105,7 @@ def test_a_single_outlier_is_named_and_left_out(tmp_path):
     assert read["doubts"] == [f"Angle 1 is off its course at sample 200 (time {float(time):.6g} s), which is left out."]
 
 
-def test_a_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(tmp_path):
+def test_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(tmp_path):
     walk = simulated("rigid")
     lines = table(walk).splitlines()
     late = [line for line in lines[1:] if float(line.split(",")[0]) > 0.3]
@@ -115,7 +115,7 @@ def test_a_recording_that_begins_within_a_step_starts_at_its_first_heel_strike(t
     assert read.summary["step_periods_s"] == pytest.approx(walk.summary["step_periods_s"][1:], abs=1e-6)
 
 
-def test_a_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
+def test_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
     folder = RunFolder(tmp_path, "paper")
     config = load(None, ("strides=2",)).config
     execute(config, "simulate", folder)
@@ -126,7 +126,7 @@ def test_a_stored_walk_of_another_run_is_read_with_its_energies(tmp_path):
         walkerlab.read_walk(folder.artifact("fixedpoint"))
 
 
-def test_mujocos_walk_of_an_exported_model_is_read_back(tmp_path):
+def test_walk_of_an_exported_model_in_mujoco_is_read_back(tmp_path):
     mujoco = pytest.importorskip("mujoco")
     path, *_ = walkerlab.export_model(tmp_path / "paper.xml", name="paper", slope_rad=0.0174, strides=3)
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -145,7 +145,7 @@ def test_mujocos_walk_of_an_exported_model_is_read_back(tmp_path):
     assert read.summary["step_lengths_m"][-1] == pytest.approx(0.36, abs=0.02)
 
 
-def test_a_comparison_has_the_recorded_walk_as_a_third_column(tmp_path):
+def test_comparison_shows_the_recorded_walk_in_a_third_column(tmp_path):
     path = written(tmp_path, table(simulated("rigid")))
     config = load(None, ("strides=2", f"recording.file={json.dumps(str(path))}", "recording.name=mine")).config
     compared = answer_in_memory(config, "compare", MEMORY)
@@ -162,7 +162,7 @@ def test_a_comparison_has_the_recorded_walk_as_a_third_column(tmp_path):
     assert "mine: the last step takes 0.7036 s" in recorded_words(summary)
 
 
-def test_figures_draw_the_recorded_walk_under_its_name(tmp_path):
+def test_figures_label_the_recorded_walk_with_its_name(tmp_path):
     path = written(tmp_path, table(simulated("rigid")))
     config = load(None, ("strides=2", f"recording.file={json.dumps(str(path))}", "recording.name=mine")).config
     folder = RunFolder(tmp_path / "runs", "drawn")
@@ -174,7 +174,7 @@ def test_figures_draw_the_recorded_walk_under_its_name(tmp_path):
         assert "mine" in (folder.path / "figures" / f"figure-{number}.svg").read_text(encoding="utf-8")
 
 
-def test_a_changed_file_makes_the_result_stale_and_the_same_content_does_not(tmp_path):
+def test_only_changed_content_makes_the_result_stale(tmp_path):
     path = written(tmp_path, table(simulated("rigid")))
     config = load(None, (f"recording.file={json.dumps(str(path))}",)).config
     folder = RunFolder(tmp_path / "runs", "recorded")
@@ -193,7 +193,7 @@ def test_a_changed_file_makes_the_result_stale_and_the_same_content_does_not(tmp
         (0.9, 1.7, "step 2 has no sample"),  # over a whole heel strike, so that two steps would be one
     ],
 )
-def test_missing_rows_are_an_error_that_says_where(tmp_path, begin, end, why):
+def test_missing_rows_are_an_error_with_their_position(tmp_path, begin, end, why):
     head, *rows = table(simulated("rigid")).splitlines()
     kept = [row for row in rows if not begin < float(row.split(",")[0]) < end]
     with pytest.raises(ConfigError, match=why) as refusal:
@@ -201,7 +201,7 @@ def test_missing_rows_are_an_error_that_says_where(tmp_path, begin, end, why):
     assert "8 samples per step" in refusal.value.advice
 
 
-def test_a_few_missing_rows_and_a_last_time_that_jumps_change_nothing(tmp_path):
+def test_few_missing_rows_and_a_jump_of_the_last_time_are_harmless(tmp_path):
     head, *rows = table(simulated("rigid")).splitlines()
     kept = [row for row in rows if not 1.0 < float(row.split(",")[0]) < 1.05 and float(row.split(",")[0]) < 4.0]
     time, angles = kept[-1].split(",", 1)
@@ -210,7 +210,7 @@ def test_a_few_missing_rows_and_a_last_time_that_jumps_change_nothing(tmp_path):
     assert read.summary["step_periods_s"] == pytest.approx([0.703597] * read.summary["steps"], abs=1e-5)
 
 
-def test_a_recording_with_five_samples_a_step_is_refused(tmp_path):
+def test_recording_with_five_samples_per_step_is_rejected(tmp_path):
     """Its steps would come out wrong by several percent, its velocities by half."""
     trajectory = simulated("rigid").content["trajectory"]
     time = np.arange(0.0, 4.0, 0.15)
@@ -223,7 +223,7 @@ def test_a_recording_with_five_samples_a_step_is_refused(tmp_path):
         walkerlab.read_walk(written(tmp_path, "\n".join(rows)))
 
 
-def test_a_dense_recording_is_thinned(tmp_path):
+def test_dense_recording_is_thinned(tmp_path):
     trajectory = simulated("rigid").content["trajectory"]
     time = np.linspace(0.0, 4.0, 4001)
     angle = [np.interp(time, trajectory["time"], leg) for leg in trajectory["angle"].T]
@@ -258,19 +258,19 @@ def marker_recording(folder):
 LEGS = {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}
 
 
-def test_markers_of_a_c3d_file_are_a_walk(tmp_path):
+def test_c3d_markers_are_read_as_a_walk(tmp_path):
     read = walkerlab.read_walk(marker_recording(tmp_path), LEGS)
     assert read.summary["step_periods_s"] == pytest.approx([0.703597] * 5, abs=2e-4)
 
 
-def test_a_c3d_file_that_is_cut_is_refused(tmp_path):
+def test_truncated_c3d_file_is_rejected(tmp_path):
     path = marker_recording(tmp_path)
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(ConfigError, match=r"walk\.c3d is not a C3D file"):
         walkerlab.read_walk(path, LEGS)
 
 
-def test_a_c3d_file_that_ends_its_reader_in_a_segmentation_fault_is_refused(tmp_path):
+def test_c3d_file_that_crashes_its_reader_is_rejected(tmp_path):
     path = marker_recording(tmp_path)
     content = bytearray(path.read_bytes())
     content[600] = 255  # among the parameters; ezc3d 1.7.2 reads beyond their end
@@ -279,7 +279,7 @@ def test_a_c3d_file_that_ends_its_reader_in_a_segmentation_fault_is_refused(tmp_
         walkerlab.read_walk(path, LEGS)
 
 
-def test_a_recording_that_is_refused_stores_nothing(tmp_path):
+def test_rejected_recording_stores_nothing(tmp_path):
     path = written(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)\n0,0.1\n")
     config = load(None, (f"recording.file={json.dumps(str(path))}",)).config
     folder = RunFolder(tmp_path / "runs", "refused")
@@ -288,7 +288,7 @@ def test_a_recording_that_is_refused_stores_nothing(tmp_path):
     assert not list(folder.path.rglob("*.h5*"))
 
 
-def test_a_recording_is_refused_before_anything_is_computed(tmp_path):
+def test_bad_recording_is_rejected_before_anything_is_computed(tmp_path):
     path = written(tmp_path, "time (s),angle 1 (rad)\n0,0.1\n1,0.2\n")
     config = load(None, (f"recording.file={json.dumps(str(path))}",)).config
     folder = RunFolder(tmp_path / "runs", "refused")
@@ -308,7 +308,7 @@ class Notes(Silent):
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.05, 0.3])
-def test_noise_that_blurs_heel_strikes_is_named(tmp_path, noise):
+def test_noise_that_blurs_heel_strikes_is_reported(tmp_path, noise):
     """The amplitude of each leg is 0.2 rad; with noise of 0.05 rad periods of single steps vary by a tenth."""
     path = written(tmp_path, table(simulated("rigid"), noise=noise))
     config, notes = load(None, (f"recording.file={json.dumps(str(path))}",)).config, Notes()
@@ -322,7 +322,7 @@ def test_noise_that_blurs_heel_strikes_is_named(tmp_path, noise):
     assert float(re.search(r"amplitude of (\S+) rad", line)[1]) == pytest.approx(0.2, abs=0.05)
 
 
-def test_few_samples_are_not_taken_for_noise(tmp_path):
+def test_sparse_samples_are_not_mistaken_for_noise(tmp_path):
     lines = table(simulated("rigid")).splitlines()
     rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
     times = np.arange(0.0, rows[-1, 0], 0.08)
@@ -331,7 +331,7 @@ def test_few_samples_are_not_taken_for_noise(tmp_path):
     assert walkerlab.read_walk(written(tmp_path, text)).summary["doubts"] == []
 
 
-def test_what_is_not_used_of_a_recording_is_said_in_the_comparison(tmp_path):
+def test_comparison_lists_unused_parts_of_a_recording(tmp_path):
     lines = table(simulated("rigid")).splitlines()
     cells = ["kinetic_J (J)", *("" if n == 5 else "1" for n in range(len(lines) - 1))]
     path = written(tmp_path, "\n".join(f"{line},{cell}" for line, cell in zip(lines, cells, strict=True)))
@@ -349,7 +349,7 @@ def test_what_is_not_used_of_a_recording_is_said_in_the_comparison(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
-def test_a_named_pipe_is_refused_by_every_stage_that_reads_files(tmp_path):
+def test_every_stage_that_reads_files_rejects_a_named_pipe(tmp_path):
     os.mkfifo(tmp_path / "walk.csv")
     for name in ("walk.csv", "walk.h5"):
         if name == "walk.h5":
@@ -362,7 +362,7 @@ def test_a_named_pipe_is_refused_by_every_stage_that_reads_files(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a\0b.csv", "\ud800.csv"])
-def test_a_path_that_no_file_can_have_is_refused(name):
+def test_impossible_path_is_rejected(name):
     with pytest.raises(ConfigError, match=r"recording\.file: .* holds a character that no file can store"):
         walkerlab.read_walk(name)
 
@@ -417,7 +417,7 @@ def damaged(draw, lines):
     return "\n".join([head, *rows])
 
 
-def test_300_damaged_files_end_in_a_message_or_in_a_walk(tmp_path):
+def test_three_hundred_damaged_files_are_read_or_rejected(tmp_path):
     draw, lines = random.Random(44), table(simulated("rigid"), every=5).splitlines()
     refusals = []
     for number in range(300):

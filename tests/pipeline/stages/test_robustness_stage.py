@@ -61,7 +61,7 @@ def both():
     )
 
 
-def test_the_answer_has_the_fixed_keys(rigid, both):
+def test_answer_has_the_expected_keys(rigid, both):
     for summary in (rigid.summary, both.summary):
         json.dumps(summary, allow_nan=False)
         for name, keys in FIXED_KEYS.items():
@@ -72,7 +72,7 @@ def test_the_answer_has_the_fixed_keys(rigid, both):
     assert len(rigid.summary["gait_sensitivity_norm"]) == 6
 
 
-def test_both_models_stand_about_the_same(both):
+def test_both_models_survive_similar_disturbances(both):
     rigid, contact = both.summary["largest_step"]
     first, second = (row["value"] for row in both.summary["gait_sensitivity_norm"][::6])
     assert contact["down_m"] == pytest.approx(rigid["down_m"], rel=0.2)
@@ -81,7 +81,7 @@ def test_both_models_stand_about_the_same(both):
     assert pushes[1]["forward_N_s"] == pytest.approx(pushes[0]["forward_N_s"], rel=0.2)
 
 
-def test_a_slope_in_degrees_is_differentiated_by_degrees(rigid):
+def test_derivative_by_a_slope_in_degrees_is_per_degree(rigid):
     found = {(row["of"], row["to"]): row for row in rigid.summary["sensitivity"]}
     one = found["step_length_m", "slope_deg"]
     assert one["unit"] == "m per deg"
@@ -93,14 +93,14 @@ def said_of(summary):
     return " ".join("\n".join(answer("robustness", summary)).replace("\N{NO-BREAK SPACE}", " ").split())
 
 
-def test_a_builder_understands_the_answer(rigid):
+def test_robustness_answer_is_in_plain_words(rigid):
     said = said_of(rigid.summary)
     assert "still takes 50 steps after a step down of 14.37 mm or up of 5.977 mm" in said
     assert "On ground with 2 mm (s.d.) roughness the rigid model takes" in said
     assert "Most effective change (rigid model): decrease walker.hip_mass_kg by 1 %" in said
 
 
-def test_what_to_change_is_a_number_of_the_walker_that_rounding_has_not_eaten(rigid):
+def test_advice_names_a_walker_parameter_with_a_resolved_effect(rigid):
     """Neither gravity, nor what has no effect."""
     row = next(row for row in rigid.summary["sensitivity"] if row["of"] == "gait_sensitivity_norm_scaled")
     others = [row | {"to": "gravity_m_s2", "relative": -9.0}, row | {"to": "walker.x", "why": "lost in rounding"}]
@@ -110,7 +110,7 @@ def test_what_to_change_is_a_number_of_the_walker_that_rounding_has_not_eaten(ri
     assert "Most effective change" not in said_of({**rigid.summary, "sensitivity": others})
 
 
-def test_a_longer_leg_does_not_win_by_the_dimension_of_the_norm():
+def test_scaled_norm_does_not_favour_longer_legs():
     """All lengths together scale the walker, which leaves the dimensionless norm as it is; keys are the config's."""
     found = run("slope-3deg", "robustness.model=rigid", "robustness.roughness_m=[]", "robustness.steps=1")
     shares = {row["to"]: row.get("relative") for row in found.summary["sensitivity"] if row["of"] == SCALED}
@@ -128,7 +128,7 @@ def test_a_longer_leg_does_not_win_by_the_dimension_of_the_norm():
     assert "push_off.impulse_N_s" in shown["Parameters that are zero"]
 
 
-def test_a_push_says_whether_the_ground_then_pushes(rigid, both):
+def test_push_reports_whether_the_ground_still_pushes(rigid, both):
     """By the force on all masses: their weight and what accelerates them, along the walk that follows the push."""
     (push,) = rigid.summary["largest_push"]
     assert push["forward_normal_impulse_N_s"] > 0.0 > push["backward_normal_impulse_N_s"]
@@ -144,7 +144,7 @@ def test_a_push_says_whether_the_ground_then_pushes(rigid, both):
     assert {value for key, value in both.summary["largest_push"][1].items() if "normal" in key} == {None}
 
 
-def test_what_moves_the_gait_is_ranked_over_both_models(both):
+def test_parameters_are_ranked_over_both_models(both):
     lines = [line.split() for line in further_tables("robustness", both.summary) if " slope_" in line]
     shares = [abs(float(line[-1].replace("\N{MINUS SIGN}", "-"))) for line in lines]
     assert {line[0] for line in lines} == {"rigid", "contact"}
@@ -152,14 +152,14 @@ def test_what_moves_the_gait_is_ranked_over_both_models(both):
     assert shares == sorted(shares, reverse=True)
 
 
-def test_large_means_are_told_to_the_digits_that_mean_something(rigid):
+def test_large_means_are_printed_to_significant_digits(rigid):
     one = rigid.summary["rough_ground"][0] | {"mean_steps": 492652.3, "standard_error": 348357.1, "method": "censored"}
     assert "takes 490,000 ± 350,000 steps on average before falling." in said_of(
         {**rigid.summary, "rough_ground": [one]}
     )
 
 
-def test_walks_are_the_same_for_any_number_of_processes_and_after_an_interruption(rigid, tmp_path):
+def test_robustness_walks_do_not_depend_on_processes_or_interruptions(rigid, tmp_path):
     assert run("slope-3deg", "robustness.model=rigid", *FEW, jobs=3).summary == rigid.summary
     kept = Checkpoint(tmp_path / "parts", "key")
     run("slope-3deg", "robustness.model=rigid", *FEW, checkpoint=kept)
@@ -168,7 +168,7 @@ def test_walks_are_the_same_for_any_number_of_processes_and_after_an_interruptio
     assert run("slope-3deg", "robustness.model=rigid", *FEW, checkpoint=again).summary == rigid.summary
 
 
-def test_a_number_that_no_walker_beside_has_is_told_with_the_reason():
+def test_parameter_without_valid_neighbours_is_reported_with_the_reason():
     """Legs of next to no mass follow no torque of the usual step."""
     found = run("kuo", "robustness.to=[walker.hip.torque_N_m]", "robustness.roughness_m=[]", "robustness.steps=1")
     rows = found.summary["sensitivity"]
@@ -176,7 +176,7 @@ def test_a_number_that_no_walker_beside_has_is_told_with_the_reason():
     assert all(row["value"] is None and row["why"] == robustness.NONE_BESIDE.why for row in rows)
 
 
-def test_gradients_are_the_same_for_any_number_of_processes(rigid):
+def test_gradients_do_not_depend_on_the_number_of_processes(rigid):
     asked = only(load(Path("slope-3deg"), ("robustness.model=rigid",)).config, PIPELINE["robustness"].takes)
     gait = fixedpoint.run(asked, {}, Silent())
     subject, numbers = next(robustness.subjects(asked, {"fixedpoint": gait}, Silent())), rigid.summary["gaits"][0]
@@ -184,7 +184,7 @@ def test_gradients_are_the_same_for_any_number_of_processes(rigid):
     assert robustness.sensitivities(subject, keys, numbers, Silent(), jobs=2) == rigid.summary["sensitivity"]
 
 
-def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
+def test_unstable_gait_has_no_norm_but_other_results():
     with pytest.raises(NoAnswer, match="the gait of the rigid model is unstable") as raised:
         run("rigid-only", "slope_deg=4.6", *FEW)
     summary = raised.value.partial.summary
@@ -195,7 +195,7 @@ def test_an_unstable_gait_has_no_norm_and_says_so_with_what_there_is():
     assert {row["of"] for row in summary["sensitivity"]} >= {"period_s", "spectral_radius"}
 
 
-def test_a_derivative_that_does_not_exist_is_a_gap():
+def test_missing_derivative_is_a_gap():
     """Where multipliers meet the spectral radius has none."""
     rows = [
         {"of": "period_s", "to": "slope_rad", "value": 0.1},
@@ -215,23 +215,23 @@ def test_a_derivative_that_does_not_exist_is_a_gap():
         (("robustness.to=[push_off.duration_s]",), "does not affect the rigid or the contact model"),
     ],
 )
-def test_bad_questions_end_in_words(changes, said):
+def test_invalid_questions_are_rejected(changes, said):
     with pytest.raises(ConfigError, match=said):
         run("slope-3deg", *changes)
 
 
-def test_a_number_that_one_of_both_models_reads_is_answered_for_that_one():
+def test_parameter_of_one_model_is_answered_for_that_model():
     found = run("slope-3deg", "robustness.roughness_m=[]", "robustness.steps=1", "robustness.to=[contact.stiffness]")
     assert {row["model"] for row in found.summary["sensitivity"]} == {"contact"}
 
 
-def test_contact_is_not_asked_for_without_its_block():
+def test_contact_model_is_skipped_without_its_block():
     with pytest.raises(ConfigError, match="contact"):
         run("rigid-only", "robustness.model=both")
     assert {row["model"] for row in run("rigid-only", "slope_deg=3", *FEW).summary["gaits"]} == {"rigid"}
 
 
-def test_the_terminal_shows_two_tables_and_the_rest_on_request(both):
+def test_terminal_shows_two_tables_and_the_rest_on_request(both):
     shown, rest = answer("robustness", both.summary), further_tables("robustness", both.summary)
     heads = [line for line in shown if line.startswith("model ")]
     others = [line for line in rest if line.startswith("model ")]
@@ -241,7 +241,7 @@ def test_the_terminal_shows_two_tables_and_the_rest_on_request(both):
     assert shown[-1].startswith(f"The option -v shows {len(others)} more table")
 
 
-def test_an_empty_list_of_parameters_leaves_the_derivatives_out():
+def test_empty_list_of_parameters_omits_the_derivatives():
     asked = ("robustness.model=rigid", "robustness.to=[]", "robustness.roughness_m=[]", "robustness.steps=3")
     summary = run("slope-3deg", *asked).summary
     assert summary["sensitivity"] == []

@@ -54,7 +54,7 @@ def paper():
     return run()
 
 
-def test_summary_has_the_fixed_keys(paper):
+def test_summary_has_the_expected_keys(paper):
     assert set(paper.summary) >= FIXED_KEYS
     json.dumps(paper.summary, allow_nan=False)
 
@@ -69,7 +69,7 @@ def test_five_strides_from_the_fixed_point_are_ten_equal_steps(paper):
     assert summary["energy_drift_J"] < 1e-8
 
 
-def test_mean_energy_as_printed_is_that_of_table_3():
+def test_mean_energy_of_printed_equations_is_that_of_table_3():
     assert run(equations="as-printed").summary["mean_energy_J"] == pytest.approx(150.142, abs=1e-3)
 
 
@@ -85,7 +85,7 @@ def test_steps_table_agrees_with_the_summary(paper):
     assert (steps["state_before"][:, [1, 0]] == steps["state_after"][:, :2]).all()
 
 
-def test_each_leg_moves_without_jumps_through_the_changes_of_roles(paper):
+def test_leg_angles_are_continuous_through_changes_of_roles(paper):
     trajectory = paper["trajectory"]
     time, angle, velocity = trajectory["time"], trajectory["angle"], trajectory["velocity"]
     assert (np.diff(time) > 0.0).all()
@@ -102,7 +102,7 @@ def test_leg_0_swings_first_and_the_legs_take_turns(paper):
     assert trajectory["velocity"][0].tolist() == paper.summary["start_state"][2:]
 
 
-def test_forces_and_energies_in_time_agree_with_the_summary(paper):
+def test_stored_forces_and_energies_agree_with_the_summary(paper):
     trajectory, summary = paper["trajectory"], paper.summary
     stands = trajectory["stance_leg"][:, None] == trajectory["leg"]
     normal, friction = trajectory["normal_force_N"], trajectory["friction_force_N"]
@@ -114,7 +114,7 @@ def test_forces_and_energies_in_time_agree_with_the_summary(paper):
     assert total == pytest.approx(summary["mean_energy_J"], rel=1e-9)
 
 
-def test_what_a_step_rolled_is_how_far_the_stance_foots_lowest_point_moved():
+def test_rolling_distance_is_the_travel_of_the_lowest_foot_point():
     config = load(Path("round-feet"), ["strides=2"]).config
     inputs = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
     walk = simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
@@ -125,7 +125,7 @@ def test_what_a_step_rolled_is_how_far_the_stance_foots_lowest_point_moved():
         assert rolled > 0.01
 
 
-def test_what_outputs_do_not_ask_for_is_left_out_and_said():
+def test_omitted_outputs_are_listed():
     none = run(outputs=[])
     assert set(none.groups) == {"steps"}
     whys = [entry["why"] for entry in none.summary["left_out"]]
@@ -143,7 +143,7 @@ def test_what_outputs_do_not_ask_for_is_left_out_and_said():
     assert none.summary["final_state"] == energies.summary["final_state"]
 
 
-def test_a_slope_without_a_gait_can_be_walked_from_a_given_start():
+def test_slope_without_a_gait_can_be_simulated_from_a_given_start():
     result = run(slope_rad=0.0, start=(-0.1674, *SLOW[1:]))
     assert result.summary["outcome"] == "fell"
     assert "hip" in result.summary["advice"]
@@ -153,20 +153,20 @@ def test_a_slope_without_a_gait_can_be_walked_from_a_given_start():
     assert set(result.groups) == {"trajectory"}
 
 
-def test_a_start_lying_down_is_rejected():
+def test_lying_start_is_rejected():
     result = run(start=(-1.5348, 1.5, 0.0, 0.0))
     assert result.summary["outcome"] == "rejected"
     assert set(result.groups) == set()
 
 
-def test_a_pulling_ground_is_said():
+def test_pulling_ground_is_reported():
     result = run(slope_rad=float(np.deg2rad(20.0)), strides=1, start=(-0.7935165, 0.0953848, 0.7024719, -1.8681666))
     assert result.summary["outcome"] == "lifted-off"
     assert result.summary["steps"] == 2
     assert result.summary["min_normal_force_N"] < 0.0
 
 
-def test_a_walk_says_what_no_ground_can_give():
+def test_walk_reports_forces_that_no_ground_can_give():
     """A pull, also of a walk that falls, and friction; nothing of a walk that keeps to both."""
     fast = run(contact=None, start=(-0.3, 0.25, -1.5, -2.6), strides=1).summary
     assert fast["min_normal_force_N"] < 0.0
@@ -180,7 +180,7 @@ def test_a_walk_says_what_no_ground_can_give():
 
 
 @pytest.mark.parametrize("heights", [(-0.03, 0.05), (0.0, 0.0)])
-def test_a_fall_on_uneven_ground_is_not_blamed_on_the_start(heights):
+def test_fall_on_uneven_ground_is_not_blamed_on_the_start(heights):
     uneven = any(heights)
     start = "fixed-point" if uneven else SLOW
     walk = run(contact=None, start=start, ground={"heights_m": heights}, strides=2).summary
@@ -189,14 +189,14 @@ def test_a_fall_on_uneven_ground_is_not_blamed_on_the_start(heights):
     assert ("start nearer to a gait" in walk["advice"]) != uneven
 
 
-def test_where_the_ground_would_have_to_pull_all_along_there_is_no_friction_ratio():
+def test_friction_ratio_is_missing_if_the_ground_always_pulls():
     summary = run(start=(-0.2022, 0.1674, -20.0, -20.0), strides=1).summary
     assert summary["min_normal_force_N"] < 0.0
     assert summary["max_friction_ratio"] is None
     json.dumps(summary, allow_nan=False)
 
 
-def test_an_exhausted_budget_is_no_answer_with_what_was_walked(monkeypatch):
+def test_exhausted_budget_is_no_answer_but_keeps_the_partial_walk(monkeypatch):
     monkeypatch.setattr(recorded_walk, "BUDGET_OF_A_STEP", 100)
     with pytest.raises(NoAnswer, match=r"budget-exhausted after [1-9] steps") as caught:
         run(start=GIVEN)
@@ -204,12 +204,12 @@ def test_an_exhausted_budget_is_no_answer_with_what_was_walked(monkeypatch):
     assert caught.value.partial.summary["steps"] > 0
 
 
-def test_another_method_walks_the_same_way(paper):
+def test_other_method_walks_the_same_steps(paper):
     other = run(solver={"rigid": {"method": "scipy-dop853", "rtol": 1e-10, "atol": 1e-12}})
     assert other.summary["final_state"] == pytest.approx(paper.summary["final_state"], abs=1e-8)
 
 
-def test_a_long_walk_needs_memory_for_its_steps_only():
+def test_long_walk_needs_memory_only_for_its_steps():
     inputs = {"fixedpoint": fixedpoint.run(only(Config(), PIPELINE["fixedpoint"].takes), {}, Silent())}
     config = only(Config(strides=2000, outputs=()), PIPELINE["simulate"].takes)
     tracemalloc.start()
@@ -224,7 +224,7 @@ def test_a_long_walk_needs_memory_for_its_steps_only():
     assert peak < 5 * table
 
 
-def test_a_start_in_mid_step_is_walked_as_it_is():
+def test_mid_step_start_is_simulated_unchanged():
     summary = run(slope_rad=0.0525, start={"instant": "mid-step", "state": [0.0, 0.0, 2.0, -0.4]}).summary
     assert summary["outcome"] == "walked"
     assert summary["step_periods_s"][:3] == pytest.approx([0.417227, 0.747143, 0.722175], abs=1e-6)
@@ -232,7 +232,7 @@ def test_a_start_in_mid_step_is_walked_as_it_is():
 
 
 @pytest.mark.parametrize("name", ["paper", "torso", "kneed-round-feet"])
-def test_a_walk_goes_on_the_same_way_from_any_of_its_states_in_mid_step(name):
+def test_walk_continues_equally_from_any_mid_step_state(name):
     config = load(Path(name), ["strides=2"]).config
     gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
     scene = rigid_scene(config, Footholds(), ("states",))
@@ -249,7 +249,7 @@ def test_a_walk_goes_on_the_same_way_from_any_of_its_states_in_mid_step(name):
             assert np.isnan(rest.knee_strike_time_s[0])
 
 
-def test_a_start_in_mid_step_on_uneven_ground_is_judged_by_its_first_step():
+def test_mid_step_start_on_uneven_ground_is_judged_by_its_first_step():
     midway = {"instant": "mid-step", "state": [0.0, 0.0, 2.0, -0.4]}
     summary = run(slope_rad=0.0525, start=midway, ground={"heights_m": [0.0, -0.001, 0.001]}).summary
     assert summary["outcome"] == "walked"
@@ -258,7 +258,7 @@ def test_a_start_in_mid_step_on_uneven_ground_is_judged_by_its_first_step():
 SIMPLEST = {"type": "compass", "leg_length_m": 1.0, "foot_to_mass_m": 1e-9, "leg_mass_kg": 1e-9, "hip_mass_kg": 1.0}
 
 
-def test_a_walk_that_leaves_an_unstable_gait_says_so_and_shows_the_cycle_in_full_digits():
+def test_walk_that_leaves_an_unstable_gait_says_so():
     summary = run(
         walker=SIMPLEST | {"foot_radius_m": 0.0},
         gravity_m_s2=1.0,
@@ -282,7 +282,7 @@ def test_a_walk_that_leaves_an_unstable_gait_says_so_and_shows_the_cycle_in_full
     assert "In the end it repeats every 4 steps" in said
 
 
-def test_a_walk_that_settles_on_a_gait_of_two_steps_says_that_it_alternates():
+def test_walk_settling_on_a_two_step_gait_is_reported_as_alternating():
     summary = run(slope_rad=math.radians(4.7), strides=150, outputs=[]).summary
     assert summary["repeats_after"] == 2
     said = " ".join(answer("simulate", summary)[1:3])
@@ -291,12 +291,12 @@ def test_a_walk_that_settles_on_a_gait_of_two_steps_says_that_it_alternates():
     )
 
 
-def test_a_walk_that_has_just_settled_shows_the_steps_between_which_it_alternates():
+def test_alternating_walk_shows_both_of_its_steps():
     # the second walk, at tighter tolerances, still leaves the gait
     summary = run(slope_rad=math.radians(4.7), strides=60, outputs=[]).summary
     assert "between steps of 0.787082 and 0.715713 s" in " ".join(answer("simulate", summary))
 
 
-def test_a_walk_on_a_stable_gait_leaves_none_and_repeats_every_step(paper):
+def test_walk_on_a_stable_gait_repeats_every_step(paper):
     assert (paper.summary["repeats_after"], paper.summary["leaves_gait_at"]) == (1, None)
     assert "In the end" not in " ".join(answer("simulate", paper.summary))

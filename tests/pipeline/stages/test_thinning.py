@@ -16,12 +16,12 @@ def walk(steps, per_step=50):
     return Samples(time, state, step, np.zeros(time.size, bool)), ends
 
 
-def test_an_ordinary_walk_is_stored_whole():
+def test_short_walk_is_stored_completely():
     samples, ends = walk(FIRST_STEPS + LAST_STEPS)
     assert thinned(samples, ends, Silent()) is samples
 
 
-def test_of_a_long_walk_both_sides_of_every_heel_strike_are_stored():
+def test_thinned_walk_keeps_both_sides_of_every_heel_strike():
     samples, ends = walk(20_000)
     kept = thinned(samples, ends, Silent())
     assert np.isin(ends[:-1], kept.time_s).all()
@@ -29,7 +29,7 @@ def test_of_a_long_walk_both_sides_of_every_heel_strike_are_stored():
     assert kept.state[:, 0].tolist() == np.sin(kept.time_s).tolist()
 
 
-def test_beginning_and_end_are_whole_and_the_middle_is_bounded():
+def test_thinned_walk_has_complete_ends_and_a_bounded_middle():
     samples, ends = walk(20_000)
     kept = thinned(samples, ends, Silent())
     first, last = samples.time_s < FIRST_STEPS, samples.time_s >= ends.size - LAST_STEPS
@@ -38,7 +38,7 @@ def test_beginning_and_end_are_whole_and_the_middle_is_bounded():
     assert kept.time_s.size < samples.time_s.size / 8
 
 
-def test_it_is_told():
+def test_thinning_is_reported():
     told = []
     progress = Silent()
     progress.note = told.append

@@ -60,7 +60,7 @@ def contents(draw):
 
 @settings(max_examples=60, deadline=None)
 @given(content=contents())
-def test_what_is_read_is_what_was_written(content, tmp_path_factory):
+def test_artifact_survives_a_round_trip(content, tmp_path_factory):
     path = tmp_path_factory.mktemp("run") / "x.h5"
     identity = Identity("x", {"a": 1}, {}, "code")
     origin = begin(Config(), {})
@@ -72,7 +72,7 @@ def test_what_is_read_is_what_was_written(content, tmp_path_factory):
     assert (read.identity, read.provenance, read.complete, read.seal) == (identity, origin, True, written.seal)
 
 
-def test_every_part_of_a_content_comes_back(tmp_path, content, identity, origin):
+def test_every_part_of_a_content_survives_a_round_trip(tmp_path, content, identity, origin):
     artifact.write(tmp_path / "a.h5", replace(content, complete=False), identity, origin)
     read = artifact.read(tmp_path / "a.h5")
     walk, original = read["corrected/walk"], content["corrected/walk"]
@@ -130,7 +130,7 @@ def test_every_array_has_unit_name_and_dimension_scales(tmp_path, content, ident
             assert {"units", "long_name"} <= set(dataset.attrs), name
 
 
-def test_root_says_where_the_result_comes_from(tmp_path, content, identity, origin):
+def test_root_states_the_origin_of_the_result(tmp_path, content, identity, origin):
     artifact.write(tmp_path / "a.h5", content, identity, origin)
     with h5py.File(tmp_path / "a.h5") as file:
         root = {name: value.decode() if isinstance(value, bytes) else value for name, value in file.attrs.items()}
@@ -161,7 +161,7 @@ def in_turn(content, size):
     return artifact.InTurn(summary, group.attrs, coordinates, sorted(group.variables.items()), size)
 
 
-def test_variables_that_come_one_by_one_make_the_same_artifact(tmp_path, content, identity, origin):
+def test_writing_variables_one_by_one_gives_the_same_artifact(tmp_path, content, identity, origin):
     path, turn = tmp_path / "a.h5", in_turn(content, 10_000)
     artifact.write_in_turn(path, turn, identity, origin)
     whole = Content({"": content["corrected/walk"]}, turn.summary)
@@ -177,9 +177,7 @@ def test_variables_that_come_one_by_one_make_the_same_artifact(tmp_path, content
         np.testing.assert_array_equal(variable.values, found[""][name])
 
 
-def test_a_group_on_disk_is_looked_through_once_however_many_variables_are_read(
-    tmp_path, content, identity, origin, monkeypatch
-):
+def test_group_on_disk_is_scanned_once_for_many_variables(tmp_path, content, identity, origin, monkeypatch):
     path, looked = tmp_path / "a.h5", []
     artifact.write_in_turn(path, in_turn(content, 10_000), identity, origin)
     monkeypatch.setattr(hdf5, "names_of", lambda members, names_of=hdf5.names_of: looked.append(1) or names_of(members))
@@ -188,7 +186,7 @@ def test_a_group_on_disk_is_looked_through_once_however_many_variables_are_read(
     assert len(looked) == 1
 
 
-def test_a_writer_in_turn_that_fails_leaves_the_old_artifact(tmp_path, content, identity, origin):
+def test_failed_incremental_write_leaves_the_old_artifact(tmp_path, content, identity, origin):
     path = tmp_path / "a.h5"
     artifact.write(path, Content({}, {"x": 1}), identity, origin)
     before = path.read_bytes()
@@ -202,7 +200,7 @@ def test_a_writer_in_turn_that_fails_leaves_the_old_artifact(tmp_path, content, 
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_identical_content_has_an_identical_digest_in_another_process(content):
+def test_digest_is_the_same_in_another_process(content):
     folders = [Path(__file__).parent, Path(walkerlab.__file__).parent.parent]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, folders)), "PYTHONHASHSEED": "7"}
     done = subprocess.run([sys.executable, "-c", WRITE_ELSEWHERE], env=environment, capture_output=True, text=True)
@@ -230,7 +228,7 @@ def test_writing_again_replaces_and_leaves_nothing_behind(tmp_path, identity, or
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.h5"]
 
 
-def test_storage_error_says_what_and_what_to_do(tmp_path, content, identity, origin):
+def test_storage_error_has_a_message_and_advice(tmp_path, content, identity, origin):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(StorageError) as caught:
         artifact.write(tmp_path / "file" / "a.h5", content, identity, origin)

@@ -18,14 +18,14 @@ def path(tmp_path):
     return checkpoint.path
 
 
-def test_numbers_come_back_to_the_last_bit(path):
+def test_checkpointed_values_are_restored_bit_for_bit(path):
     kept = Checkpoint(path, "key").kept
     assert [number.hex() for number in kept["one"]] == [number.hex() for number in NUMBERS]
     assert list(kept) == ["one", "two"]
 
 
 @pytest.mark.parametrize("cut", range(1, 21))
-def test_a_last_line_that_was_cut_short_is_dropped_and_written_again(path, cut):
+def test_truncated_last_line_is_dropped_and_rewritten(path, cut):
     whole = path.read_bytes()
     path.write_bytes(whole[:-cut])
     checkpoint = Checkpoint(path, "key")
@@ -34,19 +34,19 @@ def test_a_last_line_that_was_cut_short_is_dropped_and_written_again(path, cut):
     assert path.read_bytes() == whole
 
 
-def test_what_comes_after_a_damaged_line_is_dropped(path):
+def test_lines_after_a_damaged_one_are_dropped(path):
     path.write_bytes(path.read_bytes().replace(b"0.1", b"0.2"))
     assert Checkpoint(path, "key").kept == {}
 
 
 @pytest.mark.parametrize("forged", [b"\n", b"x\n", line(3), line(["a"]), line(["a", ["b"]]), line({"a": 1, "b": 2})])
-def test_a_line_that_is_no_part_is_dropped(path, forged):
+def test_line_that_is_not_a_part_is_dropped(path, forged):
     with path.open("ab") as file:
         file.write(forged)
     assert list(Checkpoint(path, "key").kept) == ["one", "two"]
 
 
-def test_parts_of_another_key_are_left_until_the_first_new_one(path):
+def test_parts_of_another_key_are_kept_until_the_first_new_one(path):
     before = path.read_bytes()
     checkpoint = Checkpoint(path, "other")
     assert checkpoint.kept == {}
@@ -56,7 +56,7 @@ def test_parts_of_another_key_are_left_until_the_first_new_one(path):
     assert Checkpoint(path, "key").kept == {}
 
 
-def test_forgotten_parts_are_gone(path):
+def test_forgotten_parts_are_deleted(path):
     checkpoint = Checkpoint(path, "key")
     checkpoint.forget()
     assert not path.exists()
@@ -64,6 +64,6 @@ def test_forgotten_parts_are_gone(path):
     assert Checkpoint(path, "key").kept == {"one": [1.0]}
 
 
-def test_a_folder_that_is_gone_is_told(tmp_path):
+def test_missing_folder_is_reported(tmp_path):
     with pytest.raises(StorageError):
         Checkpoint(tmp_path / "nowhere" / "x.parts", "key").keep("one", [1.0])

@@ -29,7 +29,7 @@ class Stone:
 STONES = [Stone("flint", 1.5, 2, (0.1, 0.2), 0.01), Stone("chalk", None, None, (0.3, 0.4), 0.02, "lost")]
 
 
-def test_what_has_a_label_is_a_column_with_its_unit_and_meaning():
+def test_labelled_values_are_columns_with_unit_and_meaning():
     group = rows_group(STONES, labels_of(Stone), "stone", "number of the stone")
     said = {name: (one.dims, one.units, one.long_name) for name, one in group.variables.items()}
     assert said == {
@@ -47,21 +47,21 @@ def test_what_has_a_label_is_a_column_with_its_unit_and_meaning():
     assert group["place_m"].tolist() == [[0.1, 0.2], [0.3, 0.4]]
 
 
-def test_a_value_that_is_not_there_is_a_gap_or_what_its_label_has_instead():
+def test_missing_value_is_a_gap_or_the_substitute_of_its_label():
     stored = columns(STONES, labels_of(Stone), "stone")
     np.testing.assert_array_equal(stored["depth_m"].values, [1.5, np.nan])
     assert stored["bounces"].values.tolist() == [2, 0]
     assert [name for name, one in stored.items() if one.missing] == ["depth_m"]
 
 
-def test_rows_that_are_printed_are_stored_by_their_keys():
+def test_printed_rows_are_stored_under_their_keys():
     printed = [{"from": 1.0, "said": "a"}, {"from": 2.0, "said": "b"}]
     stored = columns(printed, {"from": Label("deg", "where it begins")}, "branch")
     assert list(stored) == ["from"]
     assert (stored["from"].units, stored["from"].values.tolist()) == ("deg", [1.0, 2.0])
 
 
-def test_complex_numbers_are_two_columns():
+def test_complex_numbers_become_two_columns():
     stored = real_and_imaginary("multiplier", [(1 + 2j, 3.0), (0.0, -1j)], ("gait", "multiplier"), "multiplier")
     assert {name: one.values.tolist() for name, one in stored.items()} == {
         "multiplier_real": [[1.0, 3.0], [0.0, 0.0]],

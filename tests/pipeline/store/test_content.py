@@ -14,7 +14,7 @@ def one(variable, **more):
     return Content({"group": Group({"length": variable})}, **more)
 
 
-def test_digest_is_that_of_the_meaning_not_of_the_order_it_was_built_in():
+def test_digest_does_not_depend_on_insertion_order():
     first = Group({"a": metres([1.0]), "b": metres([2.0])}, {"p": 1, "q": 2})
     second = Group({"b": metres([2.0]), "a": metres([1.0])}, {"q": 2, "p": 1})
     one_way = Content({"g": first, "h": first}, {"u": 1, "v": 2})
@@ -54,7 +54,7 @@ def test_digest_changes_with_every_value_and_label(changed):
     assert changed.digest() != one(metres([1.0, 2.0])).digest()
 
 
-def test_timings_are_outside_the_digest():
+def test_timings_do_not_affect_the_digest():
     def measured(seconds):
         walls = metres([seconds], timing=True)
         rows = [{"error": 1e-9, "wall_s": seconds, "compile_wall_s": seconds}]
@@ -63,12 +63,12 @@ def test_timings_are_outside_the_digest():
     assert measured(1.0).digest() == measured(2.0).digest()
 
 
-def test_a_number_that_is_no_timing_is_inside_the_digest_at_any_depth():
+def test_nested_values_other_than_timings_affect_the_digest():
     assert Content({}, {"rows": [{"error": 1}]}).digest() != Content({}, {"rows": [{"error": 2}]}).digest()
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_values_that_are_not_finite_are_refused(value):
+def test_nonfinite_values_are_rejected(value):
     with pytest.raises(ValueError, match="finite"):
         metres([1.0, value])
     with pytest.raises(ValueError, match="finite"):
@@ -77,20 +77,20 @@ def test_values_that_are_not_finite_are_refused(value):
         Group({}, {"drift": value})
 
 
-def test_a_gap_is_allowed_where_it_is_declared():
+def test_declared_gaps_are_allowed():
     assert np.isnan(metres([math.nan], missing=True).values).all()
 
 
 @pytest.mark.parametrize(
     "values", [np.array([1j]), np.array([object()]), np.array([2**63], dtype=np.uint64), np.array([b"bytes"])]
 )
-def test_values_that_could_not_be_read_back_are_refused(values):
+def test_unreadable_values_are_rejected(values):
     with pytest.raises(TypeError):
         metres(values)
 
 
 @pytest.mark.parametrize("text", ["cut\0short", "\ud800"])
-def test_text_that_could_not_be_read_back_is_refused(text):
+def test_unreadable_text_is_rejected(text):
     with pytest.raises(ValueError):
         metres(np.array([text], dtype=object))
     with pytest.raises(ValueError):
@@ -111,12 +111,12 @@ def test_labels_must_fit_the_values():
 
 
 @pytest.mark.parametrize("path", ["/absolute", "a//b", "a/../b", "a b", "é"])
-def test_paths_that_not_every_reader_takes_are_refused(path):
+def test_nonportable_paths_are_rejected(path):
     with pytest.raises(ValueError, match="name"):
         Content({path: Group({})})
 
 
-def test_a_group_and_an_array_may_not_share_a_name():
+def test_group_and_an_array_may_not_share_a_name():
     with pytest.raises(ValueError, match="group"):
         Content({"a": Group({"b": metres([1.0])}), "a/b": Group({})})
 
@@ -137,12 +137,12 @@ def test_summary_is_plain_json():
         Content({}, {"x": {1, 2}})
 
 
-def test_groups_on_the_way_to_others_are_there():
+def test_parent_groups_are_created():
     assert sorted(Content({"a/b/c": Group({})}).groups) == ["a", "a/b", "a/b/c"]
     assert Content({"a/b": Group({})}).digest() == Content({"a/b": Group({}), "a": Group({})}).digest()
 
 
 @pytest.mark.parametrize("values", [[1.0], [1], [True]])
-def test_a_number_without_a_unit_is_refused(values):
+def test_number_without_a_unit_is_rejected(values):
     with pytest.raises(ValueError, match="has no unit; use '1' for a dimensionless quantity"):
         Variable(np.array(values), ("x",), "", "how many")

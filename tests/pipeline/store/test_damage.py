@@ -41,14 +41,14 @@ def refusal(path, key) -> str:
     return verdict.reason
 
 
-def test_a_file_cut_short_anywhere_is_refused(path, identity):
+def test_truncated_file_is_rejected(path, identity):
     data = path.read_bytes()
     for length in sorted({0, 1, 8, 511, 2048, *range(0, len(data), 997), *range(len(data) - 90, len(data))}):
         path.write_bytes(data[:length])
         refusal(path, identity.key)
 
 
-def test_a_file_with_any_bit_flipped_is_refused(path, identity):
+def test_file_with_a_flipped_bit_is_rejected(path, identity):
     data = path.read_bytes()
     chooser = random.Random(20)
     for position in [0, 7, 8, *chooser.sample(range(len(data)), 300), len(data) - 1]:
@@ -58,7 +58,7 @@ def test_a_file_with_any_bit_flipped_is_refused(path, identity):
         refusal(path, identity.key)
 
 
-def test_a_file_that_was_edited_with_other_tools_is_refused(path, identity):
+def test_file_edited_with_other_tools_is_rejected(path, identity):
     with h5py.File(path, "r+") as file:
         file["corrected/walk/time"][1] = 0.25
     refusal(path, identity.key)
@@ -66,12 +66,12 @@ def test_a_file_that_was_edited_with_other_tools_is_refused(path, identity):
 
 @pytest.mark.parametrize("data", [b"", b"not HDF5 at all", b"\0" * 4096, b"\x89HDF\r\n\x1a\n" + b"\xff" * 4096])
 @pytest.mark.parametrize("seal", [sealed, bytes], ids=["sealed", "bare"])
-def test_a_file_that_is_no_hdf5_is_refused(path, identity, data, seal):
+def test_file_that_is_not_hdf5_is_rejected(path, identity, data, seal):
     path.write_bytes(seal(data))
     refusal(path, identity.key)
 
 
-def test_what_is_no_regular_file_is_refused_without_waiting_for_it(tmp_path, identity):
+def test_special_file_is_rejected_without_blocking(tmp_path, identity):
     (tmp_path / "folder").mkdir()
     refusal(tmp_path / "folder", identity.key)
     os.mkfifo(tmp_path / "pipe")
@@ -82,14 +82,14 @@ def test_what_is_no_regular_file_is_refused_without_waiting_for_it(tmp_path, ide
     refusal(tmp_path / "loop", identity.key)
 
 
-def test_a_file_of_ten_gigabytes_is_not_read(tmp_path, identity):
+def test_oversized_file_is_not_read(tmp_path, identity):
     path = tmp_path / "huge.h5"
     with path.open("wb") as file:
         file.truncate(10 << 30)
     assert "more than" in refusal(path, identity.key)
 
 
-def test_a_file_that_may_not_be_read_is_refused(path, identity, unprivileged):
+def test_file_without_read_permission_is_rejected(path, identity, unprivileged):
     path.chmod(0)
     with unprivileged():
         assert "cannot be read" in refusal(path, identity.key)
@@ -236,14 +236,14 @@ def attribute_taken_away(file):
         attribute_taken_away,
     ],
 )
-def test_a_forged_file_is_refused_even_under_a_right_seal(path, identity, alter):
+def test_forged_content_is_rejected_even_with_a_valid_seal(path, identity, alter):
     with h5py.File(path, "r+") as file:
         alter(file)
     path.write_bytes(sealed(path.read_bytes()))
     refusal(path, identity.key)
 
 
-def test_the_forger_who_changes_nothing_is_not_caught(path, identity):
+def test_resealing_unchanged_content_is_accepted(path, identity):
     """So that the test above refuses for what was altered and not for the altering."""
     with h5py.File(path, "r+"):
         pass
@@ -252,7 +252,7 @@ def test_the_forger_who_changes_nothing_is_not_caught(path, identity):
     assert artifact.check(path, identity.key).accepted
 
 
-def test_many_strings_that_share_one_long_text_are_not_read(path, identity):
+def test_strings_that_expand_too_much_are_not_read(path, identity):
     with h5py.File(path, "r+") as file:
         texts = file["corrected/walk"].create_dataset(
             "texts", data=["x" * 50_000, *["y"] * 4095], dtype=h5py.string_dtype()
@@ -266,7 +266,7 @@ def test_many_strings_that_share_one_long_text_are_not_read(path, identity):
 
 
 @pytest.mark.parametrize("version", [1, 10**6])
-def test_a_file_of_another_layout_is_outdated_and_not_damaged(path, identity, version):
+def test_file_of_another_layout_is_outdated_but_not_damaged(path, identity, version):
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = version
     path.write_bytes(sealed(path.read_bytes()))

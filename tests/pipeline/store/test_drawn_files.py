@@ -20,12 +20,12 @@ def drawn(folder):
     return Content({index.GROUP: index.index(folder.path, [folder.figures / "figure-02.svg"])})
 
 
-def test_files_that_are_as_they_were_written_pass(folder):
+def test_unchanged_files_pass(folder):
     assert index.broken_file(folder.path, drawn(folder)) is None
     assert index.broken_file(folder.path, Content()) is None
 
 
-def test_a_file_that_was_altered_or_taken_away_is_named(folder):
+def test_altered_or_missing_file_is_named(folder):
     content = drawn(folder)
     (folder.figures / "figure-02.svg").write_text("<svg>other</svg>")
     assert index.broken_file(folder.path, content) == "figures/figure-02.svg was altered"
@@ -39,7 +39,7 @@ def test_only_files_of_the_run_can_be_listed(folder, tmp_path):
         index.index(folder.path, [tmp_path / "elsewhere"])
 
 
-def test_clean_removes_what_was_made_and_nothing_else(folder, identity, origin):
+def test_clean_removes_only_generated_files(folder, identity, origin):
     artifact.write(folder.artifact("plot"), drawn(folder), identity, origin)
     folder.artifact("simulate").write_bytes(b"damaged")
     (folder.path / ".simulate.h5.12345678.tmp").touch()
@@ -48,7 +48,7 @@ def test_clean_removes_what_was_made_and_nothing_else(folder, identity, origin):
     assert left == ["figures", "notes.txt", "own.svg"]
 
 
-def test_clean_does_not_follow_a_list_out_of_the_run_folder(folder, identity, origin, tmp_path):
+def test_clean_does_not_leave_the_run_folder(folder, identity, origin, tmp_path):
     (tmp_path / "precious").write_text("not of this run")
     forged = index.index(tmp_path, [tmp_path / "precious"])
     forged["file"].setflags(write=True)
@@ -57,7 +57,7 @@ def test_clean_does_not_follow_a_list_out_of_the_run_folder(folder, identity, or
     assert files_of(folder, ["plot"]) == [folder.figures / "figure-02.svg", folder.artifact("plot")]
 
 
-def test_leftovers_are_sought_only_in_the_folders_of_a_run(tmp_path):
+def test_leftovers_are_searched_only_in_run_folders(tmp_path):
     strange = tmp_path / "photos" / ".notes.12345678.tmp"
     strange.parent.mkdir()
     strange.touch()

@@ -95,19 +95,19 @@ def test_read_only_folder_leaves_the_old_artifact(tmp_path, content, identity, o
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.h5"]
 
 
-def test_a_folder_that_is_gone_is_told(tmp_path):
+def test_missing_folder_is_reported(tmp_path):
     with pytest.raises(StorageError, match="there is no folder"):
         write_atomically(tmp_path / "gone" / "a", b"")
 
 
-def test_refusals_to_store_are_told_apart_from_other_failures(tmp_path):
+def test_storage_failures_are_distinguished_from_other_failures(tmp_path):
     with pytest.raises(StorageError, match="No space left"), drawing_into(tmp_path):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     with pytest.raises(FileNotFoundError), drawing_into(tmp_path):
         (tmp_path / "template that was not shipped").read_text()
 
 
-def test_only_temporary_files_are_left_over(tmp_path):
+def test_only_temporary_files_count_as_leftovers(tmp_path):
     (tmp_path / "figures").mkdir()
     kept = [tmp_path / "a.h5", tmp_path / "notes.tmp", tmp_path / ".hidden", tmp_path / "figures" / "figure-02.svg"]
     left = [tmp_path / ".a.h5.12345678.tmp", tmp_path / "figures" / ".figure-02.svg.12345678.tmp"]

@@ -41,7 +41,7 @@ def test_equal_identities_have_no_changes():
     assert changed_parts(OLD, OLD) == []
 
 
-def test_the_name_is_no_part_of_the_key():
+def test_name_is_not_part_of_the_key():
     assert Identity("simulate", SLICE, INPUTS, "code", 1).key == OLD.key
     assert len(OLD.key) == 64
 

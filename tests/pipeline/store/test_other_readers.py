@@ -106,7 +106,7 @@ def test_octave_loads_all_variables(stored, texts):
 
 
 @pytest.mark.skipif(not shutil.which("ncatted"), reason="NCO is not installed (apt-get install nco)")
-def test_nco_can_change_a_copy(stored, tmp_path):
+def test_nco_can_modify_a_copy(stored, tmp_path):
     copy = tmp_path / "copy.h5"
     shutil.copy(stored, copy)
     subprocess.run(["ncatted", "-O", "-h", "-a", "note,global,c,c,hello", copy], check=True, capture_output=True)
@@ -150,7 +150,7 @@ def in_layout_2(path):
     path.write_bytes(image + f"\nwalkerlab sha256 {hashlib.sha256(image).hexdigest()}\n".encode())
 
 
-def test_an_artifact_of_the_last_layout_is_read_but_outdated(tmp_path, texts, identity, origin):
+def test_artifact_of_the_previous_layout_is_readable_but_outdated(tmp_path, texts, identity, origin):
     older = replace(identity, schema_version=2)
     path = tmp_path / "a.h5"
     artifact.write(path, texts, older, origin)

@@ -11,20 +11,20 @@ from walkerlab.pipeline.store import provenance
 from walkerlab.pipeline.store.commit import FILE, IN_METADATA, commit_of_source
 
 
-def test_versions_are_those_of_the_libraries_that_are_imported():
+def test_versions_are_those_of_the_imported_libraries():
     versions = provenance.library_versions()
     for name in ("numpy", "scipy", "h5py", "pydantic"):
         assert versions[name] == importlib.import_module(name).__version__
 
 
 @pytest.mark.parametrize("name", ["paper", "rigid-only", "slope-3deg"])
-def test_stored_config_loads_as_the_same_config(name, tmp_path):
+def test_stored_config_loads_unchanged(name, tmp_path):
     original = load(Path(name)).config
     (tmp_path / "stored.yaml").write_text(provenance.begin(original, {}).config)
     assert load(tmp_path / "stored.yaml").config == original
 
 
-def test_a_result_records_seed_inputs_and_times():
+def test_result_records_seed_inputs_and_times():
     origin = provenance.begin(Config(seed=7), {"fixedpoint": "abc"}).until_now()
     assert origin.seed == 7
     assert origin.input_digests == {"fixedpoint": "abc"}
@@ -57,14 +57,14 @@ def test_commit_is_that_of_the_package_and_marks_changes(tmp_path, monkeypatch):
         git("commit", "--quiet", "--message", "changed")
 
 
-def test_an_installed_package_inside_somebodys_repository_has_no_commit(tmp_path, monkeypatch):
+def test_installed_package_inside_another_repository_has_no_commit(tmp_path, monkeypatch):
     subprocess.run(["git", "init", "--quiet"], cwd=tmp_path, check=True)
     installed = tmp_path / "site-packages" / "walkerlab" / "__init__.py"
     monkeypatch.setattr(walkerlab, "__file__", str(installed))
     assert provenance.git_commit() is None
 
 
-def test_an_installed_package_knows_the_commit_that_it_was_built_from(tmp_path, monkeypatch):
+def test_installed_package_records_its_commit(tmp_path, monkeypatch):
     package = tmp_path / "walkerlab"
     metadata = tmp_path / "walkerlab-0.1.0.dist-info"
     (metadata / IN_METADATA).parent.mkdir(parents=True)
@@ -77,7 +77,7 @@ def test_an_installed_package_knows_the_commit_that_it_was_built_from(tmp_path, 
     assert provenance.git_commit() is None
 
 
-def test_a_source_distribution_carries_the_commit_to_its_build(tmp_path):
+def test_source_distribution_passes_its_commit_to_the_build(tmp_path):
     assert commit_of_source(tmp_path) is None
     (tmp_path / FILE).write_text("abc123\n")
     assert commit_of_source(tmp_path) == "abc123"

@@ -38,26 +38,26 @@ def holder(folder):
         process.kill()
 
 
-def test_files_are_where_they_belong(folder):
+def test_run_folder_has_the_documented_layout(folder):
     assert folder.path == folder.runs_dir / "paper"
     assert folder.artifact("contact-sim") == folder.path / "contact-sim.h5"
     assert not folder.path.exists()
 
 
-def test_who_does_not_want_to_wait_is_refused(folder, holder):
+def test_locked_folder_is_an_error_without_waiting(folder, holder):
     with pytest.raises(LockedError) as caught, folder.locked(wait=False):
         pass
     assert caught.value.exit_code == 6
 
 
-def test_lock_dies_with_its_owner(folder, holder):
+def test_lock_is_released_when_its_process_dies(folder, holder):
     os.kill(holder.pid, signal.SIGKILL)
     holder.wait()
     with folder.locked(wait=False):
         pass
 
 
-def test_who_waits_is_told_so_and_gets_the_lock(folder, holder):
+def test_waiting_for_the_lock_is_reported_and_succeeds(folder, holder):
     said = []
 
     def say(text):
@@ -70,7 +70,7 @@ def test_who_waits_is_told_so_and_gets_the_lock(folder, holder):
     assert "waiting" in said[0]
 
 
-def test_a_folder_names_the_process_that_works_in_it(folder, holder):
+def test_folder_names_the_process_that_works_in_it(folder, holder):
     assert folder.worker().process == holder.pid
     (folder.path / ".worker.json").write_text("{}")
     assert folder.worker() is None
@@ -78,14 +78,14 @@ def test_a_folder_names_the_process_that_works_in_it(folder, holder):
         pass
 
 
-def test_lock_is_free_again_after_a_failure(folder):
+def test_lock_is_released_after_a_failure(folder):
     with pytest.raises(KeyboardInterrupt), folder.locked():
         raise KeyboardInterrupt
     with folder.locked(wait=False):
         pass
 
 
-def test_what_killed_writers_left_goes_under_the_lock(folder):
+def test_leftovers_of_killed_writers_are_deleted_under_the_lock(folder):
     folder.path.mkdir(parents=True)
     (folder.path / ".simulate.h5.12345678.tmp").touch()
     with folder.locked():
@@ -93,7 +93,7 @@ def test_what_killed_writers_left_goes_under_the_lock(folder):
     assert [entry.name for entry in folder.path.iterdir()] == [".lock"]
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path, unprivileged):
+def test_folder_that_cannot_be_created_is_reported(tmp_path, unprivileged):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(StorageError, match="could not be stored"), RunFolder(tmp_path / "file", "paper").locked():
         pass

@@ -12,7 +12,7 @@ def question(*over, **options):
     return build_sweep("fixedpoint", [axis_of_text(text) for text in over], **options)
 
 
-def test_a_range_has_both_ends_and_a_list_its_own_values():
+def test_range_includes_both_ends():
     grid = question("slope_deg=0.5:5:50", "contact.static_friction=[0.3,0.6,0.9]")
     slopes, frictions = grid.axes
     assert slopes.values == tuple(np.linspace(0.5, 5.0, 50).tolist())
@@ -23,19 +23,19 @@ def test_a_range_has_both_ends_and_a_list_its_own_values():
     assert grid.places(4) == (1, 1)
 
 
-def test_words_and_powers_are_values_too():
+def test_options_and_powers_are_valid_values():
     assert question("contact.terrain=[checkerboard, after-mid-swing]").axes[0].values[1] == "after-mid-swing"
     assert question("contact.stiffness=1e4:1e6:3:log").axes[0].values == pytest.approx((1e4, 1e5, 1e6), rel=1e-14)
 
 
-def test_a_range_of_whole_numbers_is_of_integers_where_the_key_is_one():
+def test_range_over_an_integer_key_has_integers():
     assert question("strides=2:4:3").axes[0].values == (2, 3, 4)
     assert all(isinstance(value, int) for value in question("strides=2:4:3").axes[0].values)
     assert question("slope_deg=2:4:3").axes[0].values == (2.0, 3.0, 4.0)
 
 
 @pytest.mark.parametrize("option", ["--show", "--against"])
-def test_a_quantity_that_a_stage_never_has_is_refused_before_anything_is_computed(option):
+def test_unknown_quantity_is_rejected_before_anything_is_computed(option):
     slopes = question("slope_deg=1:3:3")
     for name in ("froude", "slope_deg", "work_per_step_J.hip_torque", "gaits.1.period_s"):
         refuse_unrecorded(slopes, {f"{option} {name}": name})
@@ -52,7 +52,7 @@ def test_zip_pairs_values():
 
 
 @pytest.mark.parametrize("sampler", ["latin-hypercube", "sobol", "random"])
-def test_a_sample_lies_within_its_intervals_and_follows_from_its_seed(sampler):
+def test_sample_is_within_its_intervals_and_determined_by_its_seed(sampler):
     over = ("slope_deg=0.5:5", "contact.static_friction=[0.3, 0.6]")
     drawn = question(*over, sample=f"{sampler}:16", seed=3)
     slopes, frictions = (np.array(axis.values) for axis in drawn.axes)
@@ -64,12 +64,12 @@ def test_a_sample_lies_within_its_intervals_and_follows_from_its_seed(sampler):
     assert question(*over, sample=f"{sampler}:16", seed=4).axes != drawn.axes
 
 
-def test_a_latin_hypercube_has_one_point_in_each_layer():
+def test_latin_hypercube_has_one_point_in_each_layer():
     slopes = np.array(question("slope_deg=0:8", "walker.hip_mass_kg=1:9", sample="latin-hypercube:8").axes[0].values)
     assert sorted(np.floor(slopes)) == list(range(8))
 
 
-def test_parameters_are_named_by_the_last_key_unless_two_would_be_the_same():
+def test_parameters_have_short_names_unless_ambiguous():
     assert distinct_ends(["solver.rigid.rtol", "solver.contact.rtol", "slope_deg"]) == (
         "rigid.rtol",
         "contact.rtol",
@@ -77,7 +77,7 @@ def test_parameters_are_named_by_the_last_key_unless_two_would_be_the_same():
     )
 
 
-def test_a_sweep_over_nothing_is_shown_an_example():
+def test_sweep_without_parameters_shows_an_example():
     with pytest.raises(ConfigError) as refused:
         question()
     assert "`walkerlab sweep --over slope_deg=" in refused.value.advice
@@ -98,12 +98,12 @@ def test_a_sweep_over_nothing_is_shown_an_example():
         ("contact=[1]", "a block of keys"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_with_what_can(over, said):
+def test_invalid_sweeps_are_rejected_with_the_allowed_values(over, said):
     with pytest.raises(ConfigError, match=said):
         question(over)
 
 
-def test_no_parameter_one_twice_and_an_unknown_sampler_are_refused():
+def test_missing_repeated_parameters_and_unknown_samplers_are_rejected():
     with pytest.raises(ConfigError, match="no parameter"):
         question()
     with pytest.raises(ConfigError, match="given twice"):
@@ -112,7 +112,7 @@ def test_no_parameter_one_twice_and_an_unknown_sampler_are_refused():
         question("slope_deg=1:2", sample="dice:3")
 
 
-def test_a_parameter_has_the_unit_of_its_key_and_of_the_blocks_units():
+def test_parameter_has_the_unit_of_its_key():
     assert described(load().config, "walker.hip_mass_kg") == ("kg", "M_H, mass at the hip")
     assert described(load().config, "contact.stiffness")[0] == "N/mm^e"
     in_si = load(sets=["contact={units: si}"]).config
@@ -129,6 +129,6 @@ def test_a_parameter_has_the_unit_of_its_key_and_of_the_blocks_units():
         (["slope_deg=0.5:3"], {"sample": "sobol:1000000000"}),
     ],
 )
-def test_every_way_to_ask_for_too_many_points_is_refused_before_they_are_made(over, options):
+def test_too_many_points_are_rejected_before_they_are_built(over, options):
     with pytest.raises(ConfigError, match=r"0 points; allowed: up to 10000000 in one sweep"):
         question(*over, **options)

@@ -38,7 +38,7 @@ def opened(swept):
     return xr.open_dataset(swept.path, engine="h5netcdf")
 
 
-def test_every_number_of_the_stage_is_a_variable_over_the_parameters(toy):
+def test_every_value_of_the_stage_is_a_variable_over_the_parameters(toy):
     swept = toy.run("drop", GRAVITIES, "walker.hip_mass_kg=[1, 2]")
     assert (swept.summary["done"], swept.failed, swept.reused) == (10, 0, 0)
     with opened(swept) as dataset:
@@ -57,7 +57,7 @@ def test_every_number_of_the_stage_is_a_variable_over_the_parameters(toy):
         assert not [name for name in dataset if "wall_s" in name or "left_out" in name]
 
 
-def test_a_row_is_what_the_stage_says_for_that_config(toy):
+def test_row_equals_the_result_for_that_config(toy):
     swept = toy.run("roll", GRAVITIES, "strides=[2, 3]")
     config = toy.sweep("roll", GRAVITIES, "strides=[2, 3]").config(7)
     report = execute(config, "roll", RunFolder(toy.runs / "elsewhere", "one"), graph=toy.graph)
@@ -65,7 +65,7 @@ def test_a_row_is_what_the_stage_says_for_that_config(toy):
     assert set(swept.content[""]["outcome"].ravel()) == {"walked"}
 
 
-def test_points_without_an_answer_are_rows_that_say_why(toy):
+def test_points_without_an_answer_have_rows_with_the_reason(toy):
     swept = toy.run("drop", "slope_rad=[0.1, 0.35, 1.2]")
     assert (swept.summary["done"], swept.failed) == (3, 0)
     with opened(swept) as dataset:
@@ -86,7 +86,7 @@ def plain(sentences):
     return [" ".join(sentence.split()) for sentence in sentences]
 
 
-def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
+def test_evenly_spread_sample_of_walks_is_recomputed(toy):
     swept = toy.run("roll", "strides=1:40:40", sets=WALKED_AGAIN)
     again = np.isfinite(swept.content[""]["numerical_error.end_time_s"])
     assert again.sum() == SAMPLE
@@ -100,7 +100,7 @@ def test_an_evenly_spread_sample_of_walks_is_taken_again_and_told(toy):
     ]
 
 
-def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted(toy):
+def test_all_of_few_points_are_recomputed(toy):
     swept = toy.run("roll", "strides=[5, 7, 8]", sets=WALKED_AGAIN)
     error = swept.summary["numerical_error"]
     assert (error["walked_again"], error["of"], error["ended_otherwise"]) == (3, 3, 1)
@@ -109,7 +109,7 @@ def test_of_few_points_all_are_walked_again_and_those_that_end_otherwise_counted
     assert summary_lines(unknown)[0].startswith("Numerical errors are unknown; 1 of 1 points")
 
 
-def test_a_sweep_of_contact_walks_says_that_pads_ended_them_with_pitch_and_last_steps():
+def test_sweep_reports_contact_walks_ended_by_pads():
     question = build_sweep("contact-sim", [axis_of_text("contact.stiffness=[1e5, 2e5, 3e5]")])
     rows = {
         "0": {"outcome": "off-pad", "pitch_m": 0.37, "step_lengths_m": [0.36, 0.35]},
@@ -127,7 +127,7 @@ def test_a_sweep_of_contact_walks_says_that_pads_ended_them_with_pitch_and_last_
     assert "the rigid gait's" not in of_pitches["said"]
 
 
-def test_a_stage_that_does_not_walk_has_no_numerical_error(toy):
+def test_stage_without_walks_has_no_numerical_error(toy):
     summary = toy.run("drop", GRAVITIES).summary
     assert "numerical_error" not in summary
     assert summary_lines(summary) == []
@@ -146,7 +146,7 @@ def test_nothing_is_computed_twice(toy, marks):
     assert marks() == 9
 
 
-def test_points_that_differ_in_nothing_the_stage_reads_are_computed_once(toy, marks):
+def test_points_equal_for_the_stage_are_computed_once(toy, marks):
     notes = []
     reporter = type("Listener", (sweeps.Silent,), {"note": lambda self, text: notes.append(text)})()
     swept = toy.run("drop", GRAVITIES, "strides=[2, 3, 4]", reporter=reporter)
@@ -155,7 +155,7 @@ def test_points_that_differ_in_nothing_the_stage_reads_are_computed_once(toy, ma
     assert any("drop does not read strides" in note for note in notes)
 
 
-def test_a_single_run_is_taken_over(toy, marks):
+def test_result_of_a_single_run_is_reused(toy, marks):
     config = toy.sweep("drop", GRAVITIES).config(2)
     execute(config, "drop", RunFolder(toy.runs, "alone"), graph=toy.graph)
     assert marks() == 1
@@ -163,7 +163,7 @@ def test_a_single_run_is_taken_over(toy, marks):
     assert marks() == 5
 
 
-def test_keys_are_those_that_the_pipeline_stores_under(toy):
+def test_sweep_keys_equal_those_of_the_pipeline(toy):
     config = toy.sweep("roll", GRAVITIES).config(1)
     report = execute(config, "roll", RunFolder(toy.runs, "alone"), graph=toy.graph)
     keys = Keys(toy.graph).of(config, "roll")
@@ -172,7 +172,7 @@ def test_keys_are_those_that_the_pipeline_stores_under(toy):
 
 
 @pytest.mark.parametrize("name", ["paper", "round-feet", "kneed"])
-def test_a_point_of_any_stage_has_the_key_of_its_single_run(name, tmp_path):
+def test_point_has_the_key_of_its_single_run(name, tmp_path):
     loaded = load(Path(name))
     stages = [stage for stage in PIPELINE.stages if not stage.draws and stage.why_unsuited(loaded.config) is None]
     folder = RunFolder(tmp_path, loaded.run_name)
@@ -181,7 +181,7 @@ def test_a_point_of_any_stage_has_the_key_of_its_single_run(name, tmp_path):
     assert {stage.name: Keys().of(loaded.config, stage.name)[stage.name] for stage in stages} == single
 
 
-def test_another_version_of_an_engine_computes_old_points_again(monkeypatch):
+def test_changed_engine_version_recomputes_its_points(monkeypatch):
     config = load().config
     monkeypatch.setattr(registry, "installed", lambda: (registry.Engine("absent", "absent"),))
     keys = []
@@ -191,12 +191,12 @@ def test_another_version_of_an_engine_computes_old_points_again(monkeypatch):
     assert [name for name in keys[0] if keys[0][name] != keys[1][name]] == ["engines"]
 
 
-def test_what_several_points_need_is_computed_once(toy, marks):
+def test_shared_inputs_of_points_are_computed_once(toy, marks):
     toy.run("roll", "strides=2:9:8")
     assert marks() == 1
 
 
-def test_a_damaged_chunk_is_computed_again(toy, marks):
+def test_damaged_chunk_is_recomputed(toy, marks):
     first = toy.run("drop", GRAVITIES)
     chunks = sorted((toy.runs / "paper" / FOLDER).iterdir())
     for path in chunks:
@@ -211,7 +211,7 @@ def test_a_damaged_chunk_is_computed_again(toy, marks):
 
 
 @pytest.mark.parametrize("why", [refused(Path("x"), OSError(28, "No space left on device")), KeyboardInterrupt()])
-def test_an_interrupted_sweep_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch, why):
+def test_interrupted_sweep_resumes_with_bitwise_equal_results(toy, tmp_path, monkeypatch, why):
     whole = toy.run("drop", "gravity_m_s2=1:9:40").content.digest()
     toy.runs = tmp_path / "again"
     kept, notes = [], []
@@ -234,7 +234,7 @@ def test_an_interrupted_sweep_goes_on_to_the_same_bits(toy, tmp_path, monkeypatc
     assert notes == (told if isinstance(why, KeyboardInterrupt) else [])
 
 
-def test_bad_points_are_told_with_their_values_before_anything_runs(toy, marks):
+def test_bad_points_are_reported_before_anything_runs(toy, marks):
     with pytest.raises(ConfigError) as caught:
         toy.run("drop", "gravity_m_s2=[1, -2, 3]", "walker.hip_mass_kg=[1, -7]")
     assert "at gravity_m_s2=-2, walker.hip_mass_kg=1" in caught.value.message
@@ -243,7 +243,7 @@ def test_bad_points_are_told_with_their_values_before_anything_runs(toy, marks):
     assert not toy.runs.exists()
 
 
-def test_a_stage_that_keeps_parts_is_swept_without_its_file(toy):
+def test_stage_with_checkpoints_is_swept_without_its_file(toy):
     swept = toy.run("count", "seed=[2, 3, 4]")
     assert swept.content[""]["total"].tolist() == [1.0, 3.0, 6.0]
     assert not list(toy.runs.rglob("*.parts"))
@@ -254,7 +254,7 @@ def test_only_stages_without_files_can_be_swept(toy):
         toy.sweep("picture", GRAVITIES)
 
 
-def test_lists_of_points_have_their_parameters_as_coordinates(toy):
+def test_parameters_of_listed_points_are_coordinates(toy):
     swept = toy.run("drop", "gravity_m_s2=1:9", "walker.hip_mass_kg=1:5", sample="latin-hypercube:6", seed=2)
     with opened(swept) as dataset:
         assert dataset.period_s.dims == ("point",)
@@ -262,7 +262,7 @@ def test_lists_of_points_have_their_parameters_as_coordinates(toy):
         assert dataset.period_s.values == pytest.approx(np.sqrt(2 / dataset.gravity_m_s2.values), rel=1e-15)
 
 
-def test_a_dry_run_says_what_is_there_and_what_the_rest_will_take(toy):
+def test_dry_run_states_finished_points_and_the_remaining_time(toy):
     toy.run("drop", GRAVITIES)
     foreseen = toy.sweep("drop", "gravity_m_s2=1:9:9").foresee(workers=2, max_points=3)
     assert (foreseen.count, foreseen.there) == (9, 5)
@@ -272,7 +272,7 @@ def test_a_dry_run_says_what_is_there_and_what_the_rest_will_take(toy):
     assert unknown.estimate_s is None
 
 
-def test_the_table_has_a_row_for_each_point(toy):
+def test_table_has_a_row_for_each_point(toy):
     swept = toy.run("drop", "slope_rad=[0.1, 1.2]", "gravity_m_s2=[2, 8]")
     rows = list(csv.DictReader(io.StringIO(as_csv(swept.content, swept.question))))
     assert [(row["slope_rad"], row["gravity_m_s2"]) for row in rows] == [
@@ -284,7 +284,7 @@ def test_the_table_has_a_row_for_each_point(toy):
     assert [row["period_s"] for row in rows] == ["1.0", "0.5", "", ""]
 
 
-def test_the_table_has_headline_numbers_and_lists_only_if_all_is_asked_for(toy):
+def test_table_shows_headline_values_unless_all_are_requested(toy):
     swept = toy.run("drop", "gravity_m_s2=[2, 8]")
     short, whole = (
         list(csv.DictReader(io.StringIO(as_csv(swept.content, swept.question, every)))) for every in (False, True)
@@ -294,13 +294,13 @@ def test_the_table_has_headline_numbers_and_lists_only_if_all_is_asked_for(toy):
     assert short[0].keys() < whole[0].keys()
 
 
-def test_the_last_step_of_walks_of_different_length_is_each_ones_own():
+def test_last_step_is_taken_from_each_walk():
     last = last_of_each(np.array([[0.7, 0.8], [0.6, np.nan], [np.nan, np.nan]]))
     assert last[:2].tolist() == [0.8, 0.6]
     assert np.isnan(last[2])
 
 
-def test_the_file_says_what_was_asked(toy):
+def test_sweep_file_records_its_question(toy):
     swept = toy.run("drop", GRAVITIES)
     stored = artifact.read(swept.path)
     assert stored.summary["parameters"] == {"gravity_m_s2": [1.0, 3.0, 5.0, 7.0, 9.0]}
@@ -310,7 +310,7 @@ def test_the_file_says_what_was_asked(toy):
 
 
 @pytest.mark.parametrize("stage", ["simulate", "contact-sim"])
-def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
+def test_walk_in_a_sweep_has_the_summary_of_a_single_walk(stage):
     config = load(sets=("strides=1",)).config
     (row,) = compute_point(config, "key", PIPELINE, stage, again=True).rows
     alone = answer_in_memory(config, stage, MemoryResults())
@@ -318,7 +318,7 @@ def test_a_walk_in_a_sweep_has_the_summary_of_the_walk_alone(stage):
     assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))
 
 
-def test_arrays_that_another_stage_draws_on_are_not_left_out():
+def test_arrays_needed_by_another_stage_are_kept():
     config = load().config
     assert without_outputs(config, "compare", PIPELINE) == config
     assert without_outputs(config, "contact-sim", PIPELINE).outputs == ()

@@ -42,7 +42,7 @@ def seeds(swept):
     return dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["status"].tolist(), strict=True))
 
 
-def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
+def test_point_that_kills_its_worker_is_marked_and_the_rest_finishes(toy):
     swept = toy.run("deadly", "seed=[5, 7, 13, 14]", engine=LOCAL, order=order())
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {7, 13}
     said = dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["reason"].tolist(), strict=True))
@@ -57,14 +57,14 @@ def test_a_point_that_kills_its_worker_is_marked_and_the_rest_is_there(toy):
     assert np.nansum(twice) == 2 * 5 + 2 * 14
 
 
-def test_workers_of_this_machine_may_begin_before_there_are_points():
+def test_local_workers_can_start_before_points_exist():
     with LOCAL.start_early(Order(workers=2)) as begun:
         workers = set(processes_below(os.getpid()))
         with begun.opened(Order(workers=2)) as pool:
             assert pool.submit(os.getpid).result() in workers
 
 
-def test_only_a_forced_sweep_computes_again_what_its_workers_remember(toy, marks, tmp_path):
+def test_only_a_forced_sweep_recomputes_cached_points(toy, marks, tmp_path):
     counts = []
     with LOCAL.start_early(Order(workers=1)) as begun:
         for first, force in ((2, False), (4, False), (4, True), (4, True)):
@@ -75,14 +75,14 @@ def test_only_a_forced_sweep_computes_again_what_its_workers_remember(toy, marks
     assert counts == [1, 0, 1, 1]
 
 
-def test_a_worker_that_dies_by_chance_costs_nothing(toy, tmp_path, monkeypatch):
+def test_accidental_death_of_a_worker_loses_nothing(toy, tmp_path, monkeypatch):
     monkeypatch.setenv("TOY_SWEEP_ONCE", str(tmp_path / "died"))
     swept = toy.run("deadly", "seed=18:24:7", engine=LOCAL, order=order())
     assert (tmp_path / "died").exists()
     assert set(seeds(swept).values()) == {"answered"}
 
 
-def test_workers_that_cannot_start_are_told_and_not_tried_for_ever(toy, monkeypatch):
+def test_workers_that_cannot_start_are_reported_after_a_few_tries(toy, monkeypatch):
     monkeypatch.setattr(work, "MAX_DEATHS", 2)  # each takes as long as a worker imports
     with pytest.raises(NoAnswer, match="all worker processes died"):
         toy.run("deadly", "seed=1:4:4", engine=LOCAL, order=Order(1, modules=("no_such_module",)))
@@ -107,7 +107,7 @@ print(swept.content.digest(), swept.failed)
 
 
 @pytest.mark.skipif(not THERE, reason="needs the kernel's table of processes")
-def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_path, monkeypatch):
+def test_killed_sweep_leaves_no_process_and_resumes(toy, tmp_path, monkeypatch):
     monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
     script = tmp_path / "sweeper.py"
     script.write_text(SWEEPER)
@@ -130,7 +130,7 @@ def test_a_killed_sweep_leaves_no_process_and_goes_on_to_the_same_bits(toy, tmp_
     assert resumed.content.digest() == toy.run("deadly", "seed=100:179:80", force=True).content.digest()
 
 
-def test_two_sweeps_on_one_folder_at_once_come_to_the_same_bits(toy, tmp_path):
+def test_concurrent_sweeps_on_one_folder_give_equal_results(toy, tmp_path):
     script = tmp_path / "sweeper.py"
     script.write_text(SWEEPER)
     command = [sys.executable, str(script), str(toy.runs)]
@@ -140,7 +140,7 @@ def test_two_sweeps_on_one_folder_at_once_come_to_the_same_bits(toy, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_dask_gives_the_same_and_outlives_its_workers(toy, monkeypatch):
+def test_dask_gives_the_same_result_and_survives_dead_workers(toy, monkeypatch):
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     monkeypatch.setenv("TOY_SWEEP_PAUSE", "0.02")
     with (
@@ -162,7 +162,7 @@ def test_dask_gives_the_same_and_outlives_its_workers(toy, monkeypatch):
     assert swept.content.digest() == toy.run("deadly", "seed=100:179:80", force=True).content.digest()
 
 
-def test_a_job_that_is_cancelled_or_fails_says_so_and_is_forgotten():
+def test_cancelled_or_failed_job_is_reported_and_forgotten():
     class Job:
         def __init__(self, error):
             self.error = error
@@ -180,7 +180,7 @@ def test_a_job_that_is_cancelled_or_fails_says_so_and_is_forgotten():
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_dask_makes_a_cluster_of_its_own(toy):
+def test_dask_starts_a_local_cluster(toy):
     pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     engine, address = engine_named("dask")
     assert address == ""
@@ -191,7 +191,7 @@ def test_dask_makes_a_cluster_of_its_own(toy):
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_jobs_on_this_machine_give_the_same(toy, tmp_path, monkeypatch):
+def test_jobs_on_this_machine_give_the_same_result(toy, tmp_path, monkeypatch):
     submitit = pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
     # how long submitit waits for a dead job's result on a slow network disk, and how often it looks for any
     monkeypatch.setattr(submitit.Job, "_results_timeout_s", 0)
@@ -203,7 +203,7 @@ def test_jobs_on_this_machine_give_the_same(toy, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("number", [signal.SIGUSR2, signal.SIGTERM])
-def test_a_job_that_is_told_to_end_returns_what_it_has_computed(number):
+def test_terminated_job_returns_its_finished_units(number):
     units = (WorkUnit("a", 1, int), WorkUnit("b", 1, partial(signal.raise_signal, number)), WorkUnit("c", 1, int))
     with WorkerPool(1) as pool:
         results = pool.submit(until_told, compute, units).result(timeout=60)
@@ -225,7 +225,7 @@ class Cut(WorkerPool):
 
 
 @pytest.mark.parametrize(("slow", "given_up"), [("", []), ("2", ["2"])])
-def test_units_that_a_job_has_not_computed_are_computed_by_another(slow, given_up):
+def test_unfinished_units_of_a_job_are_computed_by_another(slow, given_up):
     names, lost, why = [], [], []
 
     def keep(batch, results):
@@ -258,7 +258,7 @@ cat {folder}/answer 2>/dev/null
         (None, "squeue has not answered"),
     ],
 )
-def test_a_slurm_job_that_ends_without_a_result_is_noticed_without_accounting(answer, expected, tmp_path, monkeypatch):
+def test_slurm_job_without_a_result_is_detected_without_accounting(answer, expected, tmp_path, monkeypatch):
     for name, value in (("LISTING_S", 0.0), ("RESULT_S", 0.0), ("SILENCE_S", 0.1)):
         monkeypatch.setattr(engines, name, value)
     program = tmp_path / "squeue"
@@ -276,7 +276,7 @@ def test_a_slurm_job_that_ends_without_a_result_is_noticed_without_accounting(an
     SlurmQueue("60").wait(SimpleNamespace(job_id="42", paths=paths))
 
 
-def test_a_slurm_job_that_the_last_list_is_too_old_for_is_not_gone(tmp_path, monkeypatch):
+def test_slurm_job_newer_than_the_last_listing_is_not_lost(tmp_path, monkeypatch):
     program = tmp_path / "squeue"
     program.write_text("#!/bin/sh\necho 41 RUNNING\n")
     program.chmod(0o755)
@@ -287,7 +287,7 @@ def test_a_slurm_job_that_the_last_list_is_too_old_for_is_not_gone(tmp_path, mon
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_processes_of_other_engines_import_nothing_from_the_current_folder(tmp_path, monkeypatch):
+def test_sweep_workers_import_nothing_from_the_current_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cloudpickle.py").write_text("raise SystemExit('imported')")
     for name, options in (("slurm", {"cluster": "local"}), ("dask", {})):
@@ -296,7 +296,7 @@ def test_processes_of_other_engines_import_nothing_from_the_current_folder(tmp_p
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_a_dask_cluster_without_workers_gets_new_ones(monkeypatch):
+def test_dask_cluster_without_workers_gets_new_ones(monkeypatch):
     monkeypatch.setattr(engines, "RESTART_S", 1.0)
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
     with ENGINES["dask"].opened(Order(1)) as pool:
@@ -312,7 +312,7 @@ echo "Submitted batch job 42"
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_the_job_that_slurm_is_given_asks_for_what_was_said(tmp_path, monkeypatch):
+def test_slurm_job_requests_the_stated_resources(tmp_path, monkeypatch):
     pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
     for name, text in (
         ("sbatch", FAKE_SBATCH.format(folder=tmp_path)),
@@ -334,7 +334,7 @@ def test_the_job_that_slurm_is_given_asks_for_what_was_said(tmp_path, monkeypatc
 
 
 @pytest.mark.filterwarnings("ignore")  # of the library's own
-def test_pickled_jobs_are_for_this_user_alone(tmp_path):
+def test_pickled_jobs_are_private(tmp_path):
     pytest.importorskip("submitit", reason="the extra `slurm` is not installed")
     run, jobs = tmp_path / "run", tmp_path / "run" / "jobs"
     local = {"cluster": "local"}
@@ -353,7 +353,7 @@ def test_pickled_jobs_are_for_this_user_alone(tmp_path):
     assert f"chmod o-w {run}" in refused.value.advice
 
 
-def test_an_engine_that_is_not_there_or_not_installed_is_said_so(monkeypatch):
+def test_unknown_or_uninstalled_sweep_engine_is_reported(monkeypatch):
     with pytest.raises(ConfigError, match="unknown engine; choose from local, dask, slurm"):
         engine_named("cloud")
     assert engine_named("dask=tcp://10.0.0.1:8786")[1] == "tcp://10.0.0.1:8786"
@@ -365,7 +365,7 @@ def test_an_engine_that_is_not_there_or_not_installed_is_said_so(monkeypatch):
     assert caught.value.advice == "pip install 'walkerlab[dask]'"
 
 
-def test_chunks_grow_with_what_was_measured_and_shrink_towards_the_end():
+def test_chunk_size_follows_measured_times_and_shrinks_at_the_end():
     spread = Spread(iter(()), 10_000, list, print, 5.0)
     assert spread._batch_size(2) == 2
     spread.unit_s = 0.01

@@ -76,7 +76,7 @@ def test_help_begins_every_purpose_with_a_verb(walker):
     assert all(verb.istitle() and verb not in ("The", "A", "Whether") for verb in verbs)
 
 
-def test_help_says_what_each_command_is_for_without_cutting_it_short(walker):
+def test_help_states_the_purpose_of_each_command_in_full(walker):
     words = " ".join(walker("--help").stdout.split("Start:")[1].split())
     assert all(stage.purpose in words for stage in PIPELINE.stages)
     assert "..." not in words
@@ -96,7 +96,7 @@ BLOCKS_OF_OTHERS = {("compare", "recording"), ("identify", "plan"), ("plan", "id
 
 
 @pytest.mark.parametrize(("stage", "option"), OF_STAGES, ids=lambda entry: getattr(entry, "flag", entry))
-def test_an_option_of_a_stage_sets_a_key_and_offers_the_words_that_the_key_allows(stage, option):
+def test_stage_option_sets_a_key_and_offers_its_allowed_values(stage, option):
     block, _, name = option.key.rpartition(".")
     fields = block_of(Config.model_fields[block]).model_fields if block else Config.model_fields
     names = {field.alias or key: field for key, field in fields.items()}
@@ -108,7 +108,7 @@ def test_an_option_of_a_stage_sets_a_key_and_offers_the_words_that_the_key_allow
         assert name in names
 
 
-def test_the_version_is_followed_by_the_commit(walker):
+def test_version_is_followed_by_the_commit(walker):
     commit = git_commit()
     known = f" (commit {commit})" if commit else ""
     assert walker("--version").stdout == f"walkerlab {walkerlab.__version__}{known}\n"
@@ -139,7 +139,7 @@ def test_schema_prints_every_key_as_text_and_as_json(walker):
 
 
 @pytest.mark.parametrize("arguments", [["--set", "slope=1"], ["--set", "slope_rad=.nan"], ["--config", "nowhere.yaml"]])
-def test_a_bad_config_exits_3_before_anything_runs(walker, arguments):
+def test_bad_config_exits_3_before_anything_runs(walker, arguments):
     done = walker("simulate", *arguments)
     assert done.returncode == 3
     assert done.stderr.startswith("error: ")
@@ -168,31 +168,31 @@ def completed(walker, typed):
         ("walkerlab simulate --stri", ["--strides"]),
     ],
 )
-def test_a_shell_completes_keys_configs_and_options(walker, typed, offered):
+def test_shell_completes_keys_configs_and_options(walker, typed, offered):
     (walker.folder / "simple.yaml").write_text("extends: paper\n", encoding="utf-8")
     assert completed(walker, typed) == offered
 
 
 @pytest.mark.parametrize("typed", ["--slope_deg", "--slope-deg", "--hip_mass_kg"])
-def test_a_key_typed_as_an_option_is_told_with_how_it_is_set(typed):
+def test_config_key_typed_as_option_explains_set(typed):
     done = CliRunner().invoke(program(), ["fixedpoint", typed, "3"])
     assert done.exit_code == 2
     assert f"{typed.lstrip('-').replace('-', '_')}=VALUE" in done.output
     assert "--set" in done.output
 
 
-def test_of_keys_of_one_name_that_of_the_commands_own_block_is_told():
+def test_ambiguous_key_name_prefers_the_block_of_the_command():
     done = CliRunner().invoke(program(), ["basin", "--model", "contact"])
     assert "--set basin.model=VALUE" in done.output
 
 
-def test_an_option_that_is_no_key_is_told_as_any_other():
+def test_unknown_option_gets_the_usual_message():
     done = CliRunner().invoke(program(), ["fixedpoint", "--colour", "3"])
     assert done.exit_code == 2
     assert "--set" not in done.output
 
 
-def test_a_flag_may_have_a_hyphen():
+def test_flag_may_contain_a_hyphen():
     option = Option("--from-step", "strides", "N", "First step.", int)
     graph = Graph(Stage("settle", "stages.settle", "Settle.", None, options=(option,)))
     done = CliRunner().invoke(program(graph), ["settle", "--help"])
@@ -200,7 +200,7 @@ def test_a_flag_may_have_a_hyphen():
     assert "--from-step" in done.output
 
 
-def test_an_option_that_runs_another_stage_names_one_with_the_options_that_need_it():
+def test_redirecting_option_names_a_stage_with_the_same_options():
     redirects = [(stage, option) for stage in PIPELINE.stages for option in stage.options if option.runs]
     assert [(stage.name, option.flag, option.runs) for stage, option in redirects] == [("identify", "--plan", "plan")]
     for stage, option in redirects:
@@ -208,7 +208,7 @@ def test_an_option_that_runs_another_stage_names_one_with_the_options_that_need_
         assert needing <= {other.flag for other in PIPELINE[option.runs].options}
 
 
-def test_matrices_are_small_and_computed_in_one_thread_unless_the_user_says_otherwise():
+def test_linear_algebra_uses_one_thread_by_default():
     show = """
 import os
 from walkerlab.views.cli import main

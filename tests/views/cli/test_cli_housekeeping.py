@@ -7,7 +7,7 @@ def states(done):
     return {row["stage"]: row["state"] for row in json.loads(done.stdout)["stages"]}
 
 
-def test_status_says_missing_current_stale_damaged_and_left_out(toy):
+def test_status_distinguishes_missing_current_stale_damaged_and_omitted(toy):
     assert set(states(toy("status", "--json")).values()) == {"missing", "not run"}
     assert "drop     missing\n" in toy("status").stdout
     assert not list(toy.folder.iterdir())
@@ -31,7 +31,7 @@ def test_status_says_missing_current_stale_damaged_and_left_out(toy):
     assert states(toy("status", "--json", "--config", "rigid-only"))["bounce"] == "left out"
 
 
-def test_status_says_where_there_is_no_answer(toy):
+def test_status_shows_results_without_an_answer(toy):
     steep = ("--set", "slope_rad=1.2")
     toy.alone("page", *steep)
     found = toy("status", "--check", "--json", *steep)
@@ -40,7 +40,7 @@ def test_status_says_where_there_is_no_answer(toy):
     assert found.returncode == 0
 
 
-def test_status_check_exits_5_unless_all_is_current(toy):
+def test_status_check_exits_5_unless_everything_is_current(toy):
     toy("roll")
     done = toy("status", "--check", "--json")
     assert done.returncode == 5
@@ -67,7 +67,7 @@ def test_show_prints_summary_arrays_and_origin(toy):
     assert value["provenance"]["config"].startswith("name: paper")
 
 
-def test_show_of_no_run_exits_3_of_no_result_5_and_of_something_outdated_warns(toy):
+def test_show_exits_3_without_a_run_and_5_without_a_result(toy):
     done = toy("show", "drop")
     assert done.returncode == 3  # there is no such run
     assert "advice: `walkerlab drop` creates it." in done.stderr
@@ -80,7 +80,7 @@ def test_show_of_no_run_exits_3_of_no_result_5_and_of_something_outdated_warns(t
     assert "warning: runs/paper/drop.h5 is out of date: code changed" in done.stderr
 
 
-def test_clean_removes_results_and_nothing_else(toy):
+def test_clean_removes_only_results(toy):
     toy.alone("page")
     run = toy.folder / "runs" / "paper"
     (run / "notes.txt").write_text("mine")
@@ -93,7 +93,7 @@ def test_clean_removes_results_and_nothing_else(toy):
     assert "nothing removed" in toy("clean", "--yes").stdout
 
 
-def test_clean_does_not_remove_what_nobody_agreed_to(toy):
+def test_clean_removes_nothing_without_confirmation(toy):
     toy("drop")
     done = toy("clean")
     assert done.returncode == 2
@@ -101,7 +101,7 @@ def test_clean_does_not_remove_what_nobody_agreed_to(toy):
     assert (toy.folder / "runs" / "paper" / "drop.h5").exists()
 
 
-def test_clean_asks_on_a_terminal(toy):
+def test_clean_asks_for_confirmation_on_a_terminal(toy):
     toy("drop")
     artifact = toy.folder / "runs" / "paper" / "drop.h5"
     for answer, left in ((b"n\n", True), (b"y\n", False)):
@@ -114,7 +114,7 @@ def test_clean_asks_on_a_terminal(toy):
         assert artifact.exists() == left
 
 
-def test_status_gives_a_reason_once(toy):
+def test_status_states_a_repeated_reason_once(toy):
     toy.alone("page", "--set", "slope_rad=1.2")
     lines = toy("status", "--set", "slope_rad=1.2").stdout.splitlines()
     reasons = [line.split(maxsplit=3)[3] for line in lines[3:] if "left out" in line]

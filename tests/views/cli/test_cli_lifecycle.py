@@ -15,7 +15,7 @@ from walkerlab.errors import add_run_options
 from walkerlab.views.cli.request import Request, SetByOption
 
 
-def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
+def test_config_written_by_init_loads_and_names_its_schema(walker):
     done = walker("init", "my walker.yaml")
     assert done.returncode == 0
     assert "walkerlab report -c 'my walker.yaml'" in done.stdout
@@ -30,13 +30,13 @@ def test_a_config_that_init_wrote_is_accepted_and_names_its_schema(walker):
     assert walker("init", "my walker.yaml").returncode == 4
 
 
-def test_init_knows_the_types_of_walkers(walker):
+def test_init_accepts_every_walker_type(walker):
     done = walker("init", "x.yaml", "--type", "compas")
     assert done.returncode == 3
     assert "Did you mean compass?" in done.stderr
 
 
-def test_init_says_what_walkerlab_is_not_for(walker):
+def test_init_explains_what_is_out_of_scope(walker):
     done = walker("init", "x.yaml", "--type", "runner")
     assert done.returncode == 3
     assert "no running: its walkers always have a foot on the ground" in done.stderr
@@ -62,7 +62,7 @@ def test_every_key_that_init_writes_has_a_comment_above_it(walker, walker_type):
 
 
 @pytest.mark.parametrize(("text", "name"), [("Läufer 2", "Laufer-2"), ("a  b", "a-b"), ("-x.", "x"), ("歩", "run")])
-def test_a_file_name_gives_a_safe_run_name(text, name, tmp_path):
+def test_file_name_becomes_a_safe_run_name(text, name, tmp_path):
     assert safe_name(text) == name
     path = tmp_path / f"{text}.yaml"
     path.write_text("extends: paper\n")
@@ -71,13 +71,13 @@ def test_a_file_name_gives_a_safe_run_name(text, name, tmp_path):
     assert f"the run is named {name}" in loaded.warnings[0]
 
 
-def test_a_longer_leg_whose_mass_stays_is_told():
+def test_longer_leg_with_an_unchanged_mass_position_is_reported():
     (warning,) = load(sets=["walker.leg_length_m=1.2"]).warnings
     assert "walker.foot_to_mass_m is still 0.5 m" in warning
     assert load(sets=["walker.leg_length_m=1.2", "walker.foot_to_mass_m=0.6"]).warnings == ()
 
 
-def test_a_mass_that_is_moved_along_a_leg_that_stays_is_what_was_asked_for(tmp_path):
+def test_moving_a_mass_along_an_unchanged_leg_raises_no_warning(tmp_path):
     assert load(sets=["walker.foot_to_mass_m=0.3"]).warnings == ()
     path = tmp_path / "mine.yaml"
     path.write_text("extends: paper\nwalker: {foot_to_mass_m: 0.3}\n")
@@ -85,7 +85,7 @@ def test_a_mass_that_is_moved_along_a_leg_that_stays_is_what_was_asked_for(tmp_p
     assert "walker.foot_to_mass_m is still 0.3 m" in load(path, ["walker.leg_length_m=1.2"]).warnings[0]
 
 
-def test_a_run_is_a_config_and_runs_again_in_its_own_folder(toy):
+def test_run_can_be_used_as_config_and_reruns_in_its_folder(toy):
     toy("roll", "--strides", "3")
     folder = "runs/paper@strides=3"
     for config in (folder, f"{folder}/roll.h5"):
@@ -97,14 +97,14 @@ def test_a_run_is_a_config_and_runs_again_in_its_own_folder(toy):
     assert not (toy.folder / "runs" / "paper").exists()
 
 
-def test_a_folder_without_results_is_no_config(toy):
+def test_folder_without_results_is_not_a_config(toy):
     (toy.folder / "empty").mkdir()
     done = toy("roll", "-c", "empty")
     assert done.returncode == 3
     assert "no result to take a config from" in done.stderr
 
 
-def test_rerun_says_whether_a_result_comes_out_again(toy):
+def test_rerun_says_whether_results_are_reproduced(toy):
     toy("roll")
     artifact = "runs/paper/roll.h5"
     done = toy("rerun", artifact)
@@ -120,7 +120,7 @@ def test_rerun_says_whether_a_result_comes_out_again(toy):
     assert "is not reproduced" in printed["error"]["message"]
 
 
-def test_open_without_a_page_says_what_writes_it(toy):
+def test_open_without_a_page_names_the_command_that_writes_it(toy):
     for command in (("open",), ("status", "paper"), ("diff", "paper", "kneed")):
         assert toy(*command).stderr.splitlines()[:2] == [
             "error: there is no run paper.",
@@ -133,7 +133,7 @@ def test_open_without_a_page_says_what_writes_it(toy):
     assert "walkerlab report -c runs/paper" in done.stderr
 
 
-def test_a_key_is_explained_in_80_columns(walker):
+def test_explanation_of_a_key_fits_80_columns(walker):
     lines = walker("schema", "contact").stdout.splitlines()
     assert "contact.stiffness" in lines
     assert max(map(len, lines)) < 80
@@ -142,13 +142,13 @@ def test_a_key_is_explained_in_80_columns(walker):
     assert "Did you mean contact.stiffness?" in done.stderr
 
 
-def test_a_key_of_one_kind_of_walker_is_found_by_the_name_that_a_config_has(walker):
+def test_key_of_one_walker_type_is_found_by_its_config_name(walker):
     lines = walker("schema", "walker.thigh").stdout.splitlines()
     assert "walker(kneed).thigh.length_m" in lines
     assert walker("schema", "walker(kneed).thigh").stdout.splitlines() == lines
 
 
-def test_the_schema_of_a_key_is_that_key_alone_as_json_too(walker):
+def test_schema_of_a_key_lists_only_that_key(walker):
     stiffness = json.loads(walker("schema", "contact.stiffness", "--json").stdout)
     assert (stiffness["default"], stiffness["unit"]) == (1e5, "N/mm^e or N/m^e")
     thigh = json.loads(walker("schema", "walker.thigh", "--json").stdout)
@@ -162,7 +162,7 @@ def test_the_schema_of_a_key_is_that_key_alone_as_json_too(walker):
     assert "contact.stiffness?" in json.loads(done.stdout)["error"]["message"]
 
 
-def test_init_makes_the_folder_and_advises_nothing_that_it_has_not(walker):
+def test_init_creates_the_folder_and_suggests_only_valid_commands(walker):
     assert walker("init", "sub/dir/x.yaml").returncode == 0
     assert load(walker.folder / "sub" / "dir" / "x.yaml").run_name == "x"
     done = walker("init", "sub/dir/x.yaml/y.yaml")
@@ -171,19 +171,19 @@ def test_init_makes_the_folder_and_advises_nothing_that_it_has_not(walker):
     assert "--runs" not in done.stderr
 
 
-def test_a_config_that_is_not_there_is_begun_with_init(walker):
+def test_missing_config_suggests_init(walker):
     done = walker("fixedpoint", "-c", "mine.yaml")
     assert done.returncode == 3
     assert done.stderr.splitlines()[-1] == "advice: `walkerlab init` writes a config to start from"
 
 
-def test_a_film_needs_no_name(walker):
+def test_animate_of_a_missing_run_exits_3(walker):
     done = walker("animate", "paper")
     assert done.returncode == 3
     assert "there is no run paper" in done.stderr
 
 
-def test_advice_can_be_typed_back(toy):
+def test_suggested_commands_are_valid(toy):
     done = toy("show", "roll", "--strides", "3", "--set", "slope_deg=2")
     assert "advice: `walkerlab roll --set slope_deg=2 --set strides=3` creates it." in done.stderr
     request = Request("simulate", sets=["start=[0, 1, 2, 3]"])
@@ -192,7 +192,7 @@ def test_advice_can_be_typed_back(toy):
     )
 
 
-def test_advice_repeats_a_commands_own_options_only_where_they_matter():
+def test_advice_repeats_only_the_options_that_matter():
     own = SetByOption('identify.data="my steps.csv"', "--data", "my steps.csv")
     request = Request("identify", (own,), sets=["slope_deg=40"])
     assert request.typed_for("identify") == " --set slope_deg=40 --data 'my steps.csv'"
@@ -200,7 +200,7 @@ def test_advice_repeats_a_commands_own_options_only_where_they_matter():
     assert request.typed_for("status") == " --set slope_deg=40 --set 'identify.data=\"my steps.csv\"'"
 
 
-def test_the_slope_is_set_once(toy):
+def test_slope_cannot_be_set_in_both_units(toy):
     done = toy("drop", "--set", "slope_deg=2", "--set", "slope_rad=0.1")
     assert done.returncode == 3
     assert "slope already set by slope_deg" in done.stderr
@@ -215,7 +215,7 @@ def test_clean_all_leaves_no_empty_folders(toy):
     assert [path.name for path in (toy.folder / "runs").iterdir()] == ["paper"]
 
 
-def test_a_request_to_end_is_an_interrupt_with_an_object_that_names_the_run(toy, tmp_path):
+def test_termination_exits_like_an_interrupt_and_names_the_run(toy, tmp_path):
     begun = tmp_path / "begun"
     environment = {"TOY_BEGUN": str(begun), "TOY_GO_ON": str(tmp_path / "never")}
     with toy.start("drop", "--json", environment=environment) as process:
@@ -228,7 +228,7 @@ def test_a_request_to_end_is_an_interrupt_with_an_object_that_names_the_run(toy,
     assert value["error"]["exit_code"] == 130
 
 
-def test_a_closed_pipe_ends_quietly(walker):
+def test_closed_pipe_ends_quietly(walker):
     with walker.start("schema") as process:
         process.stdout.close()
         assert process.wait(timeout=30) in (0, 141)
@@ -236,7 +236,7 @@ def test_a_closed_pipe_ends_quietly(walker):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device here")
-def test_a_full_stdout_is_told(walker):
+def test_full_output_device_is_reported(walker):
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [*walker.command, "schema"], cwd=walker.folder, env=walker.environment, stdout=full, stderr=subprocess.PIPE
@@ -246,7 +246,7 @@ def test_a_full_stdout_is_told(walker):
     assert b"Traceback" not in done.stderr
 
 
-def test_init_on_a_full_disk_leaves_nothing_cut_short(walker):
+def test_init_on_a_full_disk_leaves_no_partial_file(walker):
     command = f"ulimit -f 1; exec {shlex.join(walker.command)} init x.yaml"
     done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
     assert done.returncode == 4
@@ -254,7 +254,7 @@ def test_init_on_a_full_disk_leaves_nothing_cut_short(walker):
     assert list(walker.folder.iterdir()) == []
 
 
-def test_a_pipe_is_written_into_and_not_replaced(walker):
+def test_output_pipe_is_written_into_and_not_replaced(walker):
     os.mkfifo(walker.folder / "pipe")
     with walker.start("draw", "simplest", "--to", "svg", "-o", "pipe", stdout=subprocess.DEVNULL) as process:
         drawn = (walker.folder / "pipe").read_bytes()
@@ -264,7 +264,7 @@ def test_a_pipe_is_written_into_and_not_replaced(walker):
     assert (walker.folder / "pipe").is_fifo()
 
 
-def test_a_link_is_followed_and_not_replaced(walker):
+def test_output_link_is_followed_and_not_replaced(walker):
     (walker.folder / "link.svg").symlink_to("walker.svg")
     assert walker("draw", "simplest", "-o", "link.svg").returncode == 0
     assert (walker.folder / "link.svg").is_symlink()
@@ -279,7 +279,7 @@ def test_a_link_is_followed_and_not_replaced(walker):
         (".", ". is a folder"),
     ],
 )
-def test_a_drawing_replaces_neither_what_it_is_drawn_from_nor_a_folder(walker, target, said):
+def test_drawing_overwrites_neither_its_source_nor_a_folder(walker, target, said):
     (walker.folder / "base.yaml").write_text("extends: paper\n")
     (walker.folder / "mine.yaml").write_text("extends: base.yaml\n")
     done = walker("draw", "mine.yaml", "--to", "svg", "-o", target)
@@ -290,7 +290,7 @@ def test_a_drawing_replaces_neither_what_it_is_drawn_from_nor_a_folder(walker, t
     assert (walker.folder / "base.yaml").read_text() == "extends: paper\n"
 
 
-def test_names_that_are_no_text_are_escaped_where_they_are_printed(walker):
+def test_undecodable_file_names_are_escaped_in_output(walker):
     odd = os.fsdecode(b"r\xff")
     for command in (("status", "--runs", odd), ("draw", "simplest", "-o", f"{odd}.svg"), ("export", odd, "7")):
         done = walker(*command)
@@ -299,12 +299,12 @@ def test_names_that_are_no_text_are_escaped_where_they_are_printed(walker):
     assert (walker.folder / f"{odd}.svg").is_file()
 
 
-def test_letters_that_the_terminal_lacks_are_escaped(walker):
+def test_characters_missing_from_the_terminal_are_escaped(walker):
     done = walker("schema", "slope_rad", environment={"PYTHONIOENCODING": "ascii"})
     assert (done.returncode, "Traceback" in done.stderr) == (0, False)
 
 
-def test_a_closed_stdout_ends_quietly(walker):
+def test_closed_stdout_ends_quietly(walker):
     command = f"exec {shlex.join(walker.command)} schema >&-"
     done = subprocess.run(["bash", "-c", command], cwd=walker.folder, env=walker.environment, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
@@ -316,7 +316,7 @@ def test_compile_says_how_many_kernels_are_ready(walker):
     assert re.fullmatch(r"\d+ kernels are ready for rigid-only, after \d+ s\.\n", done.stdout)
 
 
-def test_the_version_in_long_says_where_kernels_come_from(walker):
+def test_long_version_states_the_origin_of_kernels(walker):
     first, versions, *kernels = walker("--version", "--verbose").stdout.splitlines()
     assert first.startswith("walkerlab ")
     assert {"Python", "numba", "llvmlite", "sources"} <= set(versions.split())

@@ -9,7 +9,7 @@ from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.target import Target
 
 
-def test_a_model_of_a_config_without_a_run_computes_its_gait(walker):
+def test_exporting_a_model_without_a_run_computes_its_gait(walker):
     done = walker("export", "paper", "model", "--to", "adm")
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["paper.adm", "paper.acf"]
@@ -19,7 +19,7 @@ def test_a_model_of_a_config_without_a_run_computes_its_gait(walker):
     assert "fixedpoint: reused (up to date)" in again.stderr
 
 
-def test_files_beside_a_model_have_its_name(walker):
+def test_companion_files_of_a_model_share_its_name(walker):
     assert walker("export", "paper", "model", "-o", "mine.adm", "--law", "functions").returncode == 0
     assert (walker.folder / "mine.acf").read_text().startswith("mine.adm\nmine\n")
     assert "STEP" in (walker.folder / "mine.adm").read_text()
@@ -28,7 +28,7 @@ def test_files_beside_a_model_have_its_name(walker):
     assert "the script driven.py applies instead" in done.stderr
 
 
-def test_a_slope_in_the_geometry_is_said_in_the_file(walker):
+def test_slope_in_the_geometry_is_stated_in_the_file(walker):
     assert walker("export", "paper", "model", "--to", "mjcf", "--slope", "geometry").returncode == 0
     text = (walker.folder / "paper.xml").read_text()
     assert "rad, as tilted ground." in text
@@ -40,7 +40,7 @@ def test_a_slope_in_the_geometry_is_said_in_the_file(walker):
     (("--to", "mjcf", "-o", "b.xml"), "b.xml"), (("--to", "mjcf", "-o", "b.mjcf"), "b.mjcf"),
     (("--to", "c.cmd"), "c.cmd"),
 ])  # fmt: skip
-def test_the_format_is_named_or_follows_the_file(walker, options, file):
+def test_model_format_is_stated_or_follows_the_file_name(walker, options, file):
     done = walker("export", "paper", "model", *options)
     assert done.stdout.split() == [file]
     first = (walker.folder / file).read_text().splitlines()[0]
@@ -58,7 +58,7 @@ def test_the_format_is_named_or_follows_the_file(walker, options, file):
     (("rigid-only", "--to", "adm"), "contact"),
     (("nowhere", "--to", "adm"), "there is no config nowhere"),
 ])  # fmt: skip
-def test_a_model_that_cannot_be_written_is_one_message(walker, arguments, message):
+def test_model_that_cannot_be_written_gives_one_message(walker, arguments, message):
     run, *options = arguments
     done = walker("export", run, "model", *options)
     assert done.returncode == 3
@@ -67,7 +67,7 @@ def test_a_model_that_cannot_be_written_is_one_message(walker, arguments, messag
     assert not [path for path in walker.folder.iterdir() if path.suffix.removeprefix(".") in ENDINGS]
 
 
-def test_a_walker_without_a_gait_has_no_model(tmp_path, monkeypatch):
+def test_walker_without_a_gait_has_no_model(tmp_path, monkeypatch):
     answer = NoAnswer("no gait", "advice")
     monkeypatch.setattr(models, "execute", lambda *_: type("Report", (), {"no_answer": answer})())
     with pytest.raises(NoAnswer):
@@ -87,13 +87,13 @@ EXPORTS = {
 
 
 @pytest.mark.parametrize("what", EXPORTS)
-def test_an_export_of_a_run_says_that_its_config_was_edited_since(edited, what):
+def test_export_of_a_run_warns_if_its_config_was_edited(edited, what):
     done = edited(*EXPORTS[what])
     assert done.returncode == 0, done.stderr
     assert "light.yaml has changed since runs/light was computed (walker.hip_mass_kg 10.0 -> 15.0)" in done.stderr
 
 
-def test_an_export_of_a_run_says_that_its_config_was_moved(walker):
+def test_export_of_a_run_warns_if_its_config_was_moved(walker):
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
     walker("fixedpoint", "-c", "light.yaml")
     (walker.folder / "light.yaml").rename(walker.folder / "lighter.yaml")
@@ -102,14 +102,14 @@ def test_an_export_of_a_run_says_that_its_config_was_moved(walker):
     assert "light.yaml has changed since runs/light was computed (it is no longer there)" in done.stderr
 
 
-def test_a_figure_that_the_run_lacks_is_not_taken_for_another(edited):
+def test_missing_figure_is_not_replaced_by_another(edited):
     done = edited("export", "light", "figure-3")
     assert done.returncode == 3
     assert "this run has no item figure-03" in done.stderr
     assert "Did you mean" not in done.stderr
 
 
-def test_a_model_of_an_edited_config_is_that_of_the_file(walker):
+def test_model_of_an_edited_config_follows_the_file(walker):
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
     walker("fixedpoint", "-c", "light.yaml")
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\nwalker: {hip_mass_kg: 15}\n")
@@ -118,7 +118,7 @@ def test_a_model_of_an_edited_config_is_that_of_the_file(walker):
     assert "under 25 kg" in (walker.folder / "light.xml").read_text()
 
 
-def test_what_a_run_sets_itself_is_no_edit_of_its_file(walker):
+def test_settings_of_a_run_do_not_count_as_edits_of_its_file(walker):
     (walker.folder / "light.yaml").write_text("extends: paper\nstrides: 1\n")
     walker(
         "fixedpoint", "-c", "light.yaml", "--set", "walker.hip_mass_kg=12", "--set", "slope_deg=1.1", "--name", "own"
@@ -129,7 +129,7 @@ def test_what_a_run_sets_itself_is_no_edit_of_its_file(walker):
     assert "has changed" not in done.stderr
 
 
-def test_a_model_takes_settings_and_nothing_else_does(walker):
+def test_only_model_exports_accept_settings(walker):
     done = walker("export", "paper", "model", "--to", "mjcf", "--set", "walker.hip_mass_kg=15", "-o", "heavy.xml")
     assert done.returncode == 0, done.stderr
     assert "under 25 kg" in (walker.folder / "heavy.xml").read_text()
@@ -147,7 +147,7 @@ def test_a_model_takes_settings_and_nothing_else_does(walker):
     ],
     ids=lambda arguments: " ".join(arguments).replace(LONG_NAME, "NAME"),
 )  # fmt: skip
-def test_a_name_that_is_too_long_for_the_system_is_one_message(walker, arguments):
+def test_overlong_file_name_gives_one_message(walker, arguments):
     done = walker(*arguments)
     assert done.returncode == 3
     assert done.stderr.startswith("error: ")

@@ -32,7 +32,7 @@ def test_results_go_to_stdout_and_messages_to_stderr(toy):
     assert [line.split()[:2] for line in second.stderr.splitlines()] == [["drop:", "reused"], ["roll:", "reused"]]
 
 
-def test_a_stage_that_runs_anew_says_why_as_it_starts(toy):
+def test_rerun_stage_states_its_reason(toy):
     assert toy("drop").stderr.startswith("drop: starts\n")
     changed = toy("drop", "--force").stderr
     assert changed.startswith("drop: starts (--force)\n")
@@ -58,7 +58,7 @@ def test_quiet_and_verbose(toy):
     assert "dropping (1)" in loud
 
 
-def test_warnings_are_said_even_if_quiet(toy):
+def test_warnings_are_printed_even_with_quiet(toy):
     toy("drop")
     (toy.folder / "runs" / "paper" / "drop.h5").write_bytes(b"broken")
     done = toy("drop", "-q")
@@ -66,7 +66,7 @@ def test_warnings_are_said_even_if_quiet(toy):
     assert done.stderr.startswith("warning: runs/paper/drop.h5 is damaged")
 
 
-def test_dry_run_says_what_would_happen_and_why_and_touches_nothing(toy):
+def test_dry_run_explains_and_changes_nothing(toy):
     done = toy("page", "--config", "rigid-only", "--dry-run")
     assert done.returncode == 0
     assert [line.split()[:2] for line in done.stdout.splitlines()[1:-1]] == [
@@ -87,14 +87,14 @@ def test_dry_run_says_what_would_happen_and_why_and_touches_nothing(toy):
     assert {step["reason"] for step in plan["stages"]} == {"not there yet", "the config has no contact block"}
 
 
-def test_dry_run_after_a_run_says_that_all_is_reused(toy):
+def test_dry_run_after_a_run_reuses_everything(toy):
     toy.alone("page")
     plan = one_object(toy("page", "--dry-run", "--json"))
     assert plan["reused"] is True
     assert {step["action"] for step in plan["stages"]} == {"reuse"}
 
 
-def test_no_answer_exits_4_and_keeps_what_was_found(toy):
+def test_missing_answer_exits_4_and_keeps_partial_results(toy):
     done = toy("drop", "--set", "slope_rad=1.2", "--json")
     assert done.returncode == 4
     assert "Traceback" not in done.stderr
@@ -106,27 +106,27 @@ def test_no_answer_exits_4_and_keeps_what_was_found(toy):
 
 
 @pytest.mark.parametrize("stage", ["drop", "roll"])
-def test_why_there_is_no_answer_and_what_to_try_is_told_once(toy, stage):
+def test_reason_and_advice_for_a_missing_answer_appear_once(toy, stage):
     toy("drop", "--set", "slope_rad=1.2")
     done = toy(stage, "--set", "slope_rad=1.2")
     for said in ("the slope is too steep", "Try one below 1 rad."):
         assert (done.stdout + done.stderr).count(said) == 1
 
 
-def test_what_needs_a_contact_block_exits_3_without_one(toy):
+def test_contact_stages_exit_3_without_a_contact_block(toy):
     done = toy("bounce", "--config", "rigid-only", "--json")
     assert done.returncode == 3
     assert "contact block" in one_object(done)["error"]["message"]
     assert not list(toy.folder.iterdir())
 
 
-def test_a_bad_config_is_one_object_too(toy):
+def test_bad_config_with_json_prints_one_object(toy):
     done = toy("drop", "--set", "slop_rad=1", "--json")
     assert done.returncode == 3
     assert one_object(done)["error"]["exit_code"] == 3
 
 
-def test_a_case_named_as_one_of_the_catalogue_is_refused_before_anything_runs(toy):
+def test_case_with_a_built_in_name_is_rejected_before_anything_runs(toy):
     (toy.folder / "own.yaml").write_text(
         "extends: paper\nstability: {cases: [{name: moon, expected: [walked], reason: mine}]}\n"
     )
@@ -136,7 +136,7 @@ def test_a_case_named_as_one_of_the_catalogue_is_refused_before_anything_runs(to
     assert not (toy.folder / "runs").exists()
 
 
-def test_a_result_that_cannot_be_stored_exits_4(toy):
+def test_result_that_cannot_be_stored_exits_4(toy):
     (toy.folder / "runs").write_text("a file stands where the folder belongs")
     done = toy("drop")
     assert done.returncode == 4
@@ -144,7 +144,7 @@ def test_a_result_that_cannot_be_stored_exits_4(toy):
     assert done.stderr.splitlines()[-1].startswith("advice: ")
 
 
-def test_a_bug_keeps_its_traceback_and_exits_1(toy, tmp_path):
+def test_bug_keeps_its_traceback_and_exits_1(toy, tmp_path):
     source = tmp_path / "source" / "toy" / "drop.py"
     source.write_text(source.read_text().replace("progress.start(", "progress.begin("))
     done = toy("drop")
@@ -166,7 +166,7 @@ def caught(toy, tmp_path):
         process.kill()
 
 
-def test_no_wait_exits_6_while_another_process_works_which_exits_130_if_interrupted_and_leaves_no_lock(toy, caught):
+def test_no_wait_exits_6_while_another_process_works(toy, caught):
     done = toy("drop", "--no-wait", "--json")
     assert done.returncode == 6
     assert one_object(done)["error"]["exit_code"] == 6
@@ -178,7 +178,7 @@ def test_no_wait_exits_6_while_another_process_works_which_exits_130_if_interrup
 
 
 @pytest.mark.parametrize(("force", "then"), [([], "; its results will be reused"), (["--force"], "")])
-def test_a_second_process_says_for_which_command_it_waits_and_how_to_avoid_it(toy, caught, force, then):
+def test_waiting_process_names_the_command_it_waits_for(toy, caught, force, then):
     with toy.start("drop", "--json", *force) as second:
         message = second.stderr.readline()
         assert re.fullmatch(
@@ -205,7 +205,7 @@ def test_status_shows_the_command_that_is_running(toy, caught):
     assert not list((toy.folder / "runs" / "paper").glob(".worker*"))
 
 
-def test_runs_go_where_they_are_told(toy, tmp_path):
+def test_runs_option_selects_the_folder(toy, tmp_path):
     toy("drop", "--runs", tmp_path / "elsewhere")
     assert (tmp_path / "elsewhere" / "paper" / "drop.h5").exists()
     assert not (toy.folder / "runs").exists()
@@ -221,7 +221,7 @@ def read_all(terminal):
             return text.decode()
 
 
-def test_a_bar_is_drawn_on_a_terminal_only(toy):
+def test_progress_bar_appears_only_on_a_terminal(toy):
     ours, theirs = pty.openpty()
     with toy.start("drop", stderr=theirs, environment={"TERM": "xterm"}) as process:
         os.close(theirs)
@@ -236,7 +236,7 @@ def test_a_bar_is_drawn_on_a_terminal_only(toy):
     assert "dropping" not in off_terminal
 
 
-def test_a_key_to_follow_gaits_over_goes_with_its_span(walker):
+def test_continuation_over_a_key_needs_its_span(walker):
     done = walker("continuation", "--over", "slope_deg")
     assert done.returncode == 2
     assert "--from and --to" in done.stderr
@@ -250,21 +250,21 @@ def test_a_key_to_follow_gaits_over_goes_with_its_span(walker):
         "design --minimise period_s --over contact.damping=1:2": "does not affect the rigid model",
     }.items(),
 )
-def test_a_question_that_cannot_be_meant_stops_before_anything_runs(walker, asked, refused):
+def test_invalid_question_stops_before_anything_runs(walker, asked, refused):
     done = walker(*asked.split(), "--json")
     assert done.returncode == 3
     assert refused in json.loads(done.stdout)["error"]["message"]
     assert not list(walker.folder.iterdir())
 
 
-def test_what_was_left_out_is_told_to_those_who_ask(toy):
+def test_omissions_are_listed_on_request(toy):
     assert "left out" not in toy.alone("page", "--config", "rigid-only").stdout
     assert (
         "left out: bounce (the config has no contact block)" in toy.alone("page", "--config", "rigid-only", "-v").stdout
     )
 
 
-def test_plot_prints_paths_from_the_folder_that_one_is_in(walker):
+def test_plot_prints_paths_relative_to_the_current_folder(walker):
     done = walker("plot", "-c", "rigid-only", "--set", "strides=1", "--runs", "results", "--name", "one")
     assert done.returncode == 0, done.stderr
     paths = [line.split()[0] for line in done.stdout.splitlines() if ".svg" in line]

@@ -18,7 +18,7 @@ from walkerlab.views.cli.runs import lines, percent
 SWEEP = ("sweep", "--stage", "drop", "--jobs", "1")
 
 
-def test_a_sweep_prints_one_object_and_leaves_file_table_figure_and_page(swept):
+def test_sweep_prints_one_object_and_writes_file_table_figure_and_page(swept):
     toy, value = swept
     assert (value["done"], value["failed"], value["reused"], value["points"]) == (6, 0, 0, 6)
     assert value["parameters"] == {"gravity_m_s2": [1.0, 5.0, 9.0], "slope_rad": [0.1, 1.2]}
@@ -33,7 +33,7 @@ def test_a_sweep_prints_one_object_and_leaves_file_table_figure_and_page(swept):
     )
 
 
-def test_the_same_sweep_again_prints_the_table_and_computes_nothing(swept):
+def test_repeated_sweep_prints_the_table_and_computes_nothing(swept):
     toy, _ = swept
     done = toy(*SWEEP, "--over", "gravity_m_s2=1:9:3", "--over", "slope_rad=[0.1, 1.2]", "--csv")
     assert "6 of 6 points exist already" in done.stderr
@@ -42,7 +42,7 @@ def test_the_same_sweep_again_prints_the_table_and_computes_nothing(swept):
     assert float(rows[4]["period_s"]) == (2 / 9) ** 0.5
 
 
-def test_a_block_of_the_config_asks_the_same(swept):
+def test_sweep_block_of_the_config_equals_the_options(swept):
     toy, value = swept
     over = "    gravity_m_s2: 1:9:3\n    slope_rad: [0.1, 1.2]\n"
     (toy.folder / "block.yaml").write_text(f"name: paper\nextends: paper\nsweep:\n  stage: drop\n  over:\n{over}")
@@ -51,7 +51,7 @@ def test_a_block_of_the_config_asks_the_same(swept):
     assert again["file"] == value["file"]
 
 
-def test_a_dry_run_lists_points_and_touches_nothing(swept):
+def test_dry_run_of_a_sweep_lists_points_and_changes_nothing(swept):
     toy, _ = swept
     before = sorted(toy.folder.rglob("*"))
     text = toy(*SWEEP, "--over", "gravity_m_s2=1:9:5", "--set", "slope_rad=0.1", "--dry-run").stdout
@@ -60,7 +60,7 @@ def test_a_dry_run_lists_points_and_touches_nothing(swept):
     assert sorted(toy.folder.rglob("*")) == before
 
 
-def test_bad_points_and_bad_questions_exit_3_with_what_is_allowed(swept):
+def test_bad_points_and_questions_exit_3_with_allowed_values(swept):
     toy, _ = swept
     done = toy(*SWEEP, "--over", "gravity_m_s2=[1, -2]")
     assert done.returncode == 3
@@ -70,7 +70,7 @@ def test_bad_points_and_bad_questions_exit_3_with_what_is_allowed(swept):
     assert toy(*SWEEP, "--over", "gravity_m_s2=[1]", "--engine", "abacus").returncode == 3
 
 
-def test_a_name_to_show_that_there_is_not_ends_a_sweep_with_its_first_chunk(toy):
+def test_unknown_quantity_to_show_ends_a_sweep_after_its_first_chunk(toy):
     few = ("--jobs", "1", "--chunk-seconds", "1e-9")
     done = toy("sweep", "--over", "gravity_m_s2=1:9:400", "--stage", "drop", "--show", "nonsense", *few)
     assert done.returncode == 3
@@ -79,7 +79,7 @@ def test_a_name_to_show_that_there_is_not_ends_a_sweep_with_its_first_chunk(toy)
     assert 0 < json.loads(again.stdout)["reused"] < 400
 
 
-def test_clean_takes_sweeps_away(swept, tmp_path):
+def test_clean_removes_sweeps(swept, tmp_path):
     toy, _ = swept
     done = toy("clean", "--dry-run", "--json")
     removed = json.loads(done.stdout)["removed"]
@@ -87,14 +87,14 @@ def test_clean_takes_sweeps_away(swept, tmp_path):
     assert any(name.endswith("sweep.html") for name in removed)
 
 
-def test_clean_says_of_a_sweep_s_chunks_how_many_there_are_and_not_which(swept):
+def test_clean_counts_sweep_chunks_instead_of_listing_them(swept):
     toy, _ = swept
     chunks = [line for line in toy("clean", "--all", "--dry-run").stdout.splitlines() if "sweep-chunks" in line]
     assert len(chunks) == 1
     assert re.search(r"sweep-chunks/drop-\w+-\*", chunks[0]) or chunks[0].endswith(".h5")
 
 
-def test_many_files_of_a_kind_are_told_in_one_line_with_their_size():
+def test_many_files_of_a_kind_are_summarised_in_one_line():
     files = [Path(f"runs/a/sweep-chunks/drop-1234-{n}.h5") for n in range(300)] + [Path("runs/a/drop.h5")]
     assert file_lines(files, dict.fromkeys(files, 10_000)) == [
         "runs/a/sweep-chunks/drop-1234-* (300 files, 3.0 MB)",
@@ -102,7 +102,7 @@ def test_many_files_of_a_kind_are_told_in_one_line_with_their_size():
     ]
 
 
-def test_diff_says_what_of_config_and_numbers_differs(toy):
+def test_diff_lists_differences_of_config_and_results(toy):
     toy("roll")
     toy("roll", "--set", "gravity_m_s2=4.905")
     found = json.loads(toy("diff", "paper", "paper@gravity_m_s2=4.905", "--json").stdout)
@@ -113,7 +113,7 @@ def test_diff_says_what_of_config_and_numbers_differs(toy):
     assert "+41.4 %" in text
 
 
-def test_diff_tells_runs_of_one_name_apart_by_their_folders(toy):
+def test_diff_labels_runs_of_equal_name_by_folder(toy):
     toy("roll", "--runs", "here")
     toy("roll", "--runs", "there", "--set", "gravity_m_s2=4.905", "--set", "name=paper")
     (there,) = (toy.folder / "there").iterdir()
@@ -122,14 +122,14 @@ def test_diff_tells_runs_of_one_name_apart_by_their_folders(toy):
     assert head.split() == ["here/paper", "there/paper"]
 
 
-def test_diff_shows_no_per_cent_of_errors_and_of_rounding():
+def test_diff_shows_no_percentage_for_errors_and_rounding():
     assert percent(Pair("period_s", 1.0, 1.5, 0.5)) == "+50 %"
     assert percent(Pair("period_s", 1.5, 1.5, 0.0)) == "the same"
     assert percent(Pair("energy_drift_J", 1e-3, 2e-3, 1.0)) == ""
     assert percent(Pair("max_scuff_depth_m", 1e-17, 3e-17, 2.0)) == ""
 
 
-def test_diff_of_unequal_walks_prints_few_lines_and_all_on_request():
+def test_diff_of_different_walks_is_short_unless_all_is_requested():
     steps = [{f"x{place}": float(place) for place in range(500)}, {f"x{place}": 2.0 * place for place in range(500)}]
     first, second = ({"contact-sim": Content({}, {"steps": 2, "step_periods_s": [0.7, t], "of": one})}
                      for t, one in zip((0.7, 0.8), steps, strict=True))  # fmt: skip
@@ -144,7 +144,7 @@ def test_diff_of_unequal_walks_prints_few_lines_and_all_on_request():
     assert len(whole) > 500
 
 
-def test_status_lists_all_runs_and_tells_of_one(toy):
+def test_status_lists_all_runs_or_one(toy):
     toy("roll")
     toy("drop", "--set", "strides=7")
     status = json.loads(toy("status", "--json").stdout)
@@ -160,7 +160,7 @@ def test_status_lists_all_runs_and_tells_of_one(toy):
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_a_bug_at_one_point_is_told_with_its_traceback_and_exits_1_and_the_others_are_there(toy, tmp_path, jobs):
+def test_bug_at_one_point_exits_1_and_keeps_the_other_points(toy, tmp_path, jobs):
     source = tmp_path / "source" / "toy" / "drop.py"
     text = source.read_text()
     assert "    progress.advance()" in text
@@ -175,7 +175,7 @@ def test_a_bug_at_one_point_is_told_with_its_traceback_and_exits_1_and_the_other
     assert (value["done"], value["failed"], value["error"]["exit_code"]) == (4, 1, 1)
 
 
-def test_points_without_an_answer_are_no_bug_and_no_failure(toy):
+def test_points_without_an_answer_are_not_failures(toy):
     done = toy("sweep", "--stage", "drop", "--jobs", "2", "--over", "slope_rad=[0.1, 1.2]", "--json")
     assert done.returncode == 0
     assert "Traceback" not in done.stderr

@@ -16,7 +16,7 @@ from walkerlab.views.report.text import describe_summary, table
 SENTENCES = "One gait cycle of the rigid model, to scale. " * 5
 
 
-def test_a_column_of_sentences_is_named_below_the_table_and_not_in_it():
+def test_column_of_sentences_is_named_below_the_table():
     rows = [{"number": 2, "svg": "figures/figure-02.svg", "caption": SENTENCES}, {"svg": "own.svg", "caption": "-"}]
     lines = list(describe_summary({"figures": rows}))
     assert lines[1].split() == ["number", "svg"]
@@ -25,7 +25,7 @@ def test_a_column_of_sentences_is_named_below_the_table_and_not_in_it():
     assert max(map(len, lines)) < LONGEST_CELL
 
 
-def test_a_table_of_sentences_alone_is_shown():
+def test_table_with_only_sentences_is_shown():
     assert table([{"caption": SENTENCES}])[1] == SENTENCES.rstrip()
 
 
@@ -37,7 +37,7 @@ def clock(monkeypatch):
     return now
 
 
-def test_no_time_is_estimated_until_a_tenth_is_done_in_some_seconds(clock):
+def test_remaining_time_is_estimated_only_after_a_tenth_of_the_work(clock):
     line = StageLine(Console(quiet=True), "tune", "", None)
     line.start("tune: cells", 100)
     told = []
@@ -48,7 +48,7 @@ def test_no_time_is_estimated_until_a_tenth_is_done_in_some_seconds(clock):
     assert told[2:] == pytest.approx([16.0, 14.4, 8.0])  # by the rates from 5 to 20, from 15 to 40 and from 20 to 60
 
 
-def test_a_slow_begin_does_not_count_once_the_pace_is_known(clock):
+def test_slow_start_is_ignored_once_the_pace_is_known(clock):
     line = StageLine(Console(quiet=True), "sweep", "", None)
     line.start("sweep", 400)
     for clock[0], done in ((8.0, 2), (12.0, 42), (16.0, 82), (20.0, 122)):
@@ -56,7 +56,7 @@ def test_a_slow_begin_does_not_count_once_the_pace_is_known(clock):
     assert line.seconds_left() == pytest.approx((400 - 122) / 10.0)
 
 
-def test_a_stage_that_takes_longer_than_the_last_time_is_not_said_to_end_at_once(clock):
+def test_remaining_time_is_never_zero_for_an_overdue_stage(clock):
     line = StageLine(Console(quiet=True), "fixedpoint", "", expected_s=5.0)
     clock[0] = 3.0
     assert line.pace() == "3 s, about 2 s left"
@@ -64,7 +64,7 @@ def test_a_stage_that_takes_longer_than_the_last_time_is_not_said_to_end_at_once
     assert line.pace() == "9 s"
 
 
-def test_the_time_left_comes_down_while_a_long_part_is_at_work(clock):
+def test_remaining_time_decreases_during_a_long_part(clock):
     line = StageLine(Console(quiet=True), "engines", "", None)
     line.start("engines", 4)
     for clock[0] in (10.0, 20.0):
@@ -76,7 +76,7 @@ def test_the_time_left_comes_down_while_a_long_part_is_at_work(clock):
 
 
 @pytest.mark.parametrize(("summary", "stored"), [({}, False), ({"period_s": 0.7}, True)])
-def test_that_there_is_no_answer_at_all_is_not_called_stored(summary, stored):
+def test_missing_answer_is_not_reported_as_stored(summary, stored):
     said = {"message": "none is installed", "advice": "Install one."}
     summary = {**summary, "no_answer": said}
     artifact = Path("runs/paper/drop.h5")

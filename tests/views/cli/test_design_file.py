@@ -19,7 +19,7 @@ def design(walker):
     return json.loads(done.stdout)
 
 
-def test_the_optimum_is_a_config_that_extends_the_start_and_is_written_over_nothing(walker):
+def test_optimum_is_written_as_an_extending_config_without_overwriting(walker):
     found = design(walker)
     path = walker.folder / found["config"]
     assert path.name == "optimum.yaml"
@@ -65,27 +65,27 @@ OVER = "--over walker.foot_radius_m=0.1:0.7"
         ("fixedpoint --set slope_deg=95", "--set slope_deg=95: slope_deg: 95 is out of bounds"),
     ],
 )
-def test_what_is_wrong_is_told_as_it_was_typed_with_its_reason(command, message, walker):
+def test_errors_quote_the_option_as_typed(command, message, walker):
     done = walker(*command.split())
     assert done.returncode == 3
     assert done.stderr.startswith(f"error: {message}"), done.stderr
 
 
-def test_help_offers_the_models_that_the_schema_allows(walker):
+def test_help_offers_the_models_allowed_by_the_schema(walker):
     for stage, models in (("design", "rigid|contact "), ("robustness", "rigid|contact|both")):
         done = walker(stage, "--help")
         assert done.returncode == 0
         assert f"--model {models}" in done.stdout
 
 
-def test_a_config_without_contact_is_shown_the_block_to_add(walker):
+def test_config_without_contact_shows_the_block_to_add(walker):
     done = walker("contact-sim", "-c", "kneed", "--set", "contact=null")
     assert done.returncode == 3
     assert "`contact: {stiffness: 8000, damping: 7.2, terrain: plane}`" in done.stderr
 
 
 @pytest.mark.parametrize("stage", ["robustness", "design", "continuation"])
-def test_the_model_that_is_asked_about_is_an_option_that_goes_by_itself(stage, walker):
+def test_model_option_works_without_other_options(stage, walker):
     done = walker(stage, "--model", "contact", "--dry-run", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["run_dir"].endswith(f"{stage}.model=contact")

@@ -51,7 +51,7 @@ def test_exported_steps_are_identified_and_written_as_a_config(walker):
 @pytest.mark.parametrize(
     ("config", "model"), [("paper", "simulate"), ("round-feet", "simulate"), ("paper", "contact-sim")]
 )
-def test_exported_steps_are_read_back_as_the_walk_that_was_stored(walker, config, model):
+def test_exported_steps_are_read_back_unchanged(walker, config, model):
     assert walker(model, "-c", config, "--set", "strides=4", "--name", "walk").returncode == 0
     assert walker("export", "walk", "steps", "--model", model, "--to", "csv", "-o", "steps.csv").returncode == 0
     measured = read_steps(walker.folder / "steps.csv", Identify())
@@ -76,7 +76,7 @@ def test_exported_steps_are_read_back_as_the_walk_that_was_stored(walker, config
         "step,period,length,note\n,s,m,\n1,0.7036,0.3714,first\n2,0.7040,0.3716,second\n",
     ],
 )
-def test_a_table_of_steps_is_read_as_spreadsheets_write_it(tmp_path, text):
+def test_table_of_steps_from_a_spreadsheet_is_read(tmp_path, text):
     path = tmp_path / "steps.csv"
     path.write_text(text)
     measured = read_steps(path, Identify())
@@ -84,7 +84,7 @@ def test_a_table_of_steps_is_read_as_spreadsheets_write_it(tmp_path, text):
     assert measured.lengths_m.tolist() == [0.3714, 0.3716]
 
 
-def test_a_column_of_steps_is_named_with_or_without_its_unit(tmp_path):
+def test_step_columns_may_have_a_unit_suffix(tmp_path):
     path = tmp_path / "steps.csv"
     path.write_text("duration (ms),step [mm]\n703.6,371.4\n704.0,371.6\n")
     columns = {"period_s": "duration", "length_m": "step [mm]"}
@@ -95,7 +95,7 @@ def test_a_column_of_steps_is_named_with_or_without_its_unit(tmp_path):
         read_steps(path, Identify(columns=columns, units={"lenght": "mm"}))
 
 
-def test_a_missing_file_is_refused_as_it_was_typed(walker):
+def test_missing_file_is_quoted_as_typed(walker):
     done = walker("identify", "--data", "nowhere.csv", "--fit", "slope_deg")
     assert done.returncode == 3
     assert done.stderr.startswith(

@@ -34,7 +34,7 @@ def run_dir(done):
     return json.loads(done.stdout)["run_dir"]
 
 
-def test_a_run_that_is_given_by_its_folder_runs_there_and_not_in_the_folder_of_all_runs(toy):
+def test_run_named_by_its_folder_stays_in_that_folder(toy):
     config(toy, "stone.yaml", 2)
     config(toy, "far/stone.yaml", 8)
     toy("drop", "-c", "stone.yaml")
@@ -49,13 +49,13 @@ def test_a_run_that_is_given_by_its_folder_runs_there_and_not_in_the_folder_of_a
     assert not (toy.folder / "runs/stone/roll.h5").exists()
 
 
-def test_a_change_of_a_run_goes_beside_it(toy):
+def test_changed_run_goes_to_a_new_folder_next_to_it(toy):
     toy("drop", "--runs", "far")
     assert run_dir(toy("drop", "-c", "far/paper", "--set", "gravity_m_s2=2", "--json")) == "far/paper@gravity_m_s2=2"
     assert not (toy.folder / "runs").exists()
 
 
-def test_a_run_goes_by_its_name_after_files_and_built_in_configs(toy):
+def test_run_name_is_tried_after_files_and_built_in_configs(toy):
     config(toy, "stone.yaml", 2)
     toy("drop", "-c", "stone.yaml", "--runs", "kept")
     assert run_dir(toy("drop", "-c", "stone", "--runs", "kept", "--json")) == "kept/stone"
@@ -85,14 +85,14 @@ def test_results_of_another_file_are_not_overwritten(toy, command):
     assert toy(*command, "-c", "there/stone.yaml", "--name", "other").returncode == 0
 
 
-def test_a_file_does_not_overwrite_the_run_of_the_built_in_config_of_its_name(toy):
+def test_file_does_not_overwrite_the_run_of_a_built_in_config_of_equal_name(toy):
     toy("drop")
     config(toy, "paper.yaml", 2, name="paper")
     assert toy("drop", "-c", "paper.yaml").returncode == 3
     assert gravity_of(toy, toy.folder / "runs/paper/drop.h5") == pytest.approx(9.81)
 
 
-def test_a_run_folder_that_was_renamed_is_not_overwritten(toy):
+def test_renamed_run_folder_is_not_overwritten(toy):
     toy("drop", "--set", "gravity_m_s2=2")
     (toy.folder / "runs/paper@gravity_m_s2=2").rename(toy.folder / "runs/paper")
     assert toy("drop").returncode == 3
@@ -100,7 +100,7 @@ def test_a_run_folder_that_was_renamed_is_not_overwritten(toy):
     assert run_dir(toy("roll", "-c", "runs/paper", "--json")) == "runs/paper"
 
 
-def test_results_whose_folder_does_not_say_where_they_are_from_are_not_overwritten(toy):
+def test_results_of_unknown_origin_are_not_overwritten(toy):
     config(toy, "stone.yaml", 2)
     toy("drop", "-c", "stone.yaml")
     (toy.folder / "runs/stone/.run.json").unlink()
@@ -109,7 +109,7 @@ def test_results_whose_folder_does_not_say_where_they_are_from_are_not_overwritt
     assert run_dir(toy("roll", "-c", "runs/stone", "--json")) == "runs/stone"
 
 
-def test_a_config_file_is_edited_and_run_again_in_its_folder(toy):
+def test_edited_config_file_reruns_in_its_folder(toy):
     file = config(toy, "stone.yaml", 2)
     for gravity in (2, 8, 2):
         config(toy, "stone.yaml", gravity)
@@ -121,7 +121,7 @@ def test_a_config_file_is_edited_and_run_again_in_its_folder(toy):
         assert run_dir(toy("drop", "-c", "stone.yaml", "--set", "strides=3", "--json")) == "runs/stone@strides=3"
 
 
-def test_a_project_that_was_moved_goes_on(toy):
+def test_moved_project_still_works(toy):
     config(toy, "project/stone.yaml", 2)
     toy("drop", "-c", "project/stone.yaml", "--runs", "project/runs")
     (toy.folder / "project").rename(toy.folder / "moved")
@@ -129,14 +129,14 @@ def test_a_project_that_was_moved_goes_on(toy):
     assert toy("drop", "-c", "moved/stone.yaml", "--runs", "moved/runs").returncode == 0
 
 
-def test_the_same_config_from_another_file_is_the_same_run(toy):
+def test_equal_config_in_another_file_is_the_same_run(toy):
     config(toy, "here/stone.yaml", 2)
     config(toy, "there/stone.yaml", 2)
     toy("drop", "-c", "here/stone.yaml")
     assert toy("roll", "-c", "there/stone.yaml").returncode == 0
 
 
-def test_a_run_whose_results_were_taken_over_has_its_own_config(toy):
+def test_run_with_reused_results_has_its_own_config(toy):
     toy("drop")
     toy("drop", "--set", "strides=7")
     assert run_dir(toy("roll", "-c", "runs/paper@strides=7", "--json")) == "runs/paper@strides=7"
@@ -145,7 +145,7 @@ def test_a_run_whose_results_were_taken_over_has_its_own_config(toy):
     assert difference["config"] == [{"key": "strides", "first": 5, "second": 7}]
 
 
-def test_clean_gives_the_name_free(toy):
+def test_clean_frees_the_run_name(toy):
     config(toy, "here/stone.yaml", 2)
     config(toy, "there/stone.yaml", 8)
     toy("drop", "-c", "here/stone.yaml")
@@ -154,7 +154,7 @@ def test_clean_gives_the_name_free(toy):
     assert toy("drop", "-c", "there/stone.yaml").returncode == 0
 
 
-def test_what_an_export_needs_is_made_by_the_command_that_it_advises(walker):
+def test_command_suggested_by_an_export_makes_it_work(walker):
     there = walker.folder / "here"
     there.mkdir()
     assert walker("fixedpoint", "-c", "rigid-only", "--runs", "r5").returncode == 0
@@ -185,7 +185,7 @@ def test_what_an_export_needs_is_made_by_the_command_that_it_advises(walker):
         ("sweep", "-c", "nothing", "--stage", "drop", "--over", "strides=[1]"),
     ],
 )
-def test_a_run_that_is_not_there_exits_3(toy, command):
+def test_missing_run_exits_3(toy, command):
     toy("drop")
     done = toy(*command)
     assert done.returncode == 3, done.stderr
@@ -193,7 +193,7 @@ def test_a_run_that_is_not_there_exits_3(toy, command):
     assert names_in(toy.folder / "runs") == ["paper"]
 
 
-def test_damaged_results_are_told_in_one_message_with_what_makes_them_anew(toy):
+def test_damaged_results_are_reported_once_with_the_command_to_recompute_them(toy):
     toy.alone("page")
     toy("roll", "--set", "strides=7")
     artifacts = [toy.folder / "runs/paper" / name for name in ("drop.h5", "roll.h5")]
@@ -222,7 +222,7 @@ def test_damaged_results_are_told_in_one_message_with_what_makes_them_anew(toy):
     assert toy("diff", "paper", "paper@strides=7").returncode == 0
 
 
-def test_a_drawing_says_that_what_it_does_without_is_damaged(toy):
+def test_drawing_reports_omitted_damaged_results(toy):
     toy.alone("survey", "--full")
     census = toy.folder / "runs/paper/census.h5"
     census.write_bytes(census.read_bytes()[:-1])
@@ -232,7 +232,7 @@ def test_a_drawing_says_that_what_it_does_without_is_damaged(toy):
     assert "`walkerlab survey --full` recomputes it</p>" in page
 
 
-def test_a_run_has_the_name_that_it_is_given_and_goes_by_it_wherever_a_run_is_meant(toy):
+def test_named_run_is_found_by_its_name(toy):
     heavy = ("--set", "gravity_m_s2=2")
     assert run_dir(toy("drop", *heavy, "--name", "moon", "--json")) == "runs/moon"
     assert run_dir(toy("roll", "-c", "moon", "--json")) == "runs/moon"
@@ -244,7 +244,7 @@ def test_a_run_has_the_name_that_it_is_given_and_goes_by_it_wherever_a_run_is_me
     assert run_dir(swept) == "runs/moons"
 
 
-def test_a_name_does_not_overwrite_results_of_another_change(toy):
+def test_run_name_does_not_overwrite_results_of_another_change(toy):
     toy("drop", "--set", "gravity_m_s2=2", "--name", "moon")
     done = toy("drop", "--set", "gravity_m_s2=3", "--name", "moon")
     assert done.returncode == 3
@@ -253,13 +253,13 @@ def test_a_name_does_not_overwrite_results_of_another_change(toy):
 
 
 @pytest.mark.parametrize("name", ["../out", "a/b", "", "a b"])
-def test_a_name_that_is_no_name_of_a_folder_is_refused(toy, name):
+def test_invalid_run_name_is_rejected(toy, name):
     done = toy("drop", "--name", name)
     assert done.returncode == 3
     assert "--set" not in done.stderr.splitlines()[0], "it is not what was typed"
 
 
-def test_a_run_is_shown_under_one_name_only(toy):
+def test_run_is_listed_under_one_name_only(toy):
     toy("drop")
     assert toy("show", "paper", "drop", "-c", "paper").returncode == 2
     assert toy("show", "paper", "paper", "drop").returncode == 2
@@ -267,7 +267,7 @@ def test_a_run_is_shown_under_one_name_only(toy):
     assert "advice: `walkerlab roll -c paper` computes it." in toy("show", "paper", "roll").stderr
 
 
-def test_a_damaged_result_is_called_so_once(toy):
+def test_damaged_result_is_reported_once(toy):
     toy("drop")
     (toy.folder / "runs" / "paper" / "drop.h5").write_bytes(b"half a file")
     (line,) = (line for line in toy("status", "paper").stdout.splitlines() if line.startswith("drop"))
@@ -278,7 +278,7 @@ LONG = ("--set", "gravity_m_s2=1.62", "--set", "walker.leg_mass_kg=6.25")
 LONG_AS_LISTED = ["walker.leg_mass_kg=6.25", "gravity_m_s2=1.62"]
 
 
-def test_status_lists_what_was_changed_where_a_name_is_too_short_for_it(toy):
+def test_status_lists_changes_that_a_short_name_omits(toy):
     folder = run_dir(toy("drop", *LONG, "--json"))
     assert re.fullmatch(r"runs/paper@walker\.leg_mass_kg-[0-9a-f]{8}", folder)
     toy("drop")
@@ -293,7 +293,7 @@ def test_status_lists_what_was_changed_where_a_name_is_too_short_for_it(toy):
     assert json.loads(toy("status", named, "--json").stdout)["changes"] == LONG_AS_LISTED
 
 
-def test_a_run_under_a_long_name_of_an_older_version_goes_on_under_it(toy):
+def test_run_with_a_long_name_of_an_older_version_keeps_it(toy):
     old = "paper@walker.leg_mass_kg=6.25,gravity_m_s2=1.62,strides=9-cd9cca311320"
     made = run_dir(toy("drop", *LONG, "--json"))
     (toy.folder / made).rename(toy.folder / "runs" / old)
@@ -307,14 +307,14 @@ def test_a_run_under_a_long_name_of_an_older_version_goes_on_under_it(toy):
     assert "walker.leg_mass_kg=6.25" in toy("status", old).stdout
 
 
-def test_a_provenance_keeps_a_command_whose_names_are_no_text(toy):
+def test_provenance_keeps_a_command_with_undecodable_names(toy):
     odd = os.fsdecode(b"r\xff")
     assert toy("drop", "--runs", odd, "--json").returncode == 0
     assert "r\\xff" in json.loads(toy("show", "drop", "--runs", odd, "--json").stdout)["provenance"]["command_line"]
 
 
 @pytest.mark.parametrize("config", ["extends: /etc/hostname\n", "stability: {cases: /etc/hostname}\n"])
-def test_a_config_that_a_stranger_stored_with_a_result_opens_no_file(toy, config):
+def test_config_stored_in_a_result_opens_no_file(toy, config):
     toy("drop")
     path = toy.folder / "runs/paper/drop.h5"
     stored = artifact.read(path)
@@ -325,7 +325,7 @@ def test_a_config_that_a_stranger_stored_with_a_result_opens_no_file(toy, config
     assert "hostname" not in done.stderr
 
 
-def test_a_result_of_another_stage_is_not_taken_for_ones_own(toy):
+def test_result_of_another_stage_is_not_accepted(toy):
     toy("drop")
     (toy.folder / "runs/paper/drop.h5").rename(toy.folder / "runs/paper/roll.h5")
     rows = json.loads(toy("status", "-c", "paper", "--json").stdout)["stages"]

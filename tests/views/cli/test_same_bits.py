@@ -10,7 +10,7 @@ tune: {cells: 3, rigid_limit: false}
 """
 
 
-def test_results_and_drawings_are_the_same_with_one_job_and_with_two(walker):
+def test_results_and_drawings_do_not_depend_on_the_number_of_jobs(walker):
     (walker.folder / "same.yaml").write_text(CONFIG)
     for jobs in ("1", "2"):
         for stage in ("tune", "plot"):

@@ -79,7 +79,7 @@ def typed(page, key, text):
     )
 
 
-def test_the_walker_walks_at_once_and_the_page_complains_of_nothing(whole_page, served):
+def test_page_shows_a_walk_at_once_without_errors(whole_page, served):
     page = whole_page
     page.until(f"{TIME} > 0.2")
     assert page.evaluate(SHOWN) == "Shown: paper"
@@ -87,7 +87,7 @@ def test_the_walker_walks_at_once_and_the_page_complains_of_nothing(whole_page, 
     assert {url.split("/")[2] for url in page.requests()} == {f"127.0.0.1:{served.port}"}
 
 
-def test_a_slider_that_is_dragged_changes_the_walk_and_what_is_let_go_can_be_gone_back_to(whole_page):
+def test_dragging_a_slider_changes_the_walk_and_can_be_undone(whole_page):
     page = whole_page
     page.until(f"{TIME} > 0.2")
     before = page.evaluate("history.length")
@@ -108,7 +108,7 @@ def test_a_slider_that_is_dragged_changes_the_walk_and_what_is_let_go_can_be_gon
     page.until(f"{SHOWN} === 'Shown: paper'")
 
 
-def test_the_address_alone_brings_a_walk_back(page, served):
+def test_address_alone_restores_a_walk(page, served):
     page.open(Address(f"{served.url}#config=kneed&walker.hip_mass_kg=0.6"))
     page.evaluate("location.reload()")
     page.until(f"typeof rows !== 'undefined' && {SHOWN} === 'Shown: kneed with walker.hip_mass_kg 0.6'")
@@ -116,7 +116,7 @@ def test_the_address_alone_brings_a_walk_back(page, served):
     assert page.evaluate("rows.get('walker.hip_mass_kg').text.value") == "0.6"
 
 
-def test_a_picture_is_never_taken_for_that_of_other_numbers(page):
+def test_picture_is_labelled_with_the_parameters_it_shows(page):
     first = page.evaluate(SHOWN)
     typed(page, "walker.leg_mass_kg", "-4")
     page.until(f"{STATE} === 'failed'")
@@ -131,7 +131,7 @@ def test_a_picture_is_never_taken_for_that_of_other_numbers(page):
     assert page.evaluate(f"{SHOWN} + {PERIOD}") == "No walk: paper with slope_deg 30–"
 
 
-def test_any_other_key_is_found_and_turned(page):
+def test_any_key_can_be_searched_and_changed(page):
     page.evaluate("document.getElementById('search').value = 'gravity'; search()")
     page.evaluate("document.querySelector('#found button').click()")
     page.evaluate(slider("gravity_m_s2", 0, "change"))
@@ -140,14 +140,14 @@ def test_any_other_key_is_found_and_turned(page):
     assert "No key" in page.evaluate("document.getElementById('found').textContent")
 
 
-def test_enter_takes_the_only_hit_of_a_search(page):
+def test_enter_selects_the_only_match_of_a_search(page):
     page.evaluate("document.getElementById('search').focus()")
     page.call("Input.insertText", text="gravity_m")
     page.press("Enter", 13)
     assert page.evaluate("document.activeElement.id") == "turn-gravity_m_s2"
 
 
-def test_an_answer_that_arrives_leaves_alone_what_is_being_typed(page):
+def test_arriving_result_does_not_disturb_typing(page):
     page.evaluate(
         "(async () => { const late = settle(); window.typing = rows.get('slope_deg').text; typing.focus();"
         " typing.value = '2.'; await late; })()"
@@ -158,7 +158,7 @@ def test_an_answer_that_arrives_leaves_alone_what_is_being_typed(page):
     page.until(f"{SHOWN} === 'Shown: paper with slope_deg 2.5'")
 
 
-def test_an_answer_about_older_values_is_not_put_over_newer_ones(page):
+def test_outdated_result_does_not_replace_a_newer_one(page):
     first, value = page.evaluate(
         "(async () => { turn('slope_deg', 3, false); const late = settle(), first = rows.get('slope_deg').number.start;"
         " turn('slope_deg', first, false); await late; return [first, Number(rows.get('slope_deg').text.value)]; })()"
@@ -167,7 +167,7 @@ def test_an_answer_about_older_values_is_not_put_over_newer_ones(page):
     page.until(f"{SHOWN} === 'Shown: paper'")
 
 
-def test_the_camera_follows_what_still_walks(page):
+def test_camera_follows_the_model_that_still_walks(page):
     """The first minutes of the lesson of docs/explore.md: on pads of equal length the contact model trips."""
     typed(page, "slope_deg", "4.7")
     page.until(f"{SHOWN} === 'Shown: paper with slope_deg 4.7' && {STATE} === 'shown'")
@@ -186,7 +186,7 @@ def test_the_camera_follows_what_still_walks(page):
         assert x == pytest.approx(width / 2, abs=0.1 * width)
 
 
-def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(whole_page):
+def test_clicking_a_gait_curve_sets_the_parameter(whole_page):
     page = whole_page
     page.until("along.series?.length > 0")
     page.evaluate("along.cursor.scrollIntoView()")
@@ -201,7 +201,7 @@ def test_gaits_along_the_number_are_drawn_and_a_click_goes_there(whole_page):
     )
 
 
-def test_gaits_along_a_number_of_the_ground_are_the_contact_models_over_decades(whole_page):
+def test_ground_parameters_plot_contact_gaits_on_a_log_axis(whole_page):
     page = whole_page
     typed(page, "contact.stiffness", "50000")
     page.until("along.key === 'contact.stiffness' && along.found?.every(({ model }) => model === 'contact')")
@@ -222,7 +222,7 @@ def test_each_model_can_be_hidden(page):
     page.until("document.querySelectorAll('[data-view=phase] path').length === 2")
 
 
-def test_what_was_found_is_saved(page, served):
+def test_current_config_can_be_saved(page, served):
     typed(page, "slope_deg", "3")
     page.evaluate("document.getElementById('name').value = 'found.yaml'; document.getElementById('save').click()")
     page.until("document.getElementById('made').textContent.startsWith('Saved')")
@@ -231,7 +231,7 @@ def test_what_was_found_is_saved(page, served):
     page.until("document.getElementById('made').textContent.includes('already exists')")
 
 
-def test_the_picture_is_what_is_seen_on_the_pages_own_ground(page):
+def test_saved_picture_has_the_page_background_and_size(page):
     page.evaluate("window.leave = (name, address) => (window.left = address); document.getElementById('png').click()")
     page.evaluate("window.seen = new Image(); seen.src = left; seen.decode()")
     corner, size = page.evaluate(
@@ -243,7 +243,7 @@ def test_the_picture_is_what_is_seen_on_the_pages_own_ground(page):
     assert size == page.evaluate("(({ canvas }) => [canvas.width, canvas.height])(player.walk)")
 
 
-def test_a_film_is_made_and_linked(page):
+def test_film_is_written_and_linked(page):
     typed(page, "strides", "1")
     page.until(f"{SHOWN} === 'Shown: paper with strides 1'")
     page.evaluate("document.getElementById('contact').click()")
@@ -258,13 +258,13 @@ def test_a_film_is_made_and_linked(page):
 
 
 @pytest.mark.parametrize(("width", "dark"), [(400, True), (1440, False)])
-def test_nothing_is_wider_than_the_screen(browser, served, width, dark):
+def test_page_fits_the_screen_width(browser, served, width, dark):
     opened(browser, served, width=width, dark=dark, calm=True)
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
     assert browser.evaluate(TIME) == 0  # who asked for less motion starts it
 
 
-def test_the_keyboard_alone_turns_a_number(page):
+def test_keyboard_alone_can_change_a_parameter(page):
     page.evaluate("document.getElementById('turn-slope_deg').focus()")
     # not by history.length, which browsers cap
     count = "function () { places++; push.apply(this, arguments) }"
@@ -278,7 +278,7 @@ def test_the_keyboard_alone_turns_a_number(page):
     assert page.evaluate("places") == 2  # a key that is held is one place to come back to
 
 
-def test_who_skips_to_the_numbers_keeps_them(page):
+def test_skip_link_keeps_the_parameters(page):
     typed(page, "slope_deg", "2")
     page.until(f"{SHOWN} === 'Shown: paper with slope_deg 2'")
     page.evaluate("document.querySelector('.skip').click()")
@@ -287,7 +287,7 @@ def test_who_skips_to_the_numbers_keeps_them(page):
     page.until(f"{SHOWN} === 'Shown: paper'")
 
 
-def test_a_list_is_typed_and_comes_back_with_the_address(page):
+def test_typed_list_is_restored_from_the_address(page):
     page.evaluate("document.getElementById('search').value = 'heights'; search()")
     page.evaluate("document.querySelector('#found button').click()")
     typed(page, "ground.heights_m", "[0.002, -0.001]")
@@ -298,7 +298,7 @@ def test_a_list_is_typed_and_comes_back_with_the_address(page):
     assert page.evaluate("shown.answer.scene.ground.length") > 2  # the player draws the levels
 
 
-def test_a_loop_of_a_steady_walk_goes_on_over_the_ground(whole_page):
+def test_looping_walk_continues_along_the_ground(whole_page):
     page = whole_page
     page.evaluate(
         "window.said = []; const drawn = CanvasRenderingContext2D.prototype.fillText;"
@@ -321,7 +321,7 @@ def test_a_loop_of_a_steady_walk_goes_on_over_the_ground(whole_page):
     assert max(steps) < 0.3
 
 
-def test_what_the_page_was_started_from_is_what_it_shows(browser, other):
+def test_page_shows_the_config_it_was_started_with(browser, other):
     opened(browser, other)
     assert browser.evaluate(SHOWN) == "Shown: paper with slope_deg=3"
     assert browser.evaluate("rows.get('slope_deg').text.value") == "3"
@@ -333,7 +333,7 @@ def test_what_the_page_was_started_from_is_what_it_shows(browser, other):
     browser.until(f"{SHOWN} === 'Shown: paper'")
 
 
-def test_a_server_that_is_gone_is_told(browser, other, tmp_path):
+def test_lost_server_is_reported(browser, other, tmp_path):
     opened(browser, other)
     other.close()
     typed(browser, "slope_deg", "2")
@@ -353,7 +353,7 @@ def in_sight(selector):
     )
 
 
-def test_on_a_phone_the_walk_play_and_a_slider_are_in_sight_together(browser, served):
+def test_phone_shows_walk_play_button_and_a_slider_together(browser, served):
     page = opened(browser, served, ["*/api/along"], width=390, height=800, calm=True)
     for name in ("slope_deg", "dynamic_friction"):
         slider = f"#sliders [aria-label*={name}], #sliders [id*={name}]"
@@ -369,7 +369,7 @@ def test_on_a_phone_the_walk_play_and_a_slider_are_in_sight_together(browser, se
     page.until(f"{TIME} > 0")
 
 
-def test_a_phone_held_sideways_scrolls_past_the_walk_to_the_sliders(browser, served):
+def test_landscape_phone_can_scroll_to_the_sliders(browser, served):
     page = opened(browser, served, ["*/api/along"], width=800, height=390, calm=True)
     page.evaluate("document.querySelector('#sliders').scrollIntoView()")
     assert page.evaluate("document.querySelector('.walk').getBoundingClientRect().bottom") <= 0

@@ -51,19 +51,19 @@ STAGES = {"rigid": "simulate", "contact": "contact-sim"}
 
 
 @pytest.mark.parametrize(("config", "changes"), list(settings(1, 9)))
-def test_every_number_is_the_one_of_the_command(served, config, changes):
+def test_page_values_equal_those_of_the_command(served, config, changes):
     same(served, config, changes, ["rigid"])
 
 
 @pytest.mark.parametrize(
     "changes", [{"slope_deg": 3}, {"contact.stiffness": 2e4, "contact.terrain": "after-mid-swing"}]
 )
-def test_every_number_of_the_contact_walk_is_the_one_of_the_command(served, changes):
+def test_contact_walk_values_equal_those_of_the_command(served, changes):
     said = same(served, "paper", changes, ["rigid", "contact"])
     assert said["tracks"].keys() == {"simulate", "contact-sim"}
 
 
-def test_the_copied_command_lines_print_what_the_page_shows(served):
+def test_copied_commands_print_the_values_on_the_page(served):
     changes = {"slope_deg": 2.345678901, "walker.hip_mass_kg": 12.5, "contact.terrain": "after-mid-swing"}
     _, said = served.walk({**changes, "ground.heights_m": [0.0, 0.001]}, ["rigid", "contact"])
     lines = said["command"].splitlines()
@@ -77,7 +77,7 @@ def test_the_copied_command_lines_print_what_the_page_shows(served):
         assert {key: printed[key] for key in said[stage]} == said[stage]
 
 
-def test_a_gait_that_is_left_is_seen_to_limp(served):
+def test_walk_beyond_the_first_flip_limps(served):
     """The lesson of docs/explore.md."""
     changes = {"slope_deg": 4.7, "strides": 50, "contact.terrain": "after-mid-swing"}
     _, said = served.walk(changes, ["rigid", "contact"])
@@ -96,7 +96,7 @@ def other(tmp_path_factory):
     one.close()
 
 
-def test_two_servers_keep_their_tokens_apart(served, other):
+def test_two_servers_have_different_tokens(served, other):
     cookies = []
     for one in (served, other):
         with contextlib.closing(http.client.HTTPConnection("127.0.0.1", one.port)) as connection:
@@ -108,7 +108,7 @@ def test_two_servers_keep_their_tokens_apart(served, other):
         assert one.asked("/runs/none", Cookie=cookies[one is served])[0] == 401
 
 
-def test_a_question_after_an_idle_worker_died_is_answered(other):
+def test_request_after_the_death_of_an_idle_worker_is_answered(other):
     for slope in (2, 2.1):
         for file in workers_of(other.process.pid):
             os.kill(int(file.parts[2]), signal.SIGKILL)
@@ -116,7 +116,7 @@ def test_a_question_after_an_idle_worker_died_is_answered(other):
         assert (status, said["fixedpoint"]["stable"]) == (200, True)
 
 
-def test_the_server_ends_on_an_interrupt_and_leaves_nothing_behind(other):
+def test_server_ends_on_an_interrupt_and_cleans_up(other):
     began = time.monotonic()
     other.process.send_signal(signal.SIGINT)
     assert other.process.wait(10) == 130
@@ -124,7 +124,7 @@ def test_the_server_ends_on_an_interrupt_and_leaves_nothing_behind(other):
     assert not workers_of(other.process.pid)
 
 
-def test_a_port_that_is_taken_is_a_word(served, tmp_path):
+def test_occupied_port_is_a_usage_error(served, tmp_path):
     arguments = ["explore", "--no-browser", "--port", served.port]
     done = forks().run("walkerlab", arguments, tmp_path, dict(os.environ))
     assert (done.returncode, done.stdout) == (2, "")
@@ -132,7 +132,7 @@ def test_a_port_that_is_taken_is_a_word(served, tmp_path):
     assert "Traceback" not in done.stderr
 
 
-def test_a_slope_without_a_gait_is_an_answer(served):
+def test_slope_without_a_gait_is_a_valid_response(served):
     status, said = served.walk({"slope_deg": 20})
     assert (status, said["fixedpoint"]["error"]["exit_code"]) == (200, 4)
     assert "no gait" in said["fixedpoint"]["error"]["message"]
@@ -150,7 +150,7 @@ def test_a_slope_without_a_gait_is_an_answer(served):
         ({"": 1}, "", ""),
     ],
 )
-def test_what_a_config_cannot_have_is_refused_with_the_commands_message(served, changes, key, message):
+def test_invalid_value_is_rejected_with_the_message_of_the_command(served, changes, key, message):
     status, said = served.walk(changes)
     assert (status, said["error"]["key"]) == (422, key)
     assert message in said["error"]["message"]
@@ -184,13 +184,13 @@ def test_what_a_config_cannot_have_is_refused_with_the_commands_message(served, 
         (404, "//[", None, {}),
     ],
 )
-def test_who_may_not_ask_and_what_is_no_question_is_refused_in_words(served, status, path, body, headers):
+def test_unauthorised_and_malformed_requests_are_rejected(served, status, path, body, headers):
     found, said = served.asked(path, body, **({**served.bearer, **headers} if "X" not in headers else headers))
     assert found == status
     assert said["error"]["message"]
 
 
-def test_a_circle_of_links_below_the_runs_is_not_found(served):
+def test_circular_link_in_the_runs_folder_is_not_found(served):
     runs = served.folder / "runs"
     runs.mkdir(exist_ok=True)
     (runs / "circle").symlink_to(runs / "circle")
@@ -199,19 +199,19 @@ def test_a_circle_of_links_below_the_runs_is_not_found(served):
     assert said["error"]["message"]
 
 
-def test_a_decimal_comma_is_refused_with_the_number_that_was_meant(served):
+def test_decimal_comma_is_rejected_with_a_suggestion(served):
     status, said = served.walk({"slope_deg": "0,5"})
     assert status == 422
     assert "did you mean 0.5?" in said["error"]["message"]
 
 
-def test_the_page_is_small(served):
+def test_page_is_small(served):
     status, page = served.asked(f"/?token={served.token}")
     assert status == 200
     assert len(page.encode()) < 150_000
 
 
-def test_of_questions_that_pile_up_the_newest_is_answered_and_memory_stays_level(served):
+def test_newest_of_many_requests_is_answered_in_constant_memory(served):
     statuses = []
 
     def ask(slope):
@@ -242,7 +242,7 @@ def resident_kB(process):
     return int(fields["VmRSS"].split()[0])
 
 
-def test_a_config_is_saved_as_what_differs_and_over_no_file(served):
+def test_saved_config_contains_only_changes_and_overwrites_no_file(served):
     asked = {"set": {"slope_deg": 3, "walker.hip_mass_kg": 12}, "name": "mine.yaml"}
     status, said = served.asked("/api/save", asked)
     assert (status, Path(said["file"])) == (200, served.folder / "mine.yaml")
@@ -259,7 +259,7 @@ def test_a_config_is_saved_as_what_differs_and_over_no_file(served):
     assert served.walk({}, config="mine.yaml")[1]["command"].startswith("walkerlab fixedpoint -c mine.yaml\n")
 
 
-def test_gaits_along_a_number_are_those_of_the_continuation(served):
+def test_gait_curves_equal_those_of_continuation(served):
     span = {"over": "slope_deg", "from": 0.5, "to": 5.0, "points": 40, "periods": 1}
     block = {f"continuation.{key}": value for key, value in span.items()}
     status, said = served.asked("/api/along", {"set": block})
@@ -270,7 +270,7 @@ def test_gaits_along_a_number_are_those_of_the_continuation(served):
     assert 0.9 * limit < max(stable) <= limit
 
 
-def test_walks_that_settle_on_an_attractor_are_no_branch_of_gaits(served):
+def test_attractors_are_not_returned_as_branches(served):
     """The page itself asks for gaits of one step alone, of which there are no attractors."""
     span = {"over": "slope_deg", "from": 0.86, "to": 0.87, "points": 4, "periods": 2}
     block = {f"continuation.{key}": value for key, value in span.items()}
@@ -278,7 +278,7 @@ def test_walks_that_settle_on_an_attractor_are_no_branch_of_gaits(served):
     assert (status, {curve["model"] for curve in said["curves"]}) == (200, {"rigid"})
 
 
-def test_gaits_that_nobody_waits_for_any_more_are_dropped_and_their_worker_kept(served):
+def test_abandoned_gait_requests_are_dropped_and_their_worker_kept(served):
     span = {"over": "slope_deg", "from": 0.5, "to": 5.0, "points": 200, "periods": 1, "model": "contact"}
     block = {f"continuation.{key}": value for key, value in span.items()}
     answers = []
@@ -301,7 +301,7 @@ def test_gaits_that_nobody_waits_for_any_more_are_dropped_and_their_worker_kept(
     assert worker in workers_of(served.process.pid)
 
 
-def test_what_can_be_turned_is_what_the_walker_has(served):
+def test_sliders_exist_for_the_parameters_of_the_walker(served):
     _, said = served.asked("/api/numbers", {"config": "simplest", "set": {"slope_deg": 0.4}})
     keys = {number["key"]: number for number in said["numbers"]}
     assert keys["slope_deg"]["value"] == pytest.approx(0.4)
@@ -314,7 +314,7 @@ def test_what_can_be_turned_is_what_the_walker_has(served):
         assert "from" not in number or number["from"] <= number["start"] <= number["to"]
 
 
-def test_a_slider_leads_to_nothing_that_is_refused_and_to_all_that_matters(served):
+def test_slider_range_is_valid_and_wide(served):
     for config in ("kneed", "paper"):
         _, said = served.asked("/api/numbers", {"config": config})
         keys = {number["key"]: number for number in said["numbers"]}
@@ -336,7 +336,7 @@ def test_a_slider_leads_to_nothing_that_is_refused_and_to_all_that_matters(serve
     assert slope["from"] < 0 < slope["to"]  # what is driven walks uphill, too
 
 
-def test_a_server_that_is_told_to_end_leaves_no_worker_and_no_report_that_is_being_made(tmp_path):
+def test_terminated_server_leaves_no_worker_or_report_process(tmp_path):
     one = Served(tmp_path)
     try:
         assert one.asked("/api/job", {"kind": "report"})[0] == 200
@@ -352,7 +352,7 @@ def test_a_server_that_is_told_to_end_leaves_no_worker_and_no_report_that_is_bei
         one.close()
 
 
-def test_a_report_that_is_being_made_ends_with_a_server_that_is_killed(tmp_path):
+def test_report_process_ends_with_a_killed_server(tmp_path):
     one = Served(tmp_path)
     assert one.asked("/api/job", {"kind": "report"})[0] == 200
     while not at_work_for(tmp_path):
@@ -364,7 +364,7 @@ def test_a_report_that_is_being_made_ends_with_a_server_that_is_killed(tmp_path)
         time.sleep(0.05)
 
 
-def test_a_job_imports_nothing_from_the_folder_in_which_the_server_was_started(tmp_path):
+def test_jobs_import_nothing_from_the_start_folder(tmp_path):
     one = Served(tmp_path)
     try:
         (tmp_path / "signal.py").write_text(f"open({str(tmp_path / 'imported')!r}, 'w')")
@@ -409,7 +409,7 @@ def text_of(file):
         return ""
 
 
-def test_in_a_notebook_it_is_a_frame(tmp_path, monkeypatch):
+def test_notebook_shows_the_page_in_a_frame(tmp_path, monkeypatch):
     page = walkerlab.explore(walkerlab.kneed(), slope_deg=3, runs=tmp_path)
     try:
         assert f'<iframe src="{page.url}"' in page._repr_html_()

@@ -26,25 +26,25 @@ def points(lines, crosses):
     return sorted((x, y) for line in chosen for x, y in zip(*line.get_data(), strict=True))
 
 
-def test_there_is_a_figure_for_each_scene():
+def test_each_scene_has_a_figure():
     assert [figure.name for figure in FIGURES] == [f"accuracy-{scene}" for scene in SCENES]
 
 
-def test_every_run_that_reached_the_end_is_drawn_against_time_and_against_right_hand_sides():
+def test_every_complete_run_is_plotted_over_time_and_work():
     reached = [run for run in RUNS if run[3] is not None]
     for lines, cost in zip(drawn_lines(), (4, 5), strict=True):
         expected = sorted((run[cost], max(run[3], AGREEMENT)) for run in reached)
         np.testing.assert_allclose(points(lines, crosses=False), expected)
 
 
-def test_runs_that_did_not_reach_the_end_stay_visible_above_all_others():
+def test_incomplete_runs_are_plotted_above_all_others():
     left, _ = drawn_lines()
     failed = points(left, crosses=True)
     assert [x for x, _ in failed] == sorted(run[4] for run in RUNS if run[3] is None)
     assert min(y for _, y in failed) > max(y for _, y in points(left, crosses=False))
 
 
-def test_the_legend_has_a_cross_only_where_a_run_did_not_reach_the_end():
+def test_legend_has_a_cross_only_for_incomplete_runs():
     every = list(method_series(SCENES[0], measured_methods()))
     whole = [one for one in every if one.runs["reached"].all()]
     assert 0 < len(whole) < len(every)
@@ -52,13 +52,13 @@ def test_the_legend_has_a_cross_only_where_a_run_did_not_reach_the_end():
         assert ("end not reached" in [entry.get_label() for entry in legend_entries(shown, AGREEMENT)]) is there
 
 
-def test_the_caption_tells_the_conclusion_the_reference_and_the_failures():
+def test_caption_states_conclusion_reference_and_failures():
     caption = RIGID.render(measured_methods()).caption
     for said in ("at 1e-06, dop853 is fastest", "heyoka-taylor", "scipy-rk45 at 1e-09 (budget-exhausted)", "(slid)"):
         assert said in caption
 
 
-def test_the_caption_says_what_a_method_is_measured_by_that_is_the_reference_too():
+def test_caption_names_the_second_reference_of_the_reference_method():
     results = measured_methods()
     assert "itself is measured against" not in RIGID.render(results).caption
     results["accuracy"].summary["reference"]["rigid"] = {
@@ -69,14 +69,14 @@ def test_the_caption_says_what_a_method_is_measured_by_that_is_the_reference_too
     assert "radau5 itself is measured against dop853." in RIGID.render(results).caption
 
 
-def test_every_method_of_the_registry_has_a_look_of_its_own():
+def test_every_method_has_a_distinct_style():
     assert set(METHODS) <= set(LOOKS)
     looks = [(to_hex(look.colour), str(look.style)) for look in LOOKS.values()]
     assert len(set(looks)) == len(looks)
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_scene_that_was_not_measured_is_left_out_and_says_so(scene):
+def test_unmeasured_scene_is_omitted_with_the_reason(scene):
     others = measured_methods([other for other in SCENES if other != scene])
     figure = FIGURES[SCENES.index(scene)]
     assert figure.why_left_out(others, {}) == f"accuracy: the scene {scene} was not measured"

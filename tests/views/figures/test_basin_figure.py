@@ -15,11 +15,11 @@ from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections.families import basin as section
 
 
-def test_walks_that_have_settled_from_their_first_step_on_are_drawn():
+def test_walks_that_settle_at_once_are_drawn():
     assert FIGURE.render(basin([0, UNREACHED], steps=0)).png.startswith(b"\x89PNG")
 
 
-def test_it_says_how_much_of_the_window_walks_and_where_to():
+def test_caption_states_the_share_that_walks_and_its_attractors():
     results = basin([0, 0, 1, UNREACHED])
     drawing = FIGURE.render(results)
     assert drawing.png.startswith(b"\x89PNG")
@@ -30,19 +30,19 @@ def test_it_says_how_much_of_the_window_walks_and_where_to():
     assert drawing.svg == FIGURE.render(results).svg
 
 
-def test_walks_that_settle_nowhere_are_told_apart():
+def test_unsettled_walks_have_their_own_colour():
     drawing = FIGURE.render(basin([-2, UNREACHED], aperiodic=True))
     assert "aperiodic" in drawing.svg.decode()
     assert "no walk settles on a gait" in drawing.svg.decode()
     assert "6 walks are still going after 300 steps" in drawing.caption
 
 
-def test_of_three_coordinates_the_middle_plane_is_drawn():
+def test_middle_plane_of_three_coordinates_is_drawn():
     config = load(None, ["basin.plane=[theta_2,dtheta_1,dtheta_2]", "basin.cells=[3,3,3]"]).config
     assert "of which the middle plane is shown" in FIGURE.render(basin([0, UNREACHED], config=config)).caption
 
 
-def test_attractors_of_one_period_have_letters():
+def test_attractors_of_equal_period_have_letters():
     rows = [{"period": 1}, {"period": 3}, {"period": 3}]
     assert [attractor_name(number, rows) for number in range(3)] == [
         "gait of 1 step",
@@ -51,16 +51,16 @@ def test_attractors_of_one_period_have_letters():
     ]
 
 
-def test_cells_are_drawn_around_their_middles():
+def test_cells_are_drawn_around_their_centres():
     assert sides_of(np.array([0.5, 1.5, 2.5])) == (0.0, 3.0)
 
 
-def test_without_a_basin_it_says_how_to_make_one():
+def test_missing_basin_names_its_command():
     why = FIGURE.why_left_out({}, {"basin": "it was not requested; `walkerlab basin` makes it"})
     assert why == "it needs basin: it was not requested; `walkerlab basin` makes it"
 
 
-def test_the_report_has_its_shares_and_attractors():
+def test_report_lists_shares_and_attractors():
     made = section(Results(CONFIG, basin([0, 0, 1, UNREACHED]), (), ()))
     assert "75 % of the starts in the window lead to walking" in made.blocks[0].text
     assert [row[1].text for row in next(iter(made.blocks[1].groups.values()))] == ["6", "3"]
@@ -68,13 +68,13 @@ def test_the_report_has_its_shares_and_attractors():
 
 
 @pytest.mark.parametrize("stage", ["plot", "report"])
-def test_drawings_take_it_in_once_it_is_there(stage):
+def test_drawings_include_the_basin_once_it_exists(stage):
     from walkerlab.pipeline.graph import PIPELINE
 
     assert "basin" in PIPELINE[stage].if_current
 
 
-def test_its_own_command_draws_it_at_once(tmp_path):
+def test_basin_command_draws_its_figure_at_once(tmp_path):
     made = basin([0, 0, 1, UNREACHED])["basin"]
     artifact.write(tmp_path / "basin.h5", Content(made.groups, made.summary), made.identity, made.provenance)
     (path,) = plot.draw_at_once("basin", tmp_path, anew=True)

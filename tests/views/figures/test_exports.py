@@ -60,7 +60,7 @@ def run(original, tmp_path, monkeypatch):
     ("kind", "start"),
     [("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG"), ("eps", b"%!PS-Adobe"), ("tiff", b"II")],
 )
-def test_a_figure_in_every_format(run, kind, start):
+def test_figure_is_exported_in_every_format(run, kind, start):
     path = export_from(run, "figure-09", Target(kind, None), 516.0, "", QUIET)
     assert path.name == f"paper-figure-09.{kind}"
     assert path.read_bytes().startswith(start)
@@ -70,7 +70,7 @@ READERS_OF_RESULTS = {"figure-08", "figure-09", "figure-10", "figure-13", "accur
 """Figures of every stage, and those that draw whatever results there are."""
 
 
-def test_a_figure_is_the_pages_in_another_size(run, monkeypatch):
+def test_exported_figure_equals_that_of_the_page(run, monkeypatch):
     monkeypatch.setattr(illustration, "POINT", 1.0)
     monkeypatch.setattr(plot, "FIGURES", [figure for figure in FIGURES if figure.name in READERS_OF_RESULTS])
     results = {**everything(), **families()}
@@ -83,12 +83,12 @@ def test_a_figure_is_the_pages_in_another_size(run, monkeypatch):
         assert path.read_bytes() == (run.path / "figures" / f"{name}.svg").read_bytes(), name
 
 
-def test_a_figure_of_outdated_results_says_so(run, capsys):
+def test_figure_of_outdated_results_warns(run, capsys):
     export_from(run, "figure-09", Target("svg", None), 516.0, "", Console())
     assert "outdated results, which are drawn anyway: compare, contact-sim and simulate;" in capsys.readouterr().err
 
 
-def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
+def test_figure_has_the_requested_width(run, tmp_path):
     for points in (252.0, 300.0):
         file = Target("png", tmp_path / f"{points}.png")
         with Image.open(export_from(run, "figure-09", file, points, "", QUIET)) as image:
@@ -96,7 +96,7 @@ def test_a_figure_is_as_wide_as_is_asked_for(run, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["png", "tiff"])
-def test_pixels_are_as_many_an_inch_as_are_asked_for(run, kind):
+def test_image_has_the_requested_resolution(run, kind):
     with Image.open(export_from(run, "figure-09", Target(kind, None), 252.0, "", QUIET, dpi=600)) as image:
         assert image.size[0] == pytest.approx(3.5 * 600.0, abs=1.0)
         assert image.info["dpi"] == pytest.approx((600.0, 600.0), abs=0.1)
@@ -108,7 +108,7 @@ def test_fonts_of_a_pdf_are_embedded_as_truetype(run):
     assert b"/FontFile2" in data.replace(b" ", b"")
 
 
-def test_format_and_file_mean_the_same_everywhere(run, tmp_path):
+def test_format_and_file_name_are_handled_consistently(run, tmp_path):
     assert export_from(run, "trajectory", Target(None, None), 252.0, "simulate", QUIET).name == (
         "paper-simulate-trajectory.csv"
     )
@@ -122,14 +122,14 @@ def test_format_and_file_mean_the_same_everywhere(run, tmp_path):
     assert film.name == "paper-simulate.gif"
 
 
-def test_nothing_is_overwritten_in_silence(run, capsys):
+def test_nothing_is_overwritten_silently(run, capsys):
     target = Target("csv", Path("walk.csv"))
     for model, told in (("simulate", ""), ("simulate", ""), ("contact-sim", "walk.csv existed and was replaced.")):
         export_from(run, "trajectory", target, 252.0, model, Console())
         assert told in capsys.readouterr().err
 
 
-def test_a_trajectory_as_csv_is_the_stored_one(run):
+def test_exported_csv_trajectory_equals_the_stored_one(run):
     path = export_from(run, "trajectory", Target("csv", None), 516.0, "simulate", QUIET)
     with path.open() as file:
         head, *rows = csv.reader(file)
@@ -140,7 +140,7 @@ def test_a_trajectory_as_csv_is_the_stored_one(run):
     assert [float(row[column]) for row in rows] == stored["angle"][:, 0].tolist()
 
 
-def test_a_trajectory_as_netcdf_opens_without_a_group(run):
+def test_netcdf_trajectory_opens_without_a_group(run):
     path = export_from(run, "trajectory", Target("nc", None), 516.0, "contact-sim", QUIET)
     with xarray.open_dataset(path, engine="h5netcdf") as dataset:
         assert dataset["angle"].dims == ("time", "leg")
@@ -148,7 +148,7 @@ def test_a_trajectory_as_netcdf_opens_without_a_group(run):
         assert dataset.attrs["title"] == "walkerlab contact-sim"
 
 
-def test_a_table_for_latex_guards_its_letters(run):
+def test_latex_table_escapes_special_characters(run):
     text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
     assert r"left step period, $t_\mathrm{left}$ (s) & 0.70000 \\" in text
     assert in_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
@@ -159,11 +159,11 @@ def test_a_table_for_latex_guards_its_letters(run):
 
 
 @pytest.mark.parametrize("name", ["9", "09", "figure-9", "fig 9"])
-def test_a_figure_is_known_by_its_number(run, name):
+def test_figure_can_be_named_by_its_number(run, name):
     assert export_from(run, name, Target("svg", None), 516.0, "", QUIET).name == "paper-figure-09.svg"
 
 
-def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
+def test_unknown_export_lists_what_the_run_has(run):
     with pytest.raises(ConfigError) as refused:
         export_from(run, "figur", Target("pdf", None), 516.0, "", QUIET)
     assert "figure-09" in refused.value.advice
@@ -171,19 +171,19 @@ def test_what_a_run_has_is_listed_for_a_name_that_there_is_not(run):
     assert "figure-13" not in refused.value.advice
 
 
-def test_a_name_that_there_is_not_is_compared_with_what_the_run_has(run):
+def test_unknown_export_suggests_a_similar_name(run):
     with pytest.raises(ConfigError, match=r"no item figure-03\.$"):
         export_from(run, "figure-3", Target("pdf", None), 516.0, "", QUIET)
 
 
-def test_what_a_figure_needs_is_made_by_the_stage_that_is_named(run):
+def test_figure_without_results_names_the_stage_that_makes_them(run):
     for name, command in (("figure-13", "continuation"), ("stability-step", "stability --full")):
         with pytest.raises(StaleError) as refused:
             export_from(run, name, Target("pdf", None), 516.0, "", QUIET)
         assert refused.value.advice == f"Run `walkerlab {command} -c {run.quoted_path}` first."
 
 
-def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
+def test_rigid_walk_is_the_default_without_a_contact_walk(run):
     assert walk_in(run) == "contact-sim"
     run.artifact("contact-sim").unlink()
     assert walk_in(run) == "simulate"
@@ -198,12 +198,12 @@ def test_a_walk_of_its_own_is_meant_where_there_is_no_contact_walk(run):
         ("figure-11", "pdf", StaleError, "cannot be drawn"),
     ],
 )
-def test_what_cannot_be_exported_is_told(run, what, kind, error, said):
+def test_impossible_export_is_explained(run, what, kind, error, said):
     with pytest.raises(error, match=said):
         export_from(run, what, Target(kind, None), 516.0, "", QUIET)
 
 
-def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
+def test_film_has_a_frame_for_every_instant(run, tmp_path):
     path = write_film(
         run, Target(str(tmp_path / "walk.gif"), None), Film("contact-sim", steps=1, rate=10, slower=1.0), QUIET
     )
@@ -215,7 +215,7 @@ def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
         assert (np.asarray(film.convert("L")) != first).any()
 
 
-def test_a_film_of_both_models_needs_both_walks(run, tmp_path):
+def test_film_of_both_models_needs_both_walks(run, tmp_path):
     path = write_film(run, Target("gif", None), Film("both", 1, 5, 1.0), QUIET)
     assert path.name == "paper-both.gif"
     with Image.open(path) as film:
@@ -225,14 +225,14 @@ def test_a_film_of_both_models_needs_both_walks(run, tmp_path):
         write_film(run, Target("gif", None), Film("both", 1, 5, 1.0), QUIET)
 
 
-def test_a_film_of_another_kind_is_refused(run, tmp_path, monkeypatch):
+def test_unknown_film_format_is_rejected(run, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     for name, said in (("walk.avi", "an animation cannot be written as avi"), ("walk.mp4", "needs ffmpeg")):
         with pytest.raises(ConfigError, match=said):
             write_film(run, Target(str(tmp_path / name), None), Film("simulate", 1, 10, 1.0), QUIET)
 
 
-def test_ffmpeg_gets_the_pictures(run, tmp_path, monkeypatch):
+def test_ffmpeg_receives_the_frames(run, tmp_path, monkeypatch):
     tool = tmp_path / "ffmpeg"
     tool.write_text("#!/bin/sh\n/bin/cat | /usr/bin/wc -c\n")
     tool.chmod(0o755)
@@ -255,7 +255,7 @@ READERS = {
 
 @pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize("reader", READERS)
-def test_a_damaged_result_is_told_as_such_with_what_makes_it_anew(run, reader, damage):
+def test_damaged_result_is_reported_with_the_command_to_recompute_it(run, reader, damage):
     path = run.artifact("contact-sim")
     path.write_bytes(DAMAGES[damage](path.read_bytes()))
     with pytest.raises(StaleError) as refused:
@@ -265,12 +265,12 @@ def test_a_damaged_result_is_told_as_such_with_what_makes_it_anew(run, reader, d
     assert refused.value.exit_code == 5
 
 
-def test_damage_of_what_is_not_needed_does_not_matter(run):
+def test_damaged_results_that_are_not_needed_do_not_matter(run):
     run.artifact("simulate").write_bytes(b"")
     assert export_from(run, "trajectory", Target("csv", None), 516.0, "contact-sim", QUIET).is_file()
 
 
-def test_a_damaged_result_is_told_from_python_too(run):
+def test_damaged_result_is_reported_in_python(run):
     opened = open_run(run.path)
     run.artifact("compare").write_bytes(b"")
     assert "compare" in opened.stages
@@ -278,7 +278,7 @@ def test_a_damaged_result_is_told_from_python_too(run):
         opened.result("compare")
 
 
-def test_an_export_writes_over_no_result(run):
+def test_export_overwrites_no_result(run):
     before = run.artifact("simulate").read_bytes()
     for owned in ("simulate.h5", "later.h5", ".run.json"):
         with pytest.raises(ConfigError, match="belongs to the results of the run"):
@@ -287,12 +287,12 @@ def test_an_export_writes_over_no_result(run):
     assert export_from(run, "trajectory", Target("csv", run.path / "mine.csv"), WIDTH, "simulate", QUIET).is_file()
 
 
-def test_what_is_exported_of_an_outdated_result_comes_with_a_warning(run, capsys):
+def test_export_of_an_outdated_result_warns(run, capsys):
     export_from(run, "trajectory", Target("csv", None), WIDTH, "simulate", Console())
     assert f"warning: {run.artifact('simulate')} is out of date: " in capsys.readouterr().err
 
 
-def test_a_film_of_an_older_result_is_refused_in_words_where_it_lacks_what_is_drawn(run):
+def test_film_of_an_older_result_without_needed_data_is_rejected(run):
     stored = read(run.artifact("simulate"))
     known = {key: value for key, value in stored.identity.config_slice.items() if key != "push_off"}
     write(run.artifact("simulate"), stored, replace(stored.identity, config_slice=known), stored.provenance)
@@ -301,7 +301,7 @@ def test_a_film_of_an_older_result_is_refused_in_words_where_it_lacks_what_is_dr
     assert "walkerlab simulate -c" in caught.value.advice
 
 
-def test_what_there_is_to_export_is_a_list(run):
+def test_exports_are_listed(run):
     with pytest.raises(ConfigError) as caught:
         export_from(run, "99", Target(None, None), WIDTH, "simulate", QUIET)
     assert {"  figure-07", "  trajectory"} <= set(caught.value.advice.splitlines())

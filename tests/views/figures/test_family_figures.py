@@ -38,16 +38,16 @@ def plotted(figure):
 
 
 @pytest.mark.parametrize("figure", FIGURES, ids=[figure.name for figure in FIGURES])
-def test_the_same_families_give_the_same_bytes(figure):
+def test_equal_families_give_equal_bytes(figure):
     assert figure.render(families()) == figure.render(families())
 
 
-def test_curves_over_two_parameters_are_left_out_where_none_were_asked_for():
+def test_curves_over_two_parameters_are_omitted_unless_requested():
     why = FIGURE_16.why_left_out(families(curves=False), {})
     assert why == "continuation: no curves over two parameters (continuation.second)"
 
 
-def test_gaits_that_are_born_in_a_fold_have_their_steps_above_the_axes_and_in_the_caption():
+def test_gaits_that_begin_at_a_fold_are_labelled_with_their_steps():
     results = families()
     branch = results["continuation"].groups["rigid/branch_1"]
     kinds = replace(branch.variables["mark_kind"], values=np.array(["fold"]))
@@ -67,14 +67,14 @@ def test_gaits_that_are_born_in_a_fold_have_their_steps_above_the_axes_and_in_th
     assert "5 steps at 4.3 deg." in " ".join(FIGURE_13.render(results).caption.split())
 
 
-def test_in_one_column_the_parts_stand_under_one_another():
+def test_one_column_figure_stacks_its_panels():
     with styled(3.5):
         figure, _ = FIGURE_13.draw(families())
     assert {axes.get_subplotspec().colspan.start for axes in figure.axes} == {0}
     assert len(figure.axes) == 4
 
 
-def test_a_branch_is_solid_up_to_its_flip_and_dashed_beyond():
+def test_branch_is_solid_up_to_its_flip_and_dashed_beyond():
     axes = plotted(FIGURE_13).axes[0]
     solid, dashed = (
         [line for line in axes.lines if line.get_color() == MODELS["rigid"] and line.get_linestyle() == style]
@@ -87,7 +87,7 @@ def test_a_branch_is_solid_up_to_its_flip_and_dashed_beyond():
     assert STYLES[True] == "-"
 
 
-def test_a_doubled_branch_begins_at_its_parents_flip_with_equal_steps():
+def test_doubled_branch_begins_at_the_flip_of_its_parent_with_equal_steps():
     group = families()["continuation"]["rigid/branch_1"]
     curve = curve_of(group, "step_period")
     assert curve.value[0] == FLIP
@@ -95,14 +95,14 @@ def test_a_doubled_branch_begins_at_its_parents_flip_with_equal_steps():
     assert curve.stable.all()
 
 
-def test_the_captions_say_where_gaits_change():
+def test_captions_state_where_gaits_change():
     results = families()
     assert "first doubles its period at 4 deg" in FIGURE_13.render(results).caption
     assert "a flip at 4." in FIGURE_14.render(results).caption
     assert FIGURE_16.render(results).caption.startswith("Curves of flips of the rigid model's gaits")
 
 
-def test_the_plane_is_shaded_by_what_walks_settle_on():
+def test_plane_is_shaded_by_the_attractor_of_walks():
     regions = families()["continuation"]["rigid/regions"]
     kinds = {name: where.sum() for _, name, where in region_kinds(regions)}
     assert kinds == {"1 step": 3, "2 steps": 1, "aperiodic": 1, "no walking": 1}
@@ -110,7 +110,7 @@ def test_the_plane_is_shaded_by_what_walks_settle_on():
     assert len(plotted(FIGURE_16).axes[0].collections) == 1
 
 
-def test_multipliers_beyond_the_axes_are_told():
+def test_multipliers_beyond_the_axes_are_mentioned():
     results = families()
     branch = next(group for path, group in results["continuation"].groups.items() if path.endswith("branch_0"))
     assert "outside the axes" not in FIGURE_14.render(results).caption
@@ -119,7 +119,7 @@ def test_multipliers_beyond_the_axes_are_told():
     assert "Some multipliers lie outside the axes; the largest magnitude is 7.25." in FIGURE_14.render(results).caption
 
 
-def test_gaits_part_from_a_flip_as_the_root_of_the_distance():
+def test_step_periods_split_at_a_flip_like_a_square_root():
     value, parts = np.array([4.0, 4.04, 4.09]), np.array([0.0, 0.2, 0.3])
     quantity = 0.7 + parts[:, None] * np.array([1.0, -1.0])
     born = Curve(value, quantity, np.array([True, True]), ((0, "flip"),))
@@ -131,7 +131,7 @@ def test_gaits_part_from_a_flip_as_the_root_of_the_distance():
     assert stretch_of(crossed, 0, 2)[0].tolist() == value.tolist()
 
 
-def test_each_gait_of_one_step_has_its_own_look_and_says_how_long_its_steps_take():
+def test_one_step_gaits_have_distinct_styles_labelled_with_their_period():
     results = families()
     result = results["continuation"]
     result.groups["rigid/branch_1"].attrs["period"] = 1
@@ -144,7 +144,7 @@ def test_each_gait_of_one_step_has_its_own_look_and_says_how_long_its_steps_take
     assert said[1] == "rigid model, steps of 0.6 to 0.8 s"
 
 
-def test_multipliers_that_meet_turn_as_roots_do():
+def test_multipliers_that_meet_become_complex():
     product = np.linspace(0.20, 0.31, 6)
     known = np.array([np.roots([1.0, -1.0, one]) for one in product], dtype=complex)
     group = Group(
@@ -159,13 +159,13 @@ def test_multipliers_that_meet_turn_as_roots_do():
     np.testing.assert_allclose(np.abs(found), exact, atol=1e-9)
 
 
-def test_gaits_that_change_nowhere_are_drawn_once():
+def test_families_without_bifurcations_have_one_panel():
     with styled():
         figure = FIGURE_13.draw(families(flips=False))[0]
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["", ""]
 
 
-def test_ticks_beside_a_lonely_flip_have_few_digits():
+def test_ticks_near_a_single_flip_have_few_digits():
     results = families()
     summary = results["continuation"].summary
     summary["to"] = summary["attractors"][0]["to"] = FLIP + 1e-6
@@ -178,7 +178,7 @@ def test_ticks_beside_a_lonely_flip_have_few_digits():
         assert all(len(label.get_text()) <= 6 for label in axes.get_yticklabels())
 
 
-def test_keys_are_words_on_axes():
+def test_axes_show_keys_as_words():
     result = families()["continuation"]
     for key, unit, said in (
         ("walker.hip_mass_kg", "kg", "hip mass (kg)"),

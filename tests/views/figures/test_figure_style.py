@@ -94,7 +94,7 @@ def test_every_axis_has_a_label_with_a_unit(drawn):
 
 
 @for_all
-def test_legends_cover_no_axes_and_so_no_data(drawn):
+def test_legends_cover_no_axes(drawn):
     assert all(axes.get_legend() is None for axes in drawn.axes)
     for legend in drawn.legends:
         box = legend.get_window_extent()
@@ -118,13 +118,13 @@ def test_no_text_is_clipped(drawn):
 
 
 @for_all
-def test_no_text_lies_on_another(drawn):
+def test_texts_do_not_overlap(drawn):
     for (text, box), (other, other_box) in itertools.combinations(drawn.texts_drawn, 2):
         assert not box.overlaps(other_box), (text, other)
 
 
 @for_all
-def test_no_text_lies_on_an_axis(drawn):
+def test_texts_do_not_overlap_axes(drawn):
     for axes in drawn.axes:
         for spine in axes.spines.values():
             if spine.get_visible() and spine.axes.axison:
@@ -143,19 +143,19 @@ def test_exponents_are_large_enough_to_be_read(drawn):
 
 
 @for_all
-def test_all_figures_have_the_width_asked_for_and_one_font(drawn):
+def test_all_figures_have_the_requested_width_and_one_font(drawn):
     assert drawn.get_figwidth() in {POINT * width for width in COLUMN_WIDTHS.values()}
     assert {text.get_fontname() for text in drawn.findobj(Text)} == {"DejaVu Sans"}
 
 
 @for_all
-def test_legend_names_everything_once(drawn):
+def test_legend_has_no_duplicates(drawn):
     for legend in drawn.legends:
         names = [text.get_text() for text in legend.get_texts()]
         assert len(set(names)) == len(names)
 
 
-def test_what_becomes_of_walks_has_a_colour_of_its_own_in_every_map():
+def test_outcomes_have_distinct_colours_in_every_map():
     failures = [OUTCOME_TEXTS[one].colour for one in Outcome if one is not Outcome.WALKED]
     every = [tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5)) for colour in (*failures, *ATTRACTORS)]
     for one, other in itertools.combinations(every, 2):
@@ -173,13 +173,13 @@ def brightness(colour):
     [(RIGID, CONTACT), LEGS, (TIME_LOOK, PHASE_LOOK), (PHASE_LOOK, PAPER_ERROR)],
     ids=["models", "legs", "errors", "paper"],
 )
-def test_lines_on_one_another_differ_in_brightness_and_in_style(looks):
+def test_overlapping_lines_differ_in_brightness_and_style(looks):
     one, other = looks
     assert abs(brightness(one.colour) - brightness(other.colour)) > VISIBLE
     assert one.style != other.style
 
 
-def test_brightness_is_that_of_grey():
+def test_brightness_is_computed_as_grey_value():
     assert brightness("#000000") == 0.0
     assert brightness("#ffffff") == pytest.approx(1.0)
     assert brightness(to_hex("0.5")) == pytest.approx(128 / 255)

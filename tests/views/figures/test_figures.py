@@ -67,23 +67,23 @@ def test_figures_of_a_rigid_only_run_are_2_7_9_10():
     assert drawable(rigid_alone()) == [2, 7, 9, 10]
 
 
-def test_a_figure_that_is_left_out_says_why():
+def test_omitted_figure_states_the_reason():
     why = why_left_out(rigid_alone(), {"contact-sim": "the config has no contact block"})
     assert why == {6: "it needs contact-sim: the config has no contact block", 8: "it needs compare"}
 
 
-def test_states_that_no_one_asked_for_leave_the_energies_to_be_drawn():
+def test_energies_are_drawn_even_without_states():
     results = rigid_alone(simulate=without(rigid(), "trajectory", "angle", "velocity"))
     assert drawable(results) == [10]
     assert why_left_out(results, {})[7] == "simulate: 'states' is not among the config's outputs"
 
 
-def test_energies_that_no_one_asked_for_leave_the_motion_to_be_drawn():
+def test_motion_is_drawn_even_without_energies():
     results = rigid_alone(simulate=without(rigid(), "trajectory", "kinetic_J"))
     assert drawable(results) == [2, 7, 9]
 
 
-def test_a_walk_without_a_step_has_no_gait_cycle_but_can_be_drawn_in_time():
+def test_walk_without_a_step_is_drawn_only_over_time():
     results = rigid_alone(simulate=rigid(1, outcome="no-heel-strike", completed=0))
     assert drawable(results) == [7, 9, 10]
     assert why_left_out(results, {})[2] == "simulate: no step was completed"
@@ -91,7 +91,7 @@ def test_a_walk_without_a_step_has_no_gait_cycle_but_can_be_drawn_in_time():
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_walk_that_ended_where_it_began_can_be_drawn():
+def test_walk_of_zero_duration_can_be_drawn():
     results = rigid_alone(simulate=first_sample_of(rigid(1, outcome="rejected", completed=0)))
     for figure in (NUMBERED[7], NUMBERED[9], NUMBERED[10]):
         assert "0 steps (rejected)" in figure.render(results).caption
@@ -105,22 +105,22 @@ def first_sample_of(result):
     return stored("simulate", {"trajectory": Group(trajectory)}, result.summary)
 
 
-def test_models_that_completed_no_step_together_have_no_difference_in_phase():
+def test_models_without_a_common_step_have_no_phase_difference():
     results = both_models(compare=compared(aligned=False))
     assert why_left_out(results, {}) == {8: "compare: no step was completed by both models"}
 
 
-def test_figures_of_the_paper_are_called_and_filed_by_its_numbers():
+def test_figures_of_the_paper_are_named_by_its_numbers():
     assert [figure.name for figure in PAPER_FIGURES] == [f"figure-{figure.number:02d}" for figure in PAPER_FIGURES]
     assert PAPER_FIGURES[0].called == "figure 2"
     assert len(set(NAMES)) == len(NAMES)
 
 
-def test_a_figure_that_the_paper_has_not_is_called_by_its_name():
+def test_figures_not_in_the_paper_are_called_by_name():
     assert Illustration("run-time", (), dict.popitem).called == "figure run-time"
 
 
-def test_every_figure_has_its_words_and_every_word_a_figure():
+def test_every_figure_has_a_text_and_every_text_a_figure():
     assert [figure.name for figure in ALL_FIGURES if not figure.title or figure.title.endswith(".")] == []
     shared = {"cycle", "counted", "figure-17", "push-off-or-hip", "sweep", "went"}  # and the words of a sweep
     files = {path.stem for path in WORDS.folder.glob("*.j2")}
@@ -156,7 +156,7 @@ assert "matplotlib.pyplot" not in sys.modules, "pyplot has state, and opens wind
 """
 
 
-def test_same_results_give_same_bytes_whatever_the_process_and_the_users_matplotlib(tmp_path):
+def test_equal_results_give_equal_bytes_in_any_process_and_matplotlib_style(tmp_path):
     (tmp_path / "matplotlibrc").write_text(OWN_SETTINGS)
     here, package = Path(__file__).parent, Path(__file__).parents[3]
     environment = {
@@ -223,14 +223,14 @@ def test_lines_in_time_are_the_stored_angles_and_velocities():
             np.testing.assert_array_equal(line.get_ydata(), trajectory[name][:, leg])
 
 
-def test_legs_are_shaded_while_they_carry():
+def test_stance_phases_are_shaded():
     axes = plotted(NUMBERED[7], rigid_alone()).axes
     for leg, one in enumerate(axes[:2]):
         spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in one.patches]
         np.testing.assert_allclose(spans, [(0.7 * step, 0.7 * (step + 1)) for step in range(1 - leg, 10, 2)], atol=1e-9)
 
 
-def test_a_long_walk_shows_five_strides_and_says_so():
+def test_long_walk_shows_five_strides_and_says_so():
     results = rigid_alone(simulate=rigid(24))
     figure = plotted(NUMBERED[7], results)
     (line,) = lines_of(figure.axes[0], RIGID)
@@ -240,12 +240,12 @@ def test_a_long_walk_shows_five_strides_and_says_so():
     assert caption.endswith("The rigid model walked 24 steps.")
 
 
-def test_a_fall_is_told():
+def test_fall_is_mentioned():
     results = both_models(**{"contact-sim": contact(3, outcome="fell")})
     assert "the contact model took 3 steps (fell)" in caption_of(NUMBERED[7], results)
 
 
-def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():
+def test_errors_are_plotted_over_time_and_phase():
     results = both_models()
     axes = plotted(NUMBERED[8], results).axes
     (raw,) = lines_of(axes[0], TIME_LOOK)
@@ -259,7 +259,7 @@ def test_errors_are_shown_at_the_time_and_at_the_phase_they_belong_to():
         np.testing.assert_array_equal(line.get_ydata(), np.abs(aligned[step, :, 1]))
 
 
-def test_the_papers_error_is_a_line_within_sight():
+def test_error_bound_of_the_paper_is_a_visible_line():
     for axes in plotted(NUMBERED[8], both_models()).axes:
         (line,) = lines_of(axes, PAPER_ERROR)
         bottom, top = axes.get_ylim()
@@ -268,13 +268,13 @@ def test_the_papers_error_is_a_line_within_sight():
         assert bottom < 1e-4 < top
 
 
-def test_limit_cycles_of_both_legs_have_the_same_scales():
+def test_limit_cycles_of_both_legs_have_equal_scales():
     one, other = plotted(NUMBERED[9], both_models()).axes
     assert one.get_xlim() == other.get_xlim()
     assert one.get_ylim() == other.get_ylim()
 
 
-def test_the_last_stride_is_drawn_as_the_model_looks_and_the_whole_walk_thin():
+def test_last_stride_has_the_style_of_its_model_and_the_walk_is_thin():
     results = both_models()
     axes = plotted(NUMBERED[9], results).axes[0]
     (last,) = lines_of(axes, RIGID)
@@ -284,20 +284,20 @@ def test_the_last_stride_is_drawn_as_the_model_looks_and_the_whole_walk_thin():
     assert any(line.get_xdata().size == trajectory["time"].size for line in axes.lines)
 
 
-def test_a_constant_energy_looks_constant():
+def test_constant_energy_looks_constant():
     axes = plotted(NUMBERED[10], rigid_alone()).axes[2]
     bottom, top = axes.get_ylim()
     assert top - bottom > 0.5
     assert bottom < 150.24 < top
 
 
-def test_marks_do_not_widen_the_scales():
+def test_markers_do_not_widen_the_axes():
     bottom, top = plotted(NUMBERED[10], rigid_alone()).axes[0].get_ylim()
     assert bottom > 2.5
     assert top < 5.5
 
 
-def test_impacts_do_not_set_the_scale_of_the_mechanical_energy():
+def test_impacts_do_not_determine_the_energy_scale():
     results = both_models()
     axes = plotted(NUMBERED[10], both_models(**{"contact-sim": with_peak(results["contact-sim"])})).axes
     assert axes[2].get_ylim() == plotted(NUMBERED[10], results).axes[2].get_ylim()
@@ -311,14 +311,14 @@ def with_peak(result):
     return stored("contact-sim", {**result.groups, "trajectory": Group(variables)}, result.summary)
 
 
-def test_the_cycle_ends_where_its_second_step_does():
+def test_cycle_ends_with_its_second_step():
     sticks = stick_diagram.sticks_of(rigid_alone()["simulate"])
     at_strikes, between = sticks.postures()
     np.testing.assert_allclose(sticks.time[at_strikes], [0.0, 0.7, 1.4], atol=1e-12)
     assert sticks.time[between].max() < 1.4
 
 
-def test_the_legend_of_limit_cycles_has_the_marks_of_both_models():
+def test_legend_of_limit_cycles_has_the_markers_of_both_models():
     results = both_models()
     figure = plotted(NUMBERED[9], results)
     marks = {(line.get_marker(), line.get_markerfacecolor()) for line in figure.legends[0].get_lines()}
@@ -326,7 +326,7 @@ def test_the_legend_of_limit_cycles_has_the_marks_of_both_models():
         assert {(look.marker, look.colour), (look.marker, "white")} <= marks
 
 
-def test_two_runs_over_one_another_have_an_axis_for_each_leg():
+def test_overlaid_runs_have_an_axis_for_each_leg():
     first, second = both_models(), both_models(simulate=rigid(6))
     trajectories = [run["simulate"]["trajectory"] for run in (first, second)]
     with styled():

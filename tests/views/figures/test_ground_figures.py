@@ -18,7 +18,7 @@ def plotted(figure, results):
         return figure.draw(results)[0]
 
 
-def test_friction_stands_within_the_cone_of_its_coefficients():
+def test_friction_is_drawn_within_its_cone():
     cone = plotted(FORCES, both_models()).axes[1]
     bounds = [line for line in cone.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] == 0.0]
     slopes = sorted(float(line.get_ydata()[1] / line.get_xdata()[1]) for line in bounds if line.get_ydata()[1])
@@ -29,7 +29,7 @@ def test_friction_stands_within_the_cone_of_its_coefficients():
     assert "at most 0.2 of the normal force" in FORCES.render(both_models()).caption
 
 
-def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples():
+def test_losses_of_a_step_are_independent_of_the_sampling():
     lost = losses(walk_of(contact(), CONTACT))
     assert [label for label, _ in lost] == ["damping of the ground", "friction"]
     (damping, friction) = lost.values()
@@ -39,7 +39,7 @@ def test_a_step_loses_what_its_beginning_took_whatever_lies_between_two_samples(
     assert "1.1 J on average: 90.9 % to damping of the ground, 9.09 % to friction" in said
 
 
-def test_what_drives_a_walker_is_no_loss_and_hides_none():
+def test_work_of_drives_is_not_shown_as_a_loss():
     """A push-off gives back what a step loses: the energy stays, and straight legs have no knees to lose it."""
     walk = contact()
     gone = walk["trajectory"]
@@ -52,19 +52,19 @@ def test_what_drives_a_walker_is_no_loss_and_hides_none():
     np.testing.assert_allclose([*found.values()], [*passive.values()], atol=1e-12)
 
 
-def test_bars_stand_on_one_another():
+def test_bars_are_stacked():
     (axes,) = plotted(LOST, both_models()).axes
     tops = [bar.get_y() + bar.get_height() for bar in axes.patches]
     assert max(tops) == pytest.approx(1.1)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 10])
-def test_steps_are_counted_in_whole_numbers(steps):
+def test_step_axis_has_integer_ticks(steps):
     (axes,) = plotted(LOST, both_models(**{"contact-sim": contact(steps)})).axes
     assert all(float(tick).is_integer() for tick in axes.get_xticks())
 
 
-def test_what_was_not_stored_is_not_drawn():
+def test_missing_data_is_not_drawn():
     results = both_models(**{"contact-sim": without(contact(), "trajectory", "normal_force_N", "total_energy_J")})
     assert FORCES.why_left_out(results, {}) == "contact-sim: 'forces' is not among the config's outputs"
     assert LOST.why_left_out(results, {}) == "contact-sim: 'energies' is not among the config's outputs"

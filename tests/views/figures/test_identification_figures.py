@@ -19,5 +19,5 @@ LENGTH = {"key": "walker.leg_length_m", "value": 0.4, "unit": "m"}
         ([OFFSET], [-0.02], "angle offset + 0.02 rad"),
     ],
 )
-def test_parameters_that_change_together_are_named_with_their_shares(rows, move, words):
+def test_parameters_that_change_together_are_listed_with_their_shares(rows, move, words):
     assert combination_in_words(rows, np.array(move)) == words

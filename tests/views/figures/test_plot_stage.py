@@ -73,13 +73,13 @@ def test_every_figure_is_an_svg_and_a_png(whole):
     assert papers_left_out(content) == []
 
 
-def test_the_index_has_every_file_as_it_was_written(whole):
+def test_index_lists_every_file_with_its_digest(whole):
     folder, content = whole
     assert sorted(index.indexed_files(content)) == [f"figures/{name}" for name in names(folder)]
     assert index.broken_file(folder, content) is None
 
 
-def test_figures_drawn_early_are_those_of_all_results_and_not_drawn_again(tmp_path):
+def test_figures_drawn_early_are_final_and_not_redrawn(tmp_path):
     folder, content = tmp_path, draw(tmp_path, both_models())
     results = both_models() | measured_methods()
     written = {path: path.stat().st_mtime_ns for path in (folder / "figures").iterdir()}
@@ -93,7 +93,7 @@ def test_figures_drawn_early_are_those_of_all_results_and_not_drawn_again(tmp_pa
     assert index.indexed_files(anew) == index.indexed_files(final)
 
 
-def test_each_entry_has_the_words_and_the_files_of_its_figure(whole):
+def test_each_entry_has_text_and_files_of_its_figure(whole):
     folder, content = whole
     for entry in content.summary["figures"]:
         assert set(entry) | {"number"} == {"number", "title", "svg", "png", "caption", "alt", "results"}
@@ -103,7 +103,7 @@ def test_each_entry_has_the_words_and_the_files_of_its_figure(whole):
         assert (folder / entry["png"]).is_file()
 
 
-def test_figures_without_results_are_left_out_and_said_why(rigid_only):
+def test_figures_without_results_are_omitted_with_the_reason(rigid_only):
     _, content, _ = rigid_only
     assert [entry["number"] for entry in content.summary["figures"]] == [2, 7, 9, 10]
     why = "it needs {}: the config has no contact block"
@@ -118,7 +118,7 @@ def test_figures_without_results_are_left_out_and_said_why(rigid_only):
         assert entry in left_out
 
 
-def test_figures_of_results_that_are_gone_go_too_and_nothing_else(rigid_only):
+def test_figures_of_missing_results_are_removed_and_nothing_else(rigid_only):
     folder, _, _ = rigid_only
     assert "figure-06.svg" not in names(folder)
     assert (folder / "figures" / "figure-mine.svg").read_text() == "drawn before"
@@ -130,7 +130,7 @@ def test_progress_counts_figures(rigid_only):
     assert progress.done == progress.total == 4
 
 
-def test_nothing_to_draw_is_no_failure(tmp_path):
+def test_nothing_to_draw_is_not_a_failure(tmp_path):
     left_out = [LeftOut("fixedpoint", "no gait"), LeftOut("simulate", "it needs fixedpoint: no gait")]
     content = draw(tmp_path, {}, left_out)
     assert content.summary["figures"] == []

@@ -28,7 +28,7 @@ def rough():
     return {"robustness": stored("robustness", groups, {})}
 
 
-def test_the_share_still_walking_falls_where_walks_fail_and_not_where_they_are_cut_off(rough):
+def test_share_still_walking_falls_at_failures_but_not_at_the_cut_off(rough):
     with styled():
         figure, _ = robustness.FIGURE_18.draw(rough)
     for walks, line in zip(STEPS[0], figure.axes[2].lines, strict=True):
@@ -39,7 +39,7 @@ def test_the_share_still_walking_falls_where_walks_fail_and_not_where_they_are_c
         assert at.max() == walks.max()
 
 
-def test_the_footholds_heights_stand_under_the_walker(rough):
+def test_foothold_heights_are_drawn_under_the_walker(rough):
     with styled():
         figure, _ = robustness.FIGURE_18.draw(rough)
     heights = rough["robustness"]["rough_walk/steps"]["foothold_height_m"]
@@ -48,12 +48,12 @@ def test_the_footholds_heights_stand_under_the_walker(rough):
     assert "2 mm (s.d.) roughness" in robustness.FIGURE_18.render(rough).caption
 
 
-def test_without_walks_on_rough_ground_it_is_said_that_none_were_asked_for():
+def test_missing_rough_ground_walks_are_mentioned():
     why = robustness.FIGURE_18.why_left_out({"robustness": stored("robustness", {}, {})}, {})
     assert "rough ground" in why
 
 
-def test_a_walk_that_falls_in_its_first_step_has_no_figure(rough):
+def test_walk_that_falls_in_its_first_step_has_no_figure(rough):
     result = rough["robustness"]
     groups = {name: group for name, group in result.groups.items() if name != "rough_walk/steps"}
     why = robustness.FIGURE_18.why_left_out({"robustness": stored("robustness", groups, {})}, {})
@@ -71,7 +71,7 @@ def swept(count=5):
     return Group(found)
 
 
-def test_over_one_number_both_models_are_drawn_and_the_least_disturbed_gait_is_named():
+def test_sweep_figure_shows_both_models_and_names_the_least_sensitive_gait():
     illustration = robustness.sweep_illustration(swept(), ("slope_deg",))
     assert illustration.heading == "Figure 17. Robustness over one parameter"
     assert illustration.alt_text.startswith("Four stacked plots")
@@ -81,7 +81,7 @@ def test_over_one_number_both_models_are_drawn_and_the_least_disturbed_gait_is_n
     assert "speed (m/s)" in drawing.svg.decode()
 
 
-def test_only_a_sweep_of_robustness_over_one_number_is_drawn_so():
+def test_only_a_robustness_sweep_over_one_parameter_is_drawn():
     assert robustness.can_be_drawn(swept(), ("slope_deg",))
     assert not robustness.can_be_drawn(swept(), ("slope_deg", "walker.hip_mass_kg"))
     assert not robustness.can_be_drawn(Group({}), ("slope_deg",))
@@ -94,7 +94,7 @@ def driven(slope, impulse):
     return Group({name: Variable(np.array(one), ("point",), "1", name) for name, one in values.items()})
 
 
-def test_ways_to_drive_a_walker_are_told_apart_by_what_is_not_zero():
+def test_drives_are_distinguished_by_their_nonzero_parameter():
     names = ("slope_deg", "impulse_N_s")
     group = driven([1.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, 4.0])
     found = robustness.actuations(group, names)

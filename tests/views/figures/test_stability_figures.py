@@ -26,25 +26,25 @@ def colours(mesh):
     return np.array(cells, dtype=object).reshape(values.shape)
 
 
-def test_cells_meet_and_their_middles_are_the_values():
+def test_cells_touch_and_are_centred_on_their_values():
     found = edges(np.array([1.0, 10.0, 100.0]))
     np.testing.assert_allclose(found, 10.0 ** np.array([-0.5, 0.5, 1.5, 2.5]))
 
 
-def test_outcomes_have_the_colours_of_the_other_map():
+def test_outcomes_have_the_same_colours_in_both_maps():
     left, _ = meshes(STICTION)
     expected = [OUTCOME_TEXTS[Outcome(outcome)].colour.lower() for outcome, _, _ in ENDS]
     assert colours(left[0]).tolist() == [expected] * 3
 
 
-def test_errors_are_drawn_where_both_runs_end_alike_only():
+def test_errors_are_drawn_only_for_equal_outcomes():
     _, (errors, unanswered, otherwise) = meshes(STICTION)
     assert [colour is not None for colour in colours(errors)[0]] == [True, False, False]
     assert [colour is not None for colour in colours(unanswered)[0]] == [False, False, True]
     assert [colour is not None for colour in colours(otherwise)[0]] == [False, True, False]
 
 
-def test_a_fixed_step_that_diverges_has_no_error():
+def test_diverging_fixed_step_has_no_error():
     (verdicts,), (errors, diverged) = meshes(STEP)
     expected = [VERDICT_COLOURS[name].lower() for name in ("fine", "wrong silently", "diverges")]
     assert colours(verdicts)[:, 0].tolist() == expected
@@ -52,13 +52,13 @@ def test_a_fixed_step_that_diverges_has_no_error():
     assert [colour is not None for colour in colours(diverged)[:, 0]] == [False, False, True]
 
 
-def test_captions_count_the_cells():
+def test_captions_state_the_number_of_cells():
     said = STICTION.render(stability_maps()).caption
     assert "walked 3, off-pad 3, budget-exhausted 3 cells" in said
     assert "3 cells have another outcome" in said
     assert "fine 3, wrong silently 3, diverges 3 cells" in STEP.render(stability_maps()).caption
 
 
-def test_without_maps_they_are_left_out_and_say_so():
+def test_missing_maps_are_omitted_with_the_reason():
     absent = {"stability-maps": "it was not requested"}
     assert STEP.why_left_out({}, absent) == "it needs stability-maps: it was not requested"

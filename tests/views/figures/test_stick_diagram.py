@@ -28,33 +28,33 @@ def sticks(request):
     return sticks_of(both_models()[request.param])
 
 
-def test_legs_keep_their_length(sticks):
+def test_drawn_legs_keep_their_length(sticks):
     lengths = np.linalg.norm(sticks.feet - sticks.hip[:, None], axis=-1)
     np.testing.assert_allclose(lengths, LEG_LENGTH, atol=ROUNDING)
 
 
-def test_the_hip_does_not_jump_when_legs_change_roles(sticks):
+def test_hip_does_not_jump_when_legs_change_roles(sticks):
     apart = np.linalg.norm(np.diff(sticks.hip, axis=0), axis=1)
     at_once = np.diff(sticks.time) < 1e-9
     assert apart[at_once].max(initial=0.0) < ROUNDING
     assert apart.max() < 0.05
 
 
-def test_feet_come_down_one_step_length_ahead(sticks):
+def test_feet_land_one_step_length_ahead(sticks):
     for step, strike in enumerate(sticks.strikes[:2]):
         row = np.searchsorted(sticks.time, strike)
         landed = sticks.feet[row, step % 2]
         np.testing.assert_allclose(landed, [(step + 1) * STEP_LENGTH, 0.0], atol=1e-9)
 
 
-def test_the_plane_descends_in_walking_direction():
+def test_plane_descends_in_walking_direction():
     sticks = sticks_of(rigid_alone()["simulate"])
     x, y = sticks.in_plane(np.array([STEP_LENGTH, 0.0]))
     assert np.arctan2(-y, x) == pytest.approx(SLOPE)
     assert np.hypot(x, y) == pytest.approx(STEP_LENGTH)
 
 
-def test_a_cycle_that_was_not_completed_is_shown_to_its_end():
+def test_incomplete_cycle_is_drawn_to_its_end():
     results = rigid_alone(simulate=rigid(2, outcome="fell", completed=1))
     sticks = sticks_of(results["simulate"])
     at_strikes, between = sticks.postures()
@@ -63,7 +63,7 @@ def test_a_cycle_that_was_not_completed_is_shown_to_its_end():
     assert "not completed" in FIGURE_2.render(results).caption
 
 
-def test_the_slope_is_told_above_the_torso_which_has_a_name():
+def test_slope_label_is_above_the_named_torso():
     bare = sticks_of(rigid_alone()["simulate"])
     sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
     with styled():
@@ -86,14 +86,14 @@ def test_lengths_are_drawn_to_scale():
     assert drawn(FIGURE_2, rigid_alone()).get_aspect() == 1.0
 
 
-def test_both_legs_of_every_posture_are_drawn_in_their_colours():
+def test_both_legs_of_every_posture_have_their_colours():
     axes = drawn(FIGURE_2, rigid_alone())
     at_strikes, between = sticks_of(rigid_alone()["simulate"]).postures()
     for look in LEGS:
         assert sum(line.get_color() == look.colour for line in axes.lines) == at_strikes.size + between.size
 
 
-def test_pads_in_sight_are_drawn_in_their_legs_colours():
+def test_visible_pads_have_the_colour_of_their_leg():
     axes = drawn(FIGURE_6, both_models())
     left, right = axes.get_xlim()
     pads = both_models()["contact-sim"]["terrain"]
@@ -111,7 +111,7 @@ def of(patch, look):
     return to_hex(patch.get_edgecolor()).upper() == look.colour
 
 
-def test_without_pads_the_ground_is_a_plane_and_the_caption_says_when_it_carries():
+def test_ground_without_pads_is_a_plane_explained_in_the_caption():
     results = both_models(**{"contact-sim": contact(pads=False)})
     assert not [patch for patch in drawn(FIGURE_6, results).patches if patch.get_hatch()]
     assert "after it has passed the stance foot" in FIGURE_6.render(results).caption
@@ -128,20 +128,20 @@ def film_frame(result, pads=None, **changed):
     return picture
 
 
-def test_a_film_shows_the_arcs_of_round_feet():
+def test_film_shows_the_arcs_of_round_feet():
     flat, round_feet = (film_frame(rigid(), radius=radius) for radius in (0.0, 0.2))
     for look in LEGS:
         assert coloured(round_feet, look) > coloured(flat, look) + 50
 
 
-def test_a_film_of_a_walk_on_pads_shows_them_and_no_plane():
+def test_film_of_a_walk_on_pads_shows_pads_instead_of_a_plane():
     result = contact()
     plane, on_pads = film_frame(result), film_frame(result, result.groups["terrain"])
     tinted = [int((np.ptp(picture, axis=2) > 10).sum()) for picture in (plane, on_pads)]
     assert tinted[1] > tinted[0] + 200
 
 
-def test_a_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
+def test_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
     walks = both_models()
     contact_sticks, rigid_sticks = sticks_of(walks["contact-sim"]), sticks_of(walks["simulate"])
     (alone,) = pictures(contact_sticks, np.array([0.3]))
@@ -155,7 +155,7 @@ def test_a_film_of_both_models_shows_the_rigid_walk_behind_the_contact_walk():
     assert grey(both) > grey(alone) + 500
 
 
-def test_a_film_of_a_walk_that_falls_shows_the_fall_and_stays_there_for_a_second():
+def test_film_holds_the_fall_for_a_second():
     walk = sticks_of(contact(1, outcome="fell"))
     late = replace(walk, time=walk.time * 1.5)  # after the last landing it goes on
     times = film_times(late, None, 25, 1.0)
@@ -167,7 +167,7 @@ def test_a_film_of_a_walk_that_falls_shows_the_fall_and_stays_there_for_a_second
 
 
 @pytest.mark.parametrize("landings", [1, 4, 5, 10])
-def test_a_film_of_a_walk_that_falls_shows_its_last_four_steps_and_the_fall(landings):
+def test_film_of_a_fall_shows_the_last_four_steps(landings):
     period = 0.5
     walk = replace(sticks_of(rigid(landings + 1, period, completed=landings)), ending="fell")
     times = film_times(walk, None, 25, 1.0)
@@ -175,7 +175,7 @@ def test_a_film_of_a_walk_that_falls_shows_its_last_four_steps_and_the_fall(land
     assert times[-1] == walk.time[-1] > period * landings
 
 
-def test_a_walk_that_falls_in_its_first_step_has_a_film():
+def test_walk_that_falls_in_its_first_step_has_a_film():
     fall = rigid(1, outcome="fell", completed=0)
     assert FILM_NEEDS["simulate"].missing_in({"simulate": fall}, {}) is None
     walk = sticks_of(fall)
@@ -184,7 +184,7 @@ def test_a_walk_that_falls_in_its_first_step_has_a_film():
     assert len([*pictures(walk, times[-1:])]) == 1
 
 
-def test_a_film_draws_rough_ground_once_more_so_high_that_it_is_seen():
+def test_film_also_shows_rough_ground_exaggerated():
     begins, rough = np.array([-1.0, 0.2, 0.6]), np.array([0.0, 0.002, -0.001])
     even, uneven = (film_frame(rigid(), ground=np.column_stack((begins, heights))) for heights in (0.0 * rough, rough))
     red = np.round(255.0 * np.array(to_rgb(VERMILLION))).astype(np.uint8)
@@ -193,7 +193,7 @@ def test_a_film_draws_rough_ground_once_more_so_high_that_it_is_seen():
     assert np.ptp(rows[1]) > 20
 
 
-def test_the_leg_behind_pushes_off_just_after_each_landing():
+def test_trailing_leg_pushes_off_just_after_each_landing():
     driven = replace(sticks_of(both_models()["simulate"]), pushes=True)
     for strike in driven.strikes[:-1]:
         behind = driven.feet[np.searchsorted(driven.time, strike), :, 0].argmin()
@@ -202,7 +202,7 @@ def test_the_leg_behind_pushes_off_just_after_each_landing():
     assert replace(driven, pushes=False).pushing(driven.strikes[0]) is None
 
 
-def test_a_film_shows_the_push_off():
+def test_film_shows_the_push_off():
     walk = sticks_of(both_models()["simulate"])
     at = np.array([walk.strikes[0] + 0.02])
     (still,), (pushed,) = (list(pictures(replace(walk, pushes=pushes), at)) for pushes in (False, True))

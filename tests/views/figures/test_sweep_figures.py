@@ -37,7 +37,7 @@ def drawn(made, group):
 
 
 @pytest.mark.parametrize(("slopes", "masses"), [(9, 3), (3, 9)])
-def test_each_value_of_the_parameter_that_has_few_is_a_line(slopes, masses):
+def test_parameter_with_few_values_becomes_lines(slopes, masses):
     group = swept(slopes, masses)
     figure = drawn(lines, group)
     curves = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
@@ -50,7 +50,7 @@ def test_each_value_of_the_parameter_that_has_few_is_a_line(slopes, masses):
     assert said[0] == ("hip mass 5 kg" if masses == 3 else "slope 1 deg")
 
 
-def test_a_map_ends_where_values_were_sampled_and_its_white_line_has_a_legend():
+def test_map_covers_the_sampled_range_and_explains_its_white_line():
     figure = drawn(maps, swept(9, 8))
     axes = figure.axes[0]
     assert (axes.get_xlim(), axes.get_ylim()) == ((1.0, 5.0), (5.0, 15.0))
@@ -59,7 +59,7 @@ def test_a_map_ends_where_values_were_sampled_and_its_white_line_has_a_legend():
     assert [text.get_text() for text in legend.get_texts()] == ["largest multiplier 1"]
 
 
-def test_the_caption_tells_how_gaps_look():
+def test_caption_explains_missing_cells():
     for masses, said in (
         (3, "Marks at the bottom: no answer."),
         (8, "Grey: no answer."),
@@ -70,26 +70,26 @@ def test_the_caption_tells_how_gaps_look():
         assert made.svg.startswith(b"<?xml")
 
 
-def test_a_logarithmic_range_has_a_logarithmic_axis_however_narrow():
+def test_logarithmic_range_has_a_logarithmic_axis():
     for low, high in ((1.0, 3.0), (1.0, 1.001), (1e-3, 1e5)):
         assert is_logarithmic(np.geomspace(low, high, 7), span=1.0)
         assert not is_logarithmic(np.linspace(low, high, 7), span=1.0)
 
 
-def test_pictures_of_walks_begin_with_the_last_steps_period_and_length():
+def test_sweep_figures_of_walks_begin_with_period_and_length_of_the_last_step():
     names = ("slip_per_step_m", "max_penetration_m", "last_step_length_m", "last_step_period_s", "outcome")
     group = Group({name: Variable(np.arange(3.0), ("x",), "1", name) for name in names})
     assert choose(group, ["x"])[:2] == ["last_step_period_s", "last_step_length_m"]
 
 
-def test_a_name_that_no_first_result_has_is_refused_and_headlines_and_nested_ones_are_not():
+def test_unknown_sweep_quantity_is_rejected():
     known = ("steps", "last_step_period_s", "gaits.3.period_s")
     check_options("contact-sim", {f"--show {name}": name for name in known}, ["steps"])
     with pytest.raises(ConfigError, match="--show nonsense is not among the quantities"):
         check_options("contact-sim", {"--show nonsense": "nonsense"}, ["steps"])
 
 
-def test_one_quantity_is_drawn_over_another():
+def test_quantity_can_be_plotted_over_another():
     x = Variable(np.arange(3.0), ("x",), "1", "x")
     speed, cost = np.array([0.2, 0.5, 0.4]), np.array([0.03, 0.01, 0.02])
     words = Variable(np.array(["answered"] * 3, object), ("x",), "", "status")

@@ -37,19 +37,19 @@ def pictures():
     return SCRIPT["pictures"]()
 
 
-def test_pictures_of_the_docs_are_current(pictures):
+def test_pictures_in_the_docs_are_current(pictures):
     """Their words, that is: the shapes of letters and lines depend on the version of matplotlib."""
     assert {name: words((SCRIPT["IMAGES"] / name).read_bytes()) for name in pictures} == {
         name: words(picture) for name, picture in pictures.items()
     }
 
 
-def test_every_picture_stands_in_the_docs(pictures):
+def test_every_walker_drawing_is_used_in_the_docs(pictures):
     pages = "".join(page.read_text(encoding="utf-8") for page in SCRIPT["PAGE"].parent.glob("*.md"))
     assert [name for name in pictures if f"images/{name}" not in pages] == []
 
 
-def test_every_length_of_the_walker_is_named_with_its_value():
+def test_every_length_of_the_walker_is_labelled_with_its_value():
     shown = draw_measures(KNEED, "kneed").decode()
     for limb, keys in (("thigh", ("mass_below_hip_m",)), ("shank", ("mass_below_knee_m",))):
         for key in ("length_m", "mass_kg", "mass_ahead_m", *keys):
@@ -58,13 +58,13 @@ def test_every_length_of_the_walker_is_named_with_its_value():
 
 
 @pytest.mark.parametrize("walker", [KNEED, StraightLegs(type="straight-legs", foot_centre_ahead_m=0.02)])
-def test_measures_are_as_long_as_they_say(walker):
+def test_dimension_lines_have_the_labelled_length(walker):
     for measure in upright(walker).lengths:
         gaps = np.abs(np.subtract(measure.end, measure.start))
         assert np.abs(gaps - abs(measure.value)).min() < 1e-12
 
 
-def test_a_config_of_ones_own_is_drawn_by_its_command(tmp_path, monkeypatch):
+def test_user_config_is_drawn_by_its_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.yaml").write_text("extends: kneed\nname: mine\nwalker: {hip_mass_kg: 0.75}\n")
     path = draw_walker(Path("mine.yaml"), Target(None, None), Console(quiet=True))
@@ -73,7 +73,7 @@ def test_a_config_of_ones_own_is_drawn_by_its_command(tmp_path, monkeypatch):
     assert draw_walker(Path("kneed"), Target("png", Path("it")), Console()).read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_drawing_warns_of_what_its_config_perhaps_means_otherwise(tmp_path, capsys):
+def test_drawing_prints_the_warnings_of_its_config(tmp_path, capsys):
     (tmp_path / "long.yaml").write_text("walker: {leg_length_m: 1000, foot_to_mass_m: 500}\n")
     draw_walker(tmp_path / "long.yaml", Target("svg", tmp_path / "long.svg"), Console(quiet=True))
     assert "lengths are in m, not in mm" in " ".join(capsys.readouterr().err.split())
@@ -124,7 +124,7 @@ def figures():
 
 
 @pytest.mark.parametrize("place", range(len(OF_TYPES) + 3))
-def test_no_words_meet_or_leave_the_picture(place):
+def test_labels_do_not_overlap_or_leave_the_picture(place):
     with styled():
         figure = next(itertools.islice(figures(), place, None))
         settle(figure)
@@ -138,7 +138,7 @@ def test_no_words_meet_or_leave_the_picture(place):
         assert not box.overlaps(other_box), (text, other)
 
 
-def test_a_leg_of_parts_ends_on_its_arc():
+def test_leg_of_parts_ends_on_its_foot_arc():
     (axes,) = draw_parts(parts(0.2)).axes
     sole, leg = (line for line in axes.lines if line.get_linewidth() == 2.0)
     low = int(np.argmin(sole.get_ydata()))

@@ -67,7 +67,7 @@ def test_multipliers_are_written_as_complex_numbers():
     assert row(lines, "λ₃") == ["0.2160"]
 
 
-def test_an_answer_says_what_drives_a_walker_and_a_spring_does_not():
+def test_answer_lists_drives_but_not_springs():
     spring = {"driven_by": [], "springs": ["a hip spring of 10 N m/rad"]}
     head = said(answer("fixedpoint", {**GAIT, **spring}))
     assert ", with a hip spring of 10 N m/rad, there is a stable gait" in head
@@ -76,13 +76,13 @@ def test_an_answer_says_what_drives_a_walker_and_a_spring_does_not():
     assert ", driven by a push-off of 4 N s, with a hip spring of 10 N m/rad, there is" in head
 
 
-def test_what_is_right_is_named_only_beside_what_is_misprinted():
+def test_corrected_column_is_labelled_only_next_to_the_printed_one():
     assert ["quantity", "value"] in cells(answer("fixedpoint", {**GAIT, "equation_sets": {"corrected": GAIT}}))
     printed = {**GAIT, "equations": "as-printed"}
     assert ["quantity", "as", "printed"] in cells(answer("fixedpoint", printed))
 
 
-def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
+def test_gait_is_a_sentence_and_a_table_of_both_sets_of_equations():
     printed = {**GAIT, "equations": "as-printed", "state": [-0.2022, 0.1674, -0.6006, -0.8466]}
     lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
     assert lines[0].startswith("On a slope of 0.0174 rad (0.997°) there is a stable gait")
@@ -91,13 +91,13 @@ def test_the_gait_is_a_sentence_and_a_table_with_printed_beside_corrected():
     assert "0.70360123456789" not in "\n".join(lines)
 
 
-def test_a_misprint_that_makes_no_difference_has_no_column():
+def test_misprint_without_effect_has_no_column():
     printed = {**GAIT, "equations": "as-printed", "energy_drift_J": 1e-15}
     lines = answer("fixedpoint", {**GAIT, "equation_sets": {"as-printed": printed, "corrected": GAIT}})
     assert ["quantity", "value"] in cells(lines)
 
 
-def test_a_walker_with_more_angles_has_its_own_names():
+def test_walker_with_more_angles_lists_them_by_name():
     gait = {**GAIT, "state": [0.1, 0.2, 0.3, 1.0, 1.1, 1.2]}
     names = ["theta_1", "theta_2", "theta_1_shank", "dtheta_1", "dtheta_2", "dtheta_1_shank"]
     lines = answer("fixedpoint", {**gait, "state_names": names, "equation_sets": {"corrected": gait}})
@@ -106,13 +106,13 @@ def test_a_walker_with_more_angles_has_its_own_names():
     assert row(lines, "θ̇₁, swing shank (rad/s)") == ["1.200000"]
 
 
-def test_without_a_gait_the_reason_is_the_answer():
+def test_missing_gait_shows_the_reason():
     lines = answer("fixedpoint", {"slope_rad": 0.3, "reason": "the steepest gait is at 0.09 rad"})
     assert lines == ["No gait on a slope of 0.3 rad (17.2°): the steepest gait is at 0.09 rad."]
 
 
 @pytest.mark.parametrize("stage", ["simulate", "contact-sim"])
-def test_a_long_walk_is_a_few_short_lines(stage):
+def test_long_walk_is_summarised_in_a_few_lines(stage):
     lines = answer(stage, WALK)
     assert lines[0].endswith("walks all 20000 steps; the last takes 0.7000 s and is 0.3700 m long.")
     assert max(map(len, lines)) <= 120
@@ -120,7 +120,7 @@ def test_a_long_walk_is_a_few_short_lines(stage):
     assert row(lines, "period (s)") == [*["0.7000"] * 4, "…", *["0.7000"] * 6]
 
 
-def test_periods_and_lengths_have_the_digits_that_their_numerical_error_leaves():
+def test_periods_and_lengths_are_printed_to_their_numerical_error():
     changed = {"step_period_s": 4e-6, "step_length_m": 3e-3, "end_time_s": 1e-5}
     numbers = {"step_periods_s": [0.8061234], "step_lengths_m": [0.3712345], "steps": 1}
     lines = answer("contact-sim", WALK | numbers | {"numerical_error": changed})
@@ -133,7 +133,7 @@ def test_periods_and_lengths_have_the_digits_that_their_numerical_error_leaves()
     assert "another method, radau5." in said(answer("simulate", WALK | numbers | {"numerical_error": other}))
 
 
-def test_an_unknown_numerical_error_is_told_with_its_reason():
+def test_unknown_numerical_error_is_reported_with_the_reason():
     unknown = {"reason": "with a hundred times tighter tolerances the walk ends differently: fell after 1 step"}
     lines = answer("contact-sim", WALK | {"numerical_error": unknown})
     assert lines[0].endswith("takes 0.7000 s and is 0.3700 m long.")
@@ -142,7 +142,7 @@ def test_an_unknown_numerical_error_is_told_with_its_reason():
     )
 
 
-def test_compared_walks_have_their_digits_and_errors():
+def test_compared_walks_are_printed_with_digits_and_errors():
     step = {"period_s": 0.8061234, "length_m": 0.3712345}
     errors = {"contact": {"step_period_s": 4e-3, "step_length_m": 4e-6, "end_time_s": 1e-3}}
     summary = {
@@ -156,7 +156,7 @@ def test_compared_walks_have_their_digits_and_errors():
     assert "numerical error of the contact walk: 0.004 s in period" in said(lines)
 
 
-def test_a_fall_is_told_with_its_advice():
+def test_fall_is_reported_with_advice():
     fall = {"outcome": "fell", "steps": 1, "step_periods_s": [0.7], "step_lengths_m": [0.4], "advice": "Start slower."}
     lines = answer("contact-sim", WALK | fall)
     assert lines[0].startswith("The contact model walks 1 step and then falls; the last takes 0.7000 s")
@@ -166,21 +166,21 @@ def test_a_fall_is_told_with_its_advice():
 
 
 @pytest.mark.parametrize("outcome", [outcome.label for outcome in Outcome])
-def test_every_end_of_a_walk_has_words(outcome):
+def test_every_outcome_of_a_walk_has_a_text(outcome):
     said = answer("simulate", WALK | {"outcome": outcome, "advice": "Try again."})[0]
     assert outcome not in said.split("; ")[0].split()
     at_once = {"outcome": outcome, "steps": 0, "step_periods_s": [], "step_lengths_m": [], "advice": "Try again."}
     assert "further" not in answer("simulate", WALK | at_once)[0]
 
 
-def test_channels_that_took_no_energy_are_left_out():
+def test_channels_without_losses_are_omitted():
     lost = {"damping": 4.0, "friction": 0.0, "edges": 0.0, "knee_strikes": 0.274, "knee_stop": 0.0}
     told = " ".join(row(answer("contact-sim", WALK | {"dissipated_J": lost}), "energy lost"))
     assert told == "4 J in the ground's damping and 0.274 J in knee strikes"
 
 
 @pytest.mark.parametrize("outcome", ["walked", "fell"])
-def test_both_models_of_another_walker_are_compared_in_a_sentence(outcome):
+def test_models_of_another_walker_are_compared_in_a_sentence(outcome):
     step = {"period_s": 0.7, "length_m": 0.4}
     summary = {"steps": {"rigid": step, "contact": step}, "outcomes": {"rigid": "walked", "contact": outcome}}
     head = answer("compare", summary)[0]
@@ -189,11 +189,11 @@ def test_both_models_of_another_walker_are_compared_in_a_sentence(outcome):
 
 
 @pytest.mark.parametrize("stage", ANSWERS)
-def test_a_stage_that_came_to_nothing_has_nothing_to_tell(stage):
+def test_empty_summary_gives_an_empty_answer(stage):
     assert answer(stage, {}) == []
 
 
-def test_families_are_told_in_sentences_with_their_bifurcations():
+def test_families_are_described_with_their_bifurcations():
     branch = {"model": "rigid", "period": 1, "stable_ranges": [[1.0, 4.0]]}
     flip = {"kind": "flip", "model": "rigid", "period": 1, "value": 4.0, "multiplier": [-1.0, 0.0]}
     none = {"cascades": [], "attractors": [], "lyapunov": []}
@@ -204,7 +204,7 @@ def test_families_are_told_in_sentences_with_their_bifurcations():
     assert lines[-1].split() == ["flip", "rigid", "1", "4", "−1.0000"]
 
 
-def test_engines_are_told_by_what_was_concluded():
+def test_answer_about_engines_shows_the_conclusions():
     summary = {
         "rows": [{}],
         "versions": {"drake": "1.5"},
@@ -213,7 +213,7 @@ def test_engines_are_told_by_what_was_concluded():
     assert answer("engines", summary) == ["1 run in drake 1.5.", "kneed, own-law: Closest."]
 
 
-def test_how_far_a_start_may_change_is_told_in_signs():
+def test_margins_of_a_start_use_mathematical_symbols():
     margins = {
         "dtheta_1 down": {"factor": 0.0, "beyond": ""},
         "both up": {"factor": 1.10664, "beyond": "off-pad"},
@@ -233,12 +233,12 @@ def test_long_rows_keep_their_ends():
     assert "(1000 values" in line
 
 
-def test_columns_line_up_under_letters_with_dots():
+def test_columns_align_under_letters_with_dots():
     first, second = aligned([["θ̇₁", "1"], ["ab", "2"]])
     assert width(first) == width(second) == 5
 
 
-def test_the_verdict_of_a_run_is_three_paragraphs():
+def test_verdict_of_a_run_has_three_paragraphs():
     rows = [paper_row("Table 1", "m", "5", verdict, "") for verdict in ("input", *("reproduced",) * 3)]
     numbers = {"verdicts": {}, "paper_numbers": rows}
     cases = {"passed": 5, "failed": 0, "cases": [], "known": []}
@@ -274,13 +274,13 @@ SAYS_MUCH = {
 
 
 @pytest.mark.parametrize("stage", SAYS_MUCH)
-def test_whatever_stage_speaks_its_paragraphs_have_lines_of_one_length(stage):
+def test_paragraphs_of_every_stage_are_wrapped_alike(stage):
     lines = answer(stage, SAYS_MUCH[stage])
     assert sum(line.count("word") for line in lines) == 60
     assert max(map(len, lines)) <= PARAGRAPH_WIDTH
 
 
-def test_a_gait_is_one_table_on_page_and_terminal():
+def test_page_and_terminal_show_the_same_gait_table():
     gaits = {"as-printed": {**GAIT, "equations": "as-printed"}, "corrected": GAIT}
     shown = gait_table(gaits, ["theta_1", "theta_2", "dtheta_1", "dtheta_2"])
     lines = in_lines(shown)
@@ -293,7 +293,7 @@ def cells_of_head(lines):
     return " ".join(lines[0].split())
 
 
-def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_groups():
+def test_terminal_tables_omit_sentences_and_add_a_group_column():
     columns = [Column("case", "name"), Column("error", "error", number, numeric=True), Column("why", "why", wide=True)]
     record = {"name": "slow", "error": 0.5, "why": LONG}
     shown = table("Cases", columns, {"start": [record], "ground": [record]}, by="family")
@@ -312,13 +312,13 @@ def test_a_terminal_has_no_room_for_sentences_and_a_column_for_the_titles_of_gro
         ("-b ahead", "'-b ahead"), ("-2.5e-3", "-2.5e-3"), (-2.5, "-2.5"), ("fell", "fell"), (None, ""),
     ],
 )  # fmt: skip
-def test_a_text_that_a_spreadsheet_would_compute_begins_with_an_apostrophe_and_a_value_does_not(value, cell):
+def test_spreadsheet_formulas_are_escaped_in_csv(value, cell):
     lines = list(csv.reader(csv_text(["case", str(value)], [["a", value]]).decode().splitlines()))
     assert lines[1] == ["a", cell]
     assert lines[0] == ["case", cell or "None"]
 
 
-def test_records_side_by_side_have_a_row_for_what_one_of_them_has():
+def test_side_by_side_table_includes_rows_of_either_record():
     lines = [measured("period", "period_s"), measured("slip", "slip_m", prefix="m"), measured("torque", "torque_N")]
     shown = side_by_side("", lines, {"rigid": {"period_s": 0.7}, "contact": {"period_s": 0.71, "slip_m": 5e-4}})
     assert [[cell.text for cell in row] for row in next(iter(shown.groups.values()))] == [
@@ -327,7 +327,7 @@ def test_records_side_by_side_have_a_row_for_what_one_of_them_has():
     ]
 
 
-def test_what_is_written_for_people_and_for_programs_comes_from_one_cell():
+def test_cell_is_rounded_for_readers_and_exact_in_files():
     shown = table("", [measured("period", "period_s", lambda value: number(value, 2))], [{"period_s": 0.7036}])
     assert in_lines(shown) == ["period (s)", "0.7"]
     assert as_csv(shown) == b"period (s)\n0.7036\n"

@@ -18,7 +18,7 @@ from walkerlab.pipeline.sweeps.chunk import by_name
         ("contact-sim", lambda: walkerlab.simulate(strides=1, contact=walkerlab.contact()), set()),
     ],
 )
-def test_a_stage_has_its_headline_numbers_but_those_of_knees(stage, answer, lacking):
+def test_headline_values_omit_knees_without_knees(stage, answer, lacking):
     summary = answer().summary
     assert set(headline_values(stage, summary)) == set(HEADLINES[stage]) - lacking
     if stage != "fixedpoint":
@@ -29,7 +29,7 @@ LEVEL = {"slope_deg": 0, "push_off.impulse_N_s": 0.2, "walker.hip.torque_N_m": 0
 
 
 @pytest.mark.parametrize("stage", QUANTITIES)
-def test_every_number_of_a_point_of_a_sweep_can_be_asked_for(stage, tmp_path):
+def test_every_value_of_a_sweep_point_can_be_requested(stage, tmp_path):
     strides = None if stage == "fixedpoint" else 1
     path = walkerlab.run(stage, "kneed", LEVEL, tmp_path, strides=strides).artifact
     summary = artifact.read(path).summary
@@ -39,14 +39,14 @@ def test_every_number_of_a_point_of_a_sweep_can_be_asked_for(stage, tmp_path):
     assert summary["froude"] == pytest.approx(summary["speed_m_s"] / (9.81 * 1.0) ** 0.5, rel=1e-12)
 
 
-def test_headlines_are_of_stages_that_there_are_and_few():
+def test_headline_values_are_few_and_belong_to_existing_stages():
     assert HEADLINES.keys() <= {stage.name for stage in PIPELINE.stages}
     assert max(map(len, HEADLINES.values())) <= MOST
     assert all(has_quantity(stage, name) for stage in QUANTITIES for name in HEADLINES[stage])
     assert not has_quantity("fixedpoint", "froud")
 
 
-def test_a_stage_of_ones_own_has_its_first_numbers_for_headlines():
+def test_user_stage_uses_its_first_values_as_headlines():
     names = ["of.0", *(f"n{place}" for place in range(20))]
     assert headlines("mine", names) == names[1 : MOST + 1]
     assert headlines("basin", ["outcomes.walked", "share_walking"]) == ["share_walking", "outcomes.walked"]

@@ -30,7 +30,7 @@ def page(tmp_path_factory):
     browser.close()
 
 
-def test_the_measured_walk_plays_over_the_identified_one(page):
+def test_measured_walk_plays_over_the_identified_one(page):
     first = page.evaluate(PICTURE)
     page.evaluate("document.querySelector('.play').click()")
     page.until(f"{TIME} > 0.3")

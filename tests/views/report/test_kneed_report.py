@@ -32,7 +32,7 @@ def run(tmp_path_factory):
     return Results(loaded.config, stored), folder
 
 
-def test_both_models_walk_on_plain_ground(run):
+def test_both_kneed_models_walk_on_plain_ground(run):
     results, _ = run
     compared = results.summary("compare")
     assert results.config.contact.terrain == "plane"
@@ -41,7 +41,7 @@ def test_both_models_walk_on_plain_ground(run):
     assert compared["dissipated_J"]["knee_strikes"] > 0.0
 
 
-def test_knee_strikes_are_stored_and_said_alike_in_both_models(run):
+def test_knee_strikes_are_stored_and_reported_equally_in_both_models(run):
     results, _ = run
     for stage in ("simulate", "contact-sim"):
         times, steps = results.summary(stage)["knee_strike_times_s"], results.group(stage, "steps")
@@ -56,7 +56,7 @@ def test_knee_strikes_are_stored_and_said_alike_in_both_models(run):
     assert results.summary("contact-sim")["knee_strikes_s"] == times
 
 
-def test_the_instant_of_release_decides_which_gait_is_walked(run):
+def test_time_of_release_decides_which_gait_is_walked(run):
     results, _ = run
     releases = results.summary("compare")["releases"]
     assert releases.keys() == RELEASES.keys()
@@ -70,7 +70,7 @@ def test_the_instant_of_release_decides_which_gait_is_walked(run):
     assert "with the same rule the rigid model takes steps of 0.54259" in models.departure(results)
 
 
-def test_the_verdict_tells_in_one_paragraph_where_the_models_part(run):
+def test_verdict_explains_the_difference_of_the_models_in_one_paragraph(run):
     results, _ = run
     said = models.departure(results)
     assert [block.text for block in verdict.section(results).blocks if getattr(block, "text", "") == said] == [said]
@@ -78,7 +78,7 @@ def test_the_verdict_tells_in_one_paragraph_where_the_models_part(run):
         assert words in said
 
 
-def test_the_player_shows_knees_in_both_models(run):
+def test_player_shows_knees_in_both_models(run):
     results, _ = run
     (player,) = (block for block in motion.section(results).blocks if isinstance(block, Player))
     assert [walker.name for walker in player.walkers] == ["Rigid model", "Contact model"]
@@ -86,7 +86,7 @@ def test_the_player_shows_knees_in_both_models(run):
     assert player.pads == ()
 
 
-def test_figures_and_pages_are_made_of_a_kneed_walk(run, tmp_path):
+def test_kneed_walk_has_figures_and_pages(run, tmp_path):
     results, folder = run
     drawn = {figure["number"] for figure in results.summary("plot")["figures"] if "number" in figure}
     assert {2, 6, 7, 8, 9, 10} <= drawn
@@ -96,7 +96,7 @@ def test_figures_and_pages_are_made_of_a_kneed_walk(run, tmp_path):
     assert "Effect of the release instant" in page.text
 
 
-def test_without_a_release_to_compare_the_paragraph_is_silent_about_knees(run):
+def test_paragraph_omits_knees_without_a_release(run):
     results, _ = run
     compared = results.stored["compare"]
     summary = {name: value for name, value in compared.summary.items() if name != "releases"}

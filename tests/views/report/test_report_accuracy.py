@@ -83,28 +83,28 @@ def tables(made):
     }
 
 
-def test_without_the_result_there_is_no_section():
+def test_section_is_omitted_without_the_result():
     assert section(Results(config(), {"fixedpoint": fixedpoint()})) is None
 
 
-def test_each_method_has_its_least_time_for_each_error_and_its_smallest_error(made):
+def test_each_method_shows_its_shortest_time_per_error_and_its_smallest_error(made):
     costs = tables(made)["Shortest run time for each error, by method"]
     assert costs["rigid", "dop853"][:4] == ["0.05 (0.045 to 0.07)", "0.2 (0.18 to 0.28)", "7 × 10⁻¹⁵", "1,234"]
     assert costs["rigid", "scipy-bdf"][:3] == ["200", "–", "0.0003"]
     assert costs["contact", "radau5"][:2] == ["5 (4.5 to 7)", "50 (45 to 70)"]
 
 
-def test_an_error_below_what_the_reference_is_known_to_is_told_as_a_bound(made):
+def test_error_below_the_uncertainty_of_the_reference_is_shown_as_a_bound(made):
     costs = tables(made)["Shortest run time for each error, by method"]
     assert costs["contact", "radau5"][2] == "≤ 10⁻¹²"
 
 
-def test_a_run_that_ended_otherwise_is_told_with_its_outcome(made):
+def test_run_with_another_outcome_is_shown_with_it(made):
     costs = tables(made)["Shortest run time for each error, by method"]
     assert costs["rigid", "scipy-bdf"][-1] == "slid at 10⁻³"
 
 
-def test_the_fastest_methods_are_marked(made):
+def test_fastest_methods_are_marked(made):
     made_of = next(block for block in made.blocks if isinstance(block, Table)).groups
     assert {line[0].text: line[0].tone for line in next(iter(made_of.values()))} == {
         "dop853": "good",
@@ -112,7 +112,7 @@ def test_the_fastest_methods_are_marked(made):
     }
 
 
-def test_conclusions_stand_beside_their_scenes(made):
+def test_conclusions_are_shown_with_their_scenes(made):
     findings = next(block for block in made.blocks if isinstance(block, Statements))
     assert [(item.about, item.text) for item in findings.items] == [
         ("rigid", "At 1e-03, dop853 is fastest."),
@@ -120,11 +120,11 @@ def test_conclusions_stand_beside_their_scenes(made):
     ]
 
 
-def test_the_section_comes_to_the_fastest_methods(made):
+def test_finding_names_the_fastest_methods(made):
     assert made.finding == "Fastest: dop853 on rigid; radau5 on contact."
 
 
-def test_references_come_with_what_is_known_of_them(made):
+def test_references_state_their_accuracy(made):
     assert tables(made)["References"]["", "rigid"] == [
         "heyoka-taylor",
         "heyoka, at machine precision",
@@ -134,14 +134,14 @@ def test_references_come_with_what_is_known_of_them(made):
     assert tables(made)["References"]["", "contact"][1] == "ours, at 10⁻¹¹, 1,200,000 right-hand sides"
 
 
-def test_a_reference_of_our_own_is_not_said_to_be_from_outside(made):
+def test_built_in_reference_is_not_called_independent(made):
     (note,) = [block.note for block in made.blocks if getattr(block, "caption", "") == "References"]
     assert "On rigid heyoka computes the reference: an independent program" in note
     assert "On contact both methods are our own" in note
     assert "scipy-bdf on rigid, with an error of 0.0003." in note
 
 
-def test_a_budget_that_is_used_up_is_explained_as_such():
+def test_exhausted_budget_is_explained():
     used_up = {**SUMMARY, "rows": [*ROWS, row("dop853", 1e-8, None, 0.1, "budget-exhausted", scene="contact")]}
     made = section(Results(config(), {"accuracy": stored("accuracy", {}, used_up)}))
     costs = next(block for block in made.blocks if isinstance(block, Table))
@@ -151,10 +151,10 @@ def test_a_budget_that_is_used_up_is_explained_as_such():
     assert "a library’s to 20,000" in costs.note
 
 
-def test_what_was_not_run_is_said_once_for_each_reason(made):
+def test_skipped_runs_are_grouped_by_reason(made):
     assert tables(made)["Not run"]["", "rigid"] == ["scipy-bdf", "10⁻⁷ and 10⁻⁹", "too much work"]
 
 
-def test_that_the_rigid_scene_does_not_start_on_its_gait_is_said():
+def test_rigid_scene_off_its_gait_is_mentioned():
     said = words("accuracy.introduction", {"repeats": 7, "rigid_velocity_factor": 0.98})
     assert "starts with angular velocities scaled by 0.98" in said

@@ -64,14 +64,14 @@ def page(browser, folder):
     return browser
 
 
-def test_the_page_asks_for_nothing_and_complains_of_nothing(page, folder):
+def test_page_makes_no_requests_and_logs_no_errors(page, folder):
     page.evaluate("document.querySelector('.play').click()")
     page.until(f"{TIME} > 0.1")
     assert page.requests() == [(folder / "report.html").as_uri()]
     assert page.complaints() == []
 
 
-def test_pages_beside_it_complain_of_nothing_either(browser, folder):
+def test_additional_pages_log_no_errors(browser, folder):
     for file in sorted(folder.glob("report-*.html")):
         browser.open(file)
         assert browser.complaints() == []
@@ -108,7 +108,7 @@ def hostile_folder(tmp_path_factory):
     return folder
 
 
-def test_hostile_names_sources_and_labels_are_shown_as_text_and_do_nothing(browser, hostile_folder):
+def test_hostile_names_and_labels_are_shown_as_text(browser, hostile_folder):
     for file in sorted(hostile_folder.glob("report*.html")):
         browser.open(file)
         browser.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
@@ -130,7 +130,7 @@ def test_hostile_names_sources_and_labels_are_shown_as_text_and_do_nothing(brows
     assert browser.evaluate("document.querySelector('cite a').protocol") == "https:"
 
 
-def test_the_player_plays_and_pauses(page):
+def test_player_plays_and_pauses(page):
     assert page.evaluate(TIME) == 0
     page.evaluate("document.querySelector('.play').click()")
     page.until(f"{TIME} > 0.2")
@@ -153,7 +153,7 @@ def test_scrubbing_moves_every_view(page, view):
     assert page.evaluate(SEEN[view]) != before
 
 
-def test_looping_begins_again_and_otherwise_the_walk_ends(page):
+def test_playback_restarts_only_when_looping(page):
     end = page.evaluate("Number(document.querySelector('.time').max)")
     page.evaluate(SCRUB.format(end - 0.05))
     page.evaluate("document.querySelector('.play').click()")
@@ -165,7 +165,7 @@ def test_looping_begins_again_and_otherwise_the_walk_ends(page):
     page.until(f"{TIME} > 0.01 && {TIME} < 0.5 * {end}")
 
 
-def test_keys_move_through_the_walk(page):
+def test_keys_step_through_the_walk(page):
     page.evaluate("document.querySelector('.time').focus()")
     page.press("PageDown", 34)
     assert page.evaluate(TIME) == pytest.approx(0.7, abs=1e-3)
@@ -177,7 +177,7 @@ def test_keys_move_through_the_walk(page):
     page.until(f"{TIME} > 0.05")
 
 
-def test_the_values_under_the_pointer_are_told(page):
+def test_values_under_the_pointer_are_shown(page):
     page.evaluate("document.querySelector('[data-view=angles] .cursor').scrollIntoView()")
     page.evaluate(
         "(() => { const at = document.querySelector('[data-view=angles] .cursor'), box = at.getBoundingClientRect();"
@@ -191,7 +191,7 @@ def test_the_values_under_the_pointer_are_told(page):
 @pytest.mark.parametrize(
     ("value", "said"), [("0", "0 m"), ("5.55e-17", "0 m"), ("-2.5e-8", "−25 nm"), ("1.2e-4", "120 µm")]
 )
-def test_rounding_is_no_length(page, value, said):
+def test_rounding_errors_are_shown_as_zero_length(page, value, said):
     assert page.evaluate(f"metres({value})") == said
 
 
@@ -214,7 +214,7 @@ def folder_with_figures(tmp_path_factory):
 
 
 @pytest.mark.parametrize("width", [400, 768, 1280])
-def test_letters_of_figures_have_nine_pixels_before_a_click(browser, folder_with_figures, width):
+def test_figure_text_is_at_least_nine_pixels_high(browser, folder_with_figures, width):
     seen = 0
     for file in sorted(folder_with_figures.glob("report*.html")):
         browser.open(file, width)
@@ -226,7 +226,7 @@ def test_letters_of_figures_have_nine_pixels_before_a_click(browser, folder_with
     assert seen > 200
 
 
-def test_figures_fill_their_frames_and_stand_close_together(browser, folder_with_figures):
+def test_figures_fill_their_frames(browser, folder_with_figures):
     for name in ("report.html", "report-accuracy.html"):
         browser.open(folder_with_figures / name, 1280)
         shares = browser.evaluate(
@@ -243,7 +243,7 @@ def test_figures_fill_their_frames_and_stand_close_together(browser, folder_with
         assert left != next_left or top - bottom < 40
 
 
-def test_a_figure_grows_on_a_click_and_escape_closes_it(page):
+def test_figure_grows_on_a_click_and_escape_closes_it(page):
     page.evaluate("document.querySelector('[data-large]').click()")
     assert page.evaluate("document.getElementById('large').open")
     assert page.evaluate("document.querySelector('#large svg').getBoundingClientRect().height") > 600
@@ -251,13 +251,13 @@ def test_a_figure_grows_on_a_click_and_escape_closes_it(page):
     page.until("!document.getElementById('large').open")
 
 
-def test_a_link_to_a_folded_section_unfolds_it(page):
+def test_link_to_a_folded_section_unfolds_it(page):
     assert not page.evaluate("document.querySelector('#gait details').open")
     page.evaluate("document.querySelector('nav a[href=\"#gait\"]').click()")
     page.until("document.querySelector('#gait details').open")
 
 
-def test_a_gait_that_is_chosen_in_the_diagram_walks_in_the_player_and_the_walk_comes_back(page):
+def test_gait_chosen_in_the_diagram_plays_and_the_walk_can_be_restored(page):
     walk = page.evaluate(SEEN["walk"])
     page.evaluate("document.querySelector('.diagram [data-gait]').dispatchEvent(new Event('click'))")
     assert "Gait of 1 step at 1" in page.evaluate("document.querySelector('.player .key').textContent")
@@ -269,7 +269,7 @@ def test_a_gait_that_is_chosen_in_the_diagram_walks_in_the_player_and_the_walk_c
     assert page.complaints() == []
 
 
-def test_the_diagram_is_walked_through_with_keys(page):
+def test_diagram_can_be_browsed_with_keys(page):
     page.evaluate("document.querySelector('#families details').open = true")
     page.evaluate("document.querySelector('.diagram [data-gait]').focus()")
     page.press("ArrowRight", 39)
@@ -292,7 +292,7 @@ def test_nothing_overflows_the_width(browser, folder, width):
         assert browser.evaluate(sticking_out) == 0
 
 
-def test_colours_follow_the_system_in_the_dark(browser, folder):
+def test_colours_follow_the_dark_mode_of_the_system(browser, folder):
     seen = []
     for dark in (False, True):
         browser.open(folder / "report.html", dark=dark)
@@ -307,7 +307,7 @@ def test_less_motion_is_slower_motion(browser, folder):
     assert float(browser.evaluate("document.querySelector('.speed').value")) < 1.0
 
 
-def test_on_paper_the_player_is_stills_and_everything_is_unfolded(page):
+def test_printed_page_has_stills_and_unfolded_sections(page):
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     page.call("Emulation.setEmulatedMedia", media="print")
     assert page.evaluate("getComputedStyle(document.querySelector('.stills')).display") == "block"
@@ -316,7 +316,7 @@ def test_on_paper_the_player_is_stills_and_everything_is_unfolded(page):
     page.call("Emulation.setEmulatedMedia", media="")
 
 
-def test_the_walk_begins_on_the_first_printed_page(browser, folder):
+def test_walk_is_on_the_first_printed_page(browser, folder):
     browser.open(folder / "report.html", width=680, height=1009)  # A4 without its margins of 15 mm
     browser.evaluate("dispatchEvent(new Event('beforeprint'))")
     browser.call("Emulation.setEmulatedMedia", media="print")
@@ -326,7 +326,7 @@ def test_the_walk_begins_on_the_first_printed_page(browser, folder):
     browser.call("Emulation.setEmulatedMedia", media="")
 
 
-def test_nobody_is_told_on_paper_to_reload_the_page(browser, folder_with_pending):
+def test_printed_page_has_no_reload_hint(browser, folder_with_pending):
     browser.open(folder_with_pending / "report.html")
     assert "reload it" in browser.evaluate("document.querySelector('header').innerText")
     browser.call("Emulation.setEmulatedMedia", media="print")

@@ -11,11 +11,11 @@ from walkerlab.views.report.sections.families import MIN_MARK_DISTANCE, apart, g
 from walkerlab.views.report.words import words
 
 
-def test_a_run_without_families_has_no_such_section():
+def test_section_is_omitted_without_families():
     assert section.section(Results(load().config)) is None
 
 
-def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its_end():
+def test_finding_states_the_stable_range_and_paragraph_the_chaos():
     made = section.section(Results(load().config, families()))
     (paragraph, table) = made.blocks
     assert "stable from 1\u00a0deg to 4\u00a0deg" in made.finding
@@ -24,7 +24,7 @@ def test_the_finding_is_the_stable_range_and_the_paragraph_has_the_chaos_and_its
     assert [cell.text for cell in next(iter(table.groups.values()))[0]][:4] == ["flip", "rigid", "1", "4"]
 
 
-def test_what_the_ground_ends_is_told_of_gaits_of_one_step_and_of_basins():
+def test_limits_by_the_ground_are_stated_for_gaits_and_basins():
     summary = dict(families()["continuation"].summary)
     told = {"model": "contact", "value": 3.2, "outcome": "off-pad"}
     summary["endings"] = [
@@ -39,7 +39,7 @@ def test_what_the_ground_ends_is_told_of_gaits_of_one_step_and_of_basins():
     assert words.parts("basin.grounds", {}) == []
 
 
-def test_the_diagram_marks_gaits_whose_motion_is_stored():
+def test_diagram_marks_gaits_with_stored_motion():
     walk = simulate()
     made = gait_diagram(Results(config(), {"continuation": families_that_move(walk)}))
     first, second = made.gaits
@@ -50,7 +50,7 @@ def test_the_diagram_marks_gaits_whose_motion_is_stored():
     assert gait_diagram(Results(config(), families())) is None
 
 
-def test_no_mark_covers_another_and_stable_gaits_keep_theirs():
+def test_marks_do_not_overlap_and_stable_gaits_keep_theirs():
     walk = simulate()
     (mark, _) = gait_diagram(Results(config(), {"continuation": families_that_move(walk)})).gaits
     near, far = replace(mark, x=mark.x + 0.9 * MIN_MARK_DISTANCE), replace(mark, x=mark.x + MIN_MARK_DISTANCE)

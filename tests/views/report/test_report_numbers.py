@@ -27,7 +27,7 @@ def plain(text):
         (math.inf, "–"),
     ],
 )
-def test_numbers(value, text):
+def test_numbers_are_rounded_and_typeset(value, text):
     assert plain(number(value)) == text
 
 
@@ -41,17 +41,17 @@ def test_fixed_decimals_never_print_minus_zero():
     ("value", "text"),
     [(0.37143, "0.3714 m"), (0.00037, "0.37 mm"), (5.88e-5, "58.8 µm"), (1.11e-16, "0 m"), (0.0, "0 m")],
 )
-def test_lengths_are_in_the_unit_they_are_easiest_read_in(value, text):
+def test_lengths_are_shown_in_a_readable_unit(value, text):
     assert plain(length(value)) == text
 
 
-def test_spans_of_equal_numbers_are_one_number():
+def test_range_of_equal_numbers_is_one_number():
     assert plain(span([0.7, 0.7], "s")) == "0.7 s"
     assert plain(span([0.7, 0.8], "s")) == "0.7 to 0.8 s"
     assert span([], "s") == "–"
 
 
-def test_words():
+def test_counts_and_lists_are_worded_correctly():
     assert count(1, "step") == "1 step"
     assert count(2, "step") == "2 steps"
     assert join_words(["a", "b", "c"]) == "a, b and c"
@@ -59,5 +59,5 @@ def test_words():
     assert plain(power_of_ten(9.96e-10, 2)) == "10⁻⁹"
 
 
-def test_no_line_ends_between_a_number_and_its_unit():
+def test_number_and_unit_are_not_separated_by_a_line_break():
     assert " " not in quantity(1e-9, "N/m") + length(0.001) + span([1.0], "s")

@@ -49,7 +49,7 @@ def page(whole):
     return Page(whole)
 
 
-def test_nothing_is_fetched_from_elsewhere(whole, page):
+def test_page_fetches_nothing_from_elsewhere(whole, page):
     links = [value for _, attrs in page.elements for name, value in attrs.items() if name in ("src", "href", "srcset")]
     assert links
     beside = pages(Results(config(), {name: make() for name, make in EVERYTHING.items()}, (DRAWN,)))
@@ -58,14 +58,14 @@ def test_nothing_is_fetched_from_elsewhere(whole, page):
     assert not re.search(r"@import|url\(", whole)
 
 
-def test_the_page_itself_forbids_fetching_and_foreign_scripts(page):
+def test_content_policy_forbids_fetching_and_foreign_scripts(page):
     (policy,) = [attrs["content"] for attrs in page.all("meta") if attrs.get("http-equiv") == "Content-Security-Policy"]
     script = base64.b64encode(hashlib.sha256("".join(page.words["script"]).encode()).digest()).decode()
     assert "default-src 'none'" in policy
     assert f"script-src 'sha256-{script}'" in policy
 
 
-def test_every_id_is_unique_and_every_link_leads_to_one(page):
+def test_every_id_is_unique_and_every_link_has_a_target(page):
     assert len(set(page.ids)) == len(page.ids)
     inside = {attrs["href"].removeprefix("#") for attrs in page.all("a") if attrs["href"].startswith("#")}
     assert inside <= set(page.ids)
@@ -73,14 +73,14 @@ def test_every_id_is_unique_and_every_link_leads_to_one(page):
     assert set(labels) <= set(page.ids)
 
 
-def test_every_picture_says_what_it_shows(page):
+def test_every_picture_has_a_text_alternative(page):
     assert page.all("img")
     assert all(attrs["alt"].strip() for attrs in page.all("img"))
     assert all(attrs["role"] == "img" and attrs["aria-label"].strip() for attrs in page.all("svg"))
     assert all(attrs["role"] == "img" and attrs["aria-label"].strip() for attrs in page.all("canvas"))
 
 
-def test_every_table_has_a_caption_and_every_head_a_scope():
+def test_every_table_has_a_caption_and_every_header_a_scope():
     results = Results(config(), {name: make() for name, make in EVERYTHING.items()}, (DRAWN,))
     found = [Page(html) for html in pages(results).values()]
     for page in found:
@@ -103,32 +103,32 @@ def test_language_encoding_and_width_are_declared(whole, page):
     assert any(attrs.get("name") == "viewport" for attrs in page.all("meta"))
 
 
-def test_what_needs_scripts_is_hidden_until_they_run(page):
+def test_controls_that_need_scripts_are_hidden_until_they_run(page):
     (live,) = [attrs for attrs in page.all("div") if attrs.get("class") == "live"]
     assert "hidden" in live
     assert [attrs for attrs in page.all("svg") if attrs.get("class") == "stills"]
 
 
-def test_no_text_has_a_backtick_or_a_number_as_programs_print_it(page):
+def test_texts_contain_no_backticks_or_raw_numbers(page):
     texts = [part for tag, parts in page.words.items() if tag not in READS_AS_TYPED for part in parts]
     assert not any("`" in text for text in texts)
     assert not any(re.search(r"\d[eE][-+]?\d", text) for text in texts if not re.search("[0-9a-f]{16}", text))
 
 
-def test_what_is_to_be_typed_is_set_as_code_and_powers_are_raised():
+def test_commands_are_code_and_powers_are_superscripts():
     assert to_markup("`walkerlab x --at 1e-3` errs by 2.5e-07, 1e-03 and 10^-4") == (
         "<code>walkerlab x --at 1e-3</code> errs by 2.5 × 10⁻⁷, 10⁻³ and 10⁻⁴"
     )
     assert to_markup("`<b>` & <i>") == "<code>&lt;b&gt;</code> &amp; &lt;i&gt;"
 
 
-def test_a_command_on_the_page_of_another_run_has_the_options_that_name_it():
+def test_commands_on_the_page_name_their_run():
     section = Section("left-out", "Omitted results", (Paragraph("`walkerlab engines` makes it"),))
     commands = [Page(render(Sheet("t", (section,), run=run))).said("code") for run in ("", "round feet")]
     assert commands == [["walkerlab engines"], ["walkerlab engines -c 'round feet'"]]
 
 
-def test_texts_of_results_never_become_markup():
+def test_texts_of_results_are_escaped():
     row = PAPER_ROWS[1] | {"where": NASTY, "quantity": NASTY, "evidence": NASTY, "printed": NASTY, "unit": NASTY}
     left_out = [{"what": NASTY, "why": NASTY}]
     results = Results(
@@ -152,14 +152,14 @@ def test_texts_of_results_never_become_markup():
         assert NASTY in " ".join(page.said("h1"))
 
 
-def test_command_lines_and_versions_never_become_markup():
+def test_command_lines_and_versions_are_escaped():
     walk = stored("simulate", {}, simulate().summary, command_line=NASTY, platform=NASTY, git_commit=NASTY)
     page = Page(page_of(Results(config(), {"simulate": walk})))
     assert NASTY in page.text
     assert len(page.all("script")) == 1
 
 
-def test_any_block_may_hold_any_text():
+def test_any_block_accepts_any_text():
     section = Section(
         "nasty",
         NASTY,
@@ -176,32 +176,32 @@ def test_any_block_may_hold_any_text():
 
 
 @pytest.mark.parametrize("row", [[Cell("it", "good"), "other"], ["other", Cell("it", "good")]])
-def test_a_cell_with_a_tone_is_a_badge_in_the_first_column_too(row):
+def test_cell_with_a_tone_is_a_badge_in_every_column(row):
     html = sheet(Section("s", "S", (table("t", [Column("a"), Column("b")], [row]),)))
     assert '<span class="badge good">it</span>' in html
 
 
-def test_the_same_results_give_the_same_bytes(whole):
+def test_equal_results_give_equal_bytes(whole):
     again = Results(config(), {name: make() for name, make in EVERYTHING.items()}, (DRAWN,))
     assert page_of(again) == whole
 
 
-def test_two_sections_cannot_have_one_anchor():
+def test_duplicate_anchors_are_rejected():
     with pytest.raises(ValueError, match="share an anchor"):
         sheet(Section("a", "A"), Section("a", "B"))
 
 
-def test_a_row_with_a_cell_too_few_is_refused():
+def test_row_with_a_missing_cell_is_rejected():
     with pytest.raises(ValueError, match="2 cells"):
         table("t", [Column("a"), Column("b")], [["only one"]])
 
 
-def test_the_script_is_small():
+def test_script_is_small():
     assert len(source("page.js").encode()) + len(source("player.js").encode()) < 30_000
 
 
 @pytest.mark.parametrize("templates", [words.templates, prose.templates], ids=["page", "paper"])
-def test_sentences_name_only_what_there_is(templates):
+def test_templates_use_only_defined_names(templates):
     names = templates.list_templates(extensions=["j2"])
     assert names
     for name in names:
@@ -210,12 +210,12 @@ def test_sentences_name_only_what_there_is(templates):
         templates.from_string("{{ numbr }}").render()
 
 
-def test_a_sentence_is_one_line_and_keeps_the_blanks_of_its_numbers():
+def test_sentence_is_one_line_with_nonbreaking_spaces():
     assert words("gait.finding", fixedpoint().summary).count("\u00a0") == 2
     assert "\n" not in words("stability.judgement")
 
 
-def test_a_template_sets_its_parts_apart_and_none_is_empty():
+def test_template_parts_are_separated_and_not_empty():
     assert parts("| one |\n two,\u00a0m | | three|four |") == ["one", "two,\u00a0m", "three|four"]
     assert in_row(" a |\n b | c |") == "a, b and c"
     assert words.terms("adjustment.walks", True)["released"] == "without the joint, from the rigid state"

@@ -73,20 +73,20 @@ def rows(section, index=0):
     }
 
 
-def test_the_verdict_comes_first_and_the_provenance_last():
+def test_verdict_comes_first_and_provenance_last():
     anchors = list(sections())
     assert anchors[0] == "verdict"
     assert anchors[-2:] == ["left-out", "provenance"]
 
 
-def test_each_result_brings_its_sections():
+def test_each_result_adds_its_sections():
     assert {"gait"} <= sections(["fixedpoint"]).keys()
     assert {"assumptions", "steps", "motion"} <= sections(["simulate"]).keys()
     assert {"contact", "steps", "motion"} <= sections(["contact-sim"]).keys()
     assert {"paper-numbers", "errata"} <= sections(["compare"]).keys()
 
 
-def test_without_contact_the_lead_alone_says_that_it_was_not_asked():
+def test_only_the_lead_mentions_a_missing_contact_model():
     found = sections(["fixedpoint", "simulate"], sets=("contact=null",))
     assert not {"contact", "paper-numbers", "errata"} & found.keys()
     spoken = " ".join(texts(found[name]) for name in found if name != "provenance").lower()
@@ -99,7 +99,7 @@ def test_without_contact_the_lead_alone_says_that_it_was_not_asked():
     assert "not used: the walker's feet have next to no mass" in lead(simplest, "simplest")
 
 
-def test_a_slope_without_a_gait_is_said_in_words_first():
+def test_missing_gait_is_stated_first():
     first = sections([], absent=WITHOUT_GAIT, failed=["fixedpoint"])["verdict"].blocks[0]
     assert isinstance(first, Paragraph)
     assert first.tone == "bad"
@@ -107,13 +107,13 @@ def test_a_slope_without_a_gait_is_said_in_words_first():
     assert "simulate and contact-sim" in first.text
 
 
-def test_what_was_never_wanted_is_no_failure():
+def test_stage_that_was_not_requested_is_not_a_failure():
     absent = [LeftOut("contact-sim", "the config has no contact block")]
     said = blocks(sections(["simulate"], absent=absent)["verdict"], Paragraph)
     assert [one.tone for one in said] == ["plain"]
 
 
-def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
+def test_verdict_opens_with_results_failures_and_conclusions():
     def opening(**changed):
         return plain(sections(**changed)["verdict"].blocks[0].text)
 
@@ -134,7 +134,7 @@ def test_the_page_opens_with_what_holds_what_fails_and_what_follows():
     )
 
 
-def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_what_cost():
+def test_title_and_verdict_of_a_driven_walker_name_its_drive_and_cost():
     driven = ("slope_deg=0", "push_off.impulse_N_s=4", "walker.hip.spring_N_m_per_rad=10")
     by = "driven by a push-off of 4 N s, with a hip spring of 10 N m/rad"
     gait = stored("fixedpoint", {}, {**fixedpoint().summary, "cost_of_transport": 0.00998})
@@ -148,7 +148,7 @@ def test_of_a_driven_walker_title_lead_and_verdict_say_what_drives_it_and_at_wha
     assert "driven" not in plain(sections()["verdict"].blocks[0].text)
 
 
-def test_a_spring_alone_does_not_drive_a_walker():
+def test_spring_alone_is_not_a_drive():
     sprung = ("walker.hip.spring_N_m_per_rad=10",)
     said = plain(lead(config(*sprung), "paper"))
     assert "with a hip spring of 10 N m/rad" in said
@@ -156,26 +156,26 @@ def test_a_spring_alone_does_not_drive_a_walker():
     assert "driven" not in plain(sections(sets=sprung)["verdict"].blocks[0].text)
 
 
-def test_work_that_is_rounding_is_not_told():
+def test_work_at_rounding_level_is_not_mentioned():
     record = {"work_per_step_J": {"gravity": -2e-14, "push_off": 1.69, "hip": 0.0}}
     told = [column.title for column in works(str) if column.value(record) is not None]
     assert told == ["work of the push-off per step (J)"]
 
 
-def test_figures_of_the_paper_that_are_not_drawn_are_explained():
+def test_missing_figures_of_the_paper_are_explained():
     figure = Picture("Figure 2. Sticks.", "As walked.", "Legs.")
     made = {name: make() for name, make in EVERYTHING.items()}
     (said,) = blocks(motion.figures(Results(config(), made, (figure,))), Paragraph)
     assert "Figures 1, 3 and 4 show no results" in said.text
 
 
-def test_the_papers_third_table_says_whose_periods_it_has_and_over_which_time_it_takes_means():
+def test_table_3_states_the_origin_of_periods_and_means():
     (_, third) = blocks(sections()["tables"], Table)
     for part in ("last completed stride", "begins with the left step", "last five"):
         assert part in third.note
 
 
-def test_all_that_is_missing_is_listed_with_its_reason():
+def test_omissions_are_listed_with_their_reasons():
     walk = simulate(left_out=[{"what": "forces", "why": "not among the outputs", "saves": "2 numbers"}])
     found = sections([], absent=WITHOUT_GAIT, failed=["fixedpoint"], simulate=walk)["left-out"]
     assert rows(found) == {
@@ -185,7 +185,7 @@ def test_all_that_is_missing_is_listed_with_its_reason():
     }
 
 
-def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
+def test_shared_reason_is_given_once_above_its_consequences():
     why = "the config has no contact block"
     absent = [LeftOut(name, why, saves="contact code") for name in ("contact-sim", "compare")]
     absent.append(LeftOut("figure 6", f"it needs contact-sim: {why}"))
@@ -196,11 +196,11 @@ def test_a_reason_of_several_is_given_once_and_what_follows_from_it_below():
     }
 
 
-def test_nothing_missing_is_said_too():
+def test_complete_page_says_that_nothing_is_missing():
     assert "Every result of the pipeline is available" in texts(sections()["left-out"])
 
 
-def test_a_walker_that_fell_says_so_before_one_that_walked():
+def test_fall_is_mentioned_before_a_completed_walk():
     (walks, *_) = blocks(
         sections(**{"contact-sim": contact_sim("fell", 3, hip=0.4999, damping_ratio=0.03)})["verdict"], Statements
     )
@@ -222,13 +222,13 @@ def test_a_walker_that_fell_says_so_before_one_that_walked():
         ("rejected", {"step_periods_s": [], "step_lengths_m": [], "slips_m": []}, "2 of 4 steps"),
     ],
 )
-def test_every_end_of_a_walk_is_told_with_its_numbers(outcome, changed, said):
+def test_every_outcome_of_a_walk_is_described_with_its_values(outcome, changed, said):
     walk = contact_sim(outcome, 2, **changed)
     (walks, *_) = blocks(sections(["simulate"], **{"contact-sim": walk})["verdict"], Statements)
     assert said in plain(walks.items[0].text)
 
 
-def test_the_papers_numbers_are_counted_by_verdict():
+def test_printed_values_are_counted_by_verdict():
     printed = sections()["printed"]
     (shares,) = blocks(printed, Shares)
     assert printed.finding == f"Of 4 values that the paper prints, {SHARES}."
@@ -236,24 +236,24 @@ def test_the_papers_numbers_are_counted_by_verdict():
     assert sum(count for _, count, _ in shares.parts) == len(PAPER_ROWS)
 
 
-def test_the_verdict_says_which_numbers_fared_how():
+def test_verdict_lists_printed_values_by_result():
     said = {finding.about: finding.text for finding in blocks(sections()["printed"], Statements)[0].items}
     assert list(said) == ["Reproduced:", "Explained:", "Contradicted:"]
     assert said["Contradicted:"] == "Table 3 (all 2)."
 
 
-def test_the_verdict_names_the_gravest_errors_with_what_was_measured():
+def test_verdict_names_the_most_serious_errors_with_measurements():
     (error,) = blocks(sections()["printed"], Statements)[-1].items
     assert "A.5 row 2" in error.about
     assert "energy drifts by 0.13 J" in error.text
 
 
-def test_every_headline_is_of_an_erratum_that_is_looked_for():
+def test_every_headline_belongs_to_an_erratum():
     errata = Path(find_spec("walkerlab.evidence.paper.prose").submodule_search_locations[0]) / "errata.j2"
     assert [start for start in words.terms("verdict.headlines") if f"where: {start}" not in errata.read_text()] == []
 
 
-def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_on_a_page_of_its_own():
+def test_other_scenes_have_the_paper_on_a_separate_page():
     other = stored("compare", compare().groups, {**compare().summary, "departures": ["slope_rad 0.05"]})
     found = sections(compare=other)
     assert "printed" not in found
@@ -263,21 +263,21 @@ def test_a_scene_that_is_not_the_papers_has_its_own_results_first_and_the_paper_
     assert "slope_rad 0.05" in said.text
 
 
-def test_the_papers_tables_stand_beside_ours_without_empty_columns():
+def test_tables_of_the_paper_are_shown_with_ours_without_empty_columns():
     first, third = blocks(sections()["tables"], Table)
     assert [column.title for column in first.columns] == ["symbol", "quantity", "paper", "used here", "where"]
     assert [column.title for column in third.columns] == ["quantity", "paper, MATLAB", "corrected"]
     assert next(iter(third.groups.values()))[0][0].text == "left step period, t_left (s)"
 
 
-def test_the_difference_of_the_models_is_given_in_every_way_it_was_taken():
+def test_difference_of_the_models_is_given_in_every_measure():
     assert rows(sections()["models"]) == {
         "at the same time": ["0.11", "0.11"],
         "at the same phase of each step": ["0.017", "0.017"],
     }
 
 
-def test_every_number_of_the_paper_is_listed_under_where_it_stands():
+def test_every_printed_value_is_listed_by_its_place_in_the_paper():
     (table,) = blocks(sections()["paper-numbers"], Table)
     assert [(title, len(rows)) for title, rows in table.groups.items()] == [
         ("eq. 11", 1),
@@ -286,7 +286,7 @@ def test_every_number_of_the_paper_is_listed_under_where_it_stands():
     ]
 
 
-def test_a_model_without_any_number_has_no_column():
+def test_model_without_values_has_no_column():
     rows_without = [paper_row("eq. 11", "x", "1", "reproduced", "", corrected=1.0)]
     (table,) = blocks(sections([], compare=compare(rows_without))["paper-numbers"], Table)
     heads = [column.title for column in table.columns]
@@ -294,18 +294,18 @@ def test_a_model_without_any_number_has_no_column():
     assert "contact model" not in heads
 
 
-def test_errata_stand_with_what_was_measured():
+def test_errata_are_shown_with_measurements():
     assert rows(sections()["errata"])["A.5 row 2"][-1] == "energy drifts by 0.13 J"
 
 
-def test_both_sets_of_equations_stand_side_by_side():
+def test_both_sets_of_equations_are_shown_side_by_side():
     found = rows(sections()["gait"])
     assert found["stable"] == ["no", "yes"]
     assert found["step period T (s)"] == ["0.700000"] * 2
     assert found["multipliers λ₁"] == ["0.3626 + 0.4603i"] * 2
 
 
-def test_the_coordinates_of_any_walker_have_their_signs():
+def test_coordinates_of_any_walker_have_symbols():
     names = ("theta_1", "theta_1_shank", "theta_torso", "dtheta_1_shank", "q_7")
     assert [coordinate(name) for name in names] == [
         "θ₁, swing leg (rad)",
@@ -316,7 +316,7 @@ def test_the_coordinates_of_any_walker_have_their_signs():
     ]
 
 
-def test_a_set_of_equations_without_a_gait_is_left_away():
+def test_equations_without_a_gait_are_omitted():
     summary = dict(fixedpoint().summary)
     summary["equation_sets"] = {"corrected": summary["equation_sets"]["corrected"], "as-printed": {"gaits_found": 0}}
     (table,) = blocks(sections([], fixedpoint=stored("fixedpoint", {}, summary))["gait"], Table)
@@ -332,13 +332,13 @@ def test_assumptions_are_judged():
     assert [row[-1] for row in bad.values()] == [fails, fails, "does not hold (ignored)", fails]
 
 
-def test_steps_of_both_models_stand_side_by_side_with_dashes_behind_the_shorter():
+def test_steps_of_both_models_are_shown_side_by_side():
     found = rows(sections(**{"contact-sim": contact_sim("fell", 2)})["steps"])
     assert found["2"] == ["0.7000", "0.7000", "0.3700", "0.3700", "0.9300"]
     assert found["4"] == ["0.7000", "–", "0.3700", "–", "–"]
 
 
-def test_steps_have_the_digits_that_the_numerical_error_leaves_and_a_sentence_says_it():
+def test_steps_are_printed_to_the_numerical_error():
     error = {"step_period_s": 4e-6, "step_length_m": 4e-4, "end_time_s": 1e-5}
     section = sections(simulate=simulate(numerical_error=error), **{"contact-sim": contact_sim()})["steps"]
     assert rows(section)["2"][:4] == ["0.70000", "0.7000", "0.370", "0.3700"]
@@ -348,20 +348,20 @@ def test_steps_have_the_digits_that_the_numerical_error_leaves_and_a_sentence_sa
     assert not [block for block in sections()["steps"].blocks if isinstance(block, Paragraph)]
 
 
-def test_of_a_very_long_walk_the_first_and_last_steps_are_listed():
+def test_first_and_last_steps_of_a_long_walk_are_listed():
     found = rows(sections(["x"], simulate=stored("simulate", {}, simulate(steps=2000).summary))["steps"])
     assert 10 < len(found) < 40
     assert {"1", "2000"} <= found.keys()
 
 
-def test_the_contact_walk_has_its_numbers():
+def test_contact_walk_values_are_listed():
     found = rows(sections()["contact"])
     assert found["static penetration"][0] == "58.8 µm"
     assert found["damping ratio"][0] == "3.71"
     assert found["energy balance error"][0] == "7 × 10⁻⁹ J"
 
 
-def test_the_config_can_be_run_again_from_the_page(tmp_path):
+def test_page_states_the_config_to_rerun(tmp_path):
     asked = ("slope_deg=3", "contact.stiffness=1e6")
     code = blocks(sections(sets=asked)["provenance"], Code)[0].text
     file = tmp_path / "again.yaml"
@@ -369,7 +369,7 @@ def test_the_config_can_be_run_again_from_the_page(tmp_path):
     assert config(file=file) == config(*asked)
 
 
-def test_provenance_names_key_digest_commit_and_command_of_each_result():
+def test_provenance_lists_key_digest_commit_and_command_of_each_result():
     made = simulate()
     said = texts(sections([], simulate=made)["provenance"])
     for part in (made.identity.key, made.digest(), "0123456789abcdef", "walkerlab report", "1.25"):
@@ -382,7 +382,7 @@ def channels(walker):
     return dict(zip(walker.track.channels, floats.astype(float), strict=True))
 
 
-def test_stick_figures_stand_where_the_walker_stood():
+def test_stick_figures_are_at_the_positions_of_the_walker():
     (player,) = sections(["simulate"])["motion"].blocks
     assert isinstance(player, Player)
     found = channels(player.walkers[0])
@@ -397,7 +397,7 @@ def test_stick_figures_stand_where_the_walker_stood():
     assert (found["fx1"][0], found["fy1"][0]) == pytest.approx((0.0, 0.0), abs=1e-6)
 
 
-def test_stills_hold_the_whole_walk():
+def test_stills_cover_the_whole_walk():
     (player,) = sections()["motion"].blocks
     left, top, width, height = player.view
     points = np.array([joint for walker in player.walkers for still in walker.stills for joint in still])
@@ -422,7 +422,7 @@ def test_thinning_keeps_jumps_and_the_largest_force():
     assert (thin["a0"][before], thin["a0"][after]) == (1.0, -1.0)
 
 
-def test_slip_counts_from_the_touch_and_is_nothing_in_the_air():
+def test_slip_is_counted_from_touch_and_zero_in_the_air():
     time = np.linspace(0.0, 4.0, 4001)
     touching = (time < 1.0) | (time > 3.0)
     slip = slip_since_touch(time, np.full(time.size, 0.5), touching)
@@ -431,18 +431,18 @@ def test_slip_counts_from_the_touch_and_is_nothing_in_the_air():
     assert slip[500] == pytest.approx(0.25, abs=1e-3)
 
 
-def test_a_walk_without_stored_states_has_no_picture():
+def test_walk_without_stored_states_has_no_picture():
     walk = simulate()
     assert "motion" not in sections([], simulate=stored("simulate", {}, walk.summary))
 
 
-def test_a_section_is_one_function_and_one_entry():
+def test_section_needs_one_function_and_one_registry_entry():
     extra = Section("accuracy", "Accuracy", (Paragraph("Measured."),))
     assert extra in sections_of(Results(config()), (*SECTIONS, lambda results: extra))
     assert extra not in sections_of(Results(config()), (*SECTIONS, lambda results: None))
 
 
-def test_the_report_loads_no_plotting_and_no_compiler():
+def test_report_imports_no_plotting_or_compiler():
     heavy = (
         "matplotlib",
         "numba",
@@ -456,13 +456,13 @@ def test_the_report_loads_no_plotting_and_no_compiler():
     assert done.stdout.strip() == "[]"
 
 
-def test_the_paragraph_under_the_title_names_config_change_slope_and_equations():
+def test_lead_names_config_change_slope_and_equations():
     said = plain(lead(config("slope_deg=3", "equations=as-printed"), "paper@slope_deg=3"))
     for part in ("Config paper", "changed by slope_deg=3", "0.05236 rad (3°)", "as the paper prints them", "2 strides"):
         assert part in said
 
 
-def test_the_paragraph_under_the_title_lists_what_a_walker_has():
+def test_lead_lists_the_features_of_the_walker():
     torso = {"mass_kg": 0.5, "above_hip_m": 0.2}
     kneed, compass = (load(Path(name)).config for name in ("kneed", "torso"))
     said = plain(lead(load(Path("kneed"), [f"walker.torso={torso}"]).config, "kneed"))
@@ -474,7 +474,7 @@ def test_the_paragraph_under_the_title_lists_what_a_walker_has():
     assert "torso" not in lead(kneed, "kneed")
 
 
-def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
+def test_gaits_have_no_heading_with_one_set_of_equations():
     gait = gait_summary() | {"chosen": True, "objection": ""}
     every = {name: [gait, gait | {"chosen": False, "objection": "it scuffs"}] for name in SETS}
     heads = [
@@ -487,12 +487,12 @@ def test_gaits_have_no_heading_where_there_is_one_set_of_equations():
     ]
 
 
-def test_where_no_ground_is_described_the_friction_it_takes_is_told_once():
+def test_required_friction_is_stated_once_without_contact():
     walk = simulate()
     walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
     made = assumptions(Results(config("contact=null"), {"simulate": walk}))
     assert "The stance foot does not slip: needs friction, 0.203" in made.finding
 
 
-def test_the_page_names_the_law_of_friction_that_walked():
+def test_page_names_the_friction_law():
     assert "there is creeping friction of its own kind." in texts(sections()["contact"])

@@ -34,7 +34,7 @@ def run(folder, *sets, inputs=None, left_out=()):
     return report.run(config(*sets), made, Silent(), folder, left_out)
 
 
-def test_the_page_is_written_and_indexed(tmp_path):
+def test_page_is_written_and_indexed(tmp_path):
     content = run(tmp_path)
     assert content.summary["html"] == "report.html"
     pages = sorted(tmp_path.iterdir())
@@ -43,7 +43,7 @@ def test_the_page_is_written_and_indexed(tmp_path):
     assert broken_file(tmp_path, content) is None
 
 
-def test_the_summary_lists_figures_and_tables_as_they_stand_on_the_page(tmp_path):
+def test_summary_lists_figures_and_tables_in_page_order(tmp_path):
     inputs = {name: make() for name, make in EVERYTHING.items()} | {"plot": plot(tmp_path)}
     content = run(tmp_path, inputs=inputs)
     pages = [Page((tmp_path / file).read_text()) for file in content.summary["pages"]]
@@ -52,7 +52,7 @@ def test_the_summary_lists_figures_and_tables_as_they_stand_on_the_page(tmp_path
     assert "Figure 7. Legs." in pages[0].said("b")
 
 
-def test_drawn_figures_are_embedded_and_nothing_in_them_can_run_or_fetch(tmp_path):
+def test_embedded_figures_contain_no_scripts_or_links(tmp_path):
     run(tmp_path, inputs={"plot": plot(tmp_path)})
     html = (tmp_path / "report.html").read_text()
     (drawn,) = [attrs for attrs in Page(html).all("svg") if attrs.get("viewbox") == "0 0 518.4 396"]
@@ -62,14 +62,14 @@ def test_drawn_figures_are_embedded_and_nothing_in_them_can_run_or_fetch(tmp_pat
         assert part not in html
 
 
-def test_figures_have_the_papers_numbers_only_where_the_scene_is_the_papers(tmp_path):
+def test_figures_have_numbers_of_the_paper_only_for_its_scene(tmp_path):
     departs = stored("compare", {}, {**EVERYTHING["compare"]().summary, "departures": ["slope_rad 0.05"]})
     inputs = {"compare": EVERYTHING["compare"](), "plot": plot(tmp_path)}
     assert run(tmp_path, inputs=inputs).summary["figures"] == ["Figure 7. Legs."]
     assert run(tmp_path, inputs=inputs | {"compare": departs}).summary["figures"] == ["Legs."]
 
 
-def test_the_report_of_another_scene_only_links_the_paper(tmp_path):
+def test_report_of_another_scene_only_links_the_paper(tmp_path):
     departs = stored("compare", {}, {**EVERYTHING["compare"]().summary, "departures": ["slope_rad 0.05"]})
     inputs = {"fixedpoint": EVERYTHING["fixedpoint"](), "compare": departs, "plot": plot(tmp_path)}
     run(tmp_path, "source=null", inputs=inputs)
@@ -81,7 +81,7 @@ def test_the_report_of_another_scene_only_links_the_paper(tmp_path):
     assert {"href": "report-paper.html"} in page.all("a")
 
 
-def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
+def test_page_lists_what_is_still_being_computed(tmp_path):
     left_out = [LeftOut("compare", STILL_COMPUTED), LeftOut("accuracy", STILL_COMPUTED)]
     left_out.append(LeftOut("tune", "the config has no contact block"))
     write_pages(config(), {"simulate": EVERYTHING["simulate"]()}, tmp_path, left_out)
@@ -92,12 +92,12 @@ def test_what_is_still_being_computed_stands_in_the_page(tmp_path):
     assert [attrs for attrs in page.all("figure") if "data-player" in attrs]
 
 
-def test_a_drawing_made_early_says_what_it_waits_for(tmp_path):
+def test_early_drawing_says_what_it_waits_for(tmp_path):
     run(tmp_path, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("compare", STILL_COMPUTED)])
     assert "when this page was written: compare." in Page((tmp_path / "report.html").read_text()).text
 
 
-def test_an_early_page_stays_true_when_its_command_is_stopped(tmp_path):
+def test_early_page_stays_correct_if_its_command_is_interrupted(tmp_path):
     folder = tmp_path / "stopped"
     folder.mkdir()
     run(folder, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("plot", STILL_COMPUTED)])
@@ -107,7 +107,7 @@ def test_an_early_page_stays_true_when_its_command_is_stopped(tmp_path):
     assert "<code>walkerlab status -c stopped</code> shows what runs" in html
 
 
-def test_a_page_says_that_its_command_was_stopped(tmp_path):
+def test_page_says_that_its_command_was_interrupted(tmp_path):
     folder = tmp_path / "stopped"
     folder.mkdir()
     run(folder, inputs={"simulate": EVERYTHING["simulate"]()}, left_out=[LeftOut("plot", STOPPED)])
@@ -117,7 +117,7 @@ def test_a_page_says_that_its_command_was_stopped(tmp_path):
     assert "Not computed yet when" not in html
 
 
-def test_a_page_that_there_is_nothing_for_any_more_is_removed(tmp_path):
+def test_outdated_extra_page_is_removed(tmp_path):
     run(tmp_path)
     assert (tmp_path / "report-paper.html").exists()
     run(tmp_path, inputs={"simulate": EVERYTHING["simulate"]()})
@@ -134,7 +134,7 @@ def test_a_page_that_there_is_nothing_for_any_more_is_removed(tmp_path):
         ),
     ],
 )
-def test_the_page_names_and_links_the_study_that_is_redone(tmp_path, sets, said):
+def test_page_names_and_links_the_reproduced_study(tmp_path, sets, said):
     run(tmp_path, *sets)
     page = Page((tmp_path / "report.html").read_text())
     assert said in page.text
@@ -143,17 +143,17 @@ def test_the_page_names_and_links_the_study_that_is_redone(tmp_path, sets, said)
         assert {"href": "https://a.example/b", "rel": "noreferrer"} in page.all("a")
 
 
-def test_the_same_results_give_the_same_file(tmp_path):
+def test_equal_results_give_equal_files(tmp_path):
     inputs = {name: make() for name, make in EVERYTHING.items()} | {"plot": plot(tmp_path)}
     first = (run(tmp_path, inputs=inputs).digest(), (tmp_path / "report.html").read_bytes())
     assert (run(tmp_path, inputs=inputs).digest(), (tmp_path / "report.html").read_bytes()) == first
 
 
-def test_the_page_shows_the_whole_config_so_the_stage_reads_all_of_it():
+def test_report_stage_reads_the_whole_config():
     assert set(PIPELINE["report"].reads) == set(Config.model_fields)
 
 
-def test_a_slope_without_a_gait_has_a_page_that_says_so_first(tmp_path):
+def test_page_of_a_slope_without_a_gait_says_so_first(tmp_path):
     why = "no gait at a slope of 0.2 rad"
     left_out = [
         LeftOut("fixedpoint", why),
@@ -165,7 +165,7 @@ def test_a_slope_without_a_gait_has_a_page_that_says_so_first(tmp_path):
     assert content.summary["figures"] == []
 
 
-def test_stages_that_need_contact_do_not_fail_without_it(tmp_path):
+def test_drawing_stages_do_not_fail_without_contact(tmp_path):
     left_out = [
         LeftOut("contact-sim", "the config has no contact block"),
         LeftOut("compare", "the config has no contact block"),
@@ -174,13 +174,13 @@ def test_stages_that_need_contact_do_not_fail_without_it(tmp_path):
     assert "has no answer" not in (tmp_path / "report.html").read_text()
 
 
-def test_a_page_that_cannot_be_stored_is_told_and_leaves_the_old_one(tmp_path):
+def test_page_that_cannot_be_stored_leaves_the_old_one(tmp_path):
     (tmp_path / "report.html").mkdir()
     with pytest.raises(StorageError):
         run(tmp_path)
 
 
-def test_drawings_too_large_together_are_embedded_as_pixels_largest_first(tmp_path):
+def test_largest_drawings_become_pixel_images_if_the_page_is_too_large(tmp_path):
     drawings = []
     for name, size in (("a", 100), ("b", 900), ("c", 300)):
         svg, png = tmp_path / f"{name}.svg", tmp_path / f"{name}.png"

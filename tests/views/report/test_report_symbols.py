@@ -15,12 +15,12 @@ from walkerlab.views.report.symbols import in_signs
         ("N/mm^e, m/s^2, 10^-4, 1.1e-09 J", "N/mmᵉ, m/s², 10⁻⁴, 1.1 × 10⁻⁹ J"),
     ],
 )
-def test_formulas(plain, signs):
+def test_formulas_are_shown_with_symbols(plain, signs):
     assert in_signs(plain) == signs
 
 
 @pytest.mark.parametrize(
     "text", ["eq. 9-2", "as-printed", "A.5 row 2, A.29", "t_left, v_com", "--set a.b=1", "less than 1%", "k-1e8-linear"]
 )
-def test_prose(text):
+def test_prose_is_left_unchanged(text):
     assert in_signs(text) == text

@@ -21,32 +21,32 @@ def cells(text):
     return [line.removesuffix(END) for line in lines[lines.index(r"\midrule") + 1 : lines.index(r"\bottomrule")]]
 
 
-def test_decimals_stand_under_one_another_with_one_number_of_digits():
+def test_decimals_are_aligned_with_equal_digits():
     text = tex_of(0.7, 0.70638, -1.25)
     assert r"\begin{tabular}{S[table-format=-1.4]}" in text
     assert cells(text) == ["0.7000", "0.7064", "-1.2500"]
     assert cells(tex_of(3, 12)) == ["3", "12"]
 
 
-def test_numbers_that_differ_much_keep_as_many_digits_each():
+def test_numbers_of_different_magnitude_keep_their_significant_digits():
     text = tex_of(1e5, 0.5, 2e-9, 0.0)
     assert r"\begin{tabular}{S[table-format=1.5e-1]}" in text
     assert cells(text) == ["1.0000e5", "0.50000", "2.0000e-9", "0"]
 
 
-def test_packages_and_caption_come_first_and_a_head_of_numbers_is_no_number():
+def test_latex_table_starts_with_packages_and_caption():
     begin = ["% \\usepackage{booktabs, graphicx, siunitx}", WITHOUT_GRAPHICX]
     text = tex_of(0.5)
     assert text.splitlines()[:5] == [*begin, r"\begin{table}", r"\centering", r"\caption{Periods.}"]
     assert "{period} \\\\\n{(s)} \\\\\n\\midrule" in text
 
 
-def test_what_is_no_number_is_kept_from_the_columns_layout():
+def test_texts_in_number_columns_are_braced():
     assert cells(tex_of(0.5, None, "walked")) == ["0.50000", "{--}", "{walked}"]
     assert r"\begin{tabular}{l}" in tex_of("walked", "fell")
 
 
-def test_the_papers_tables_have_its_digits_its_words_and_a_caption():
+def test_tables_of_the_paper_have_its_digits_words_and_a_caption():
     row = {"unit": "s", "paper_matlab": 0.6, "paper_matlab_text": "0.60", "corrected": 0.7036, "contact": 0.7111}
     text = as_tex(table_of("table3", {"t_left": row})).decode()
     assert r"\caption{Table 3: characteristics of the walk, in the paper and here." in text
@@ -70,14 +70,14 @@ def test_tables_compile_and_stay_within_the_text_block(options, tmp_path):
     assert compile_tables(texts, options, tmp_path) == []
 
 
-def test_a_table_of_two_columns_is_a_float_across_both():
+def test_two_column_table_spans_both_columns():
     for columns, kind in ((1, "table"), (2, "table*")):
         text = as_tex(SMALL_TABLE, columns).decode()
         assert text.splitlines()[2] == rf"\begin{{{kind}}}"
         assert text.endswith(f"\\end{{{kind}}}\n")
 
 
-def test_units_have_a_row_of_their_own_under_heads_of_several_lines():
+def test_units_have_a_separate_row_under_multiline_headers():
     columns = [Column("walk"), Column("length of the longest step (m)", numeric=True), Column("steps", numeric=True)]
     text = as_tex(table("Walks", columns, [["rigid", 0.3714, 10]])).decode()
     head = text[text.index(r"\toprule") : text.index(r"\midrule")].splitlines()[1:]
@@ -87,9 +87,9 @@ def test_units_have_a_row_of_their_own_under_heads_of_several_lines():
     ]  # fmt: skip
 
 
-def test_superscripts_that_follow_one_another_are_one():
+def test_adjacent_superscripts_are_merged():
     assert in_tex("10⁻¹² m, x₁², 2^-3") == "10$^{-12}$ m, x$_{1}^{2}$, 2$^{-3}$"
 
 
-def test_what_a_record_has_no_value_for_is_empty_in_a_file():
+def test_missing_values_are_empty_in_a_file():
     assert as_csv(record_table([{"a": None, "b": 1.5}, {"a": "x", "b": 2.5}])) == b"a,b\n,1.5\nx,2.5\n"

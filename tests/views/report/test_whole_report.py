@@ -70,7 +70,7 @@ def test_every_stage_ran_and_the_page_is_there(run):
     assert not {"None", "nan", "inf"} & set(page.text.split())
 
 
-def test_every_table_of_the_pages_is_exported_by_its_caption(run, tmp_path, monkeypatch):
+def test_every_table_can_be_exported_by_its_caption(run, tmp_path, monkeypatch):
     _, folder, report = run
     # each export makes all pages again, from the same results
     monkeypatch.setattr(exports, "page_tables", functools.cache(page_tables))
@@ -89,7 +89,7 @@ def test_every_table_of_the_pages_is_exported_by_its_caption(run, tmp_path, monk
     assert "the-contact-models-walk" in refused.value.advice
 
 
-def test_a_number_in_an_exported_table_is_in_the_unit_of_its_head(run):
+def test_exported_values_are_in_the_unit_of_their_header(run):
     tables = page_tables(run[1])
     cells = [cell for table in tables.values() for rows in table.groups.values() for row in rows for cell in row]
     numbers = [cell for cell in cells if isinstance(cell.datum, float) and cell.text.isascii()]
@@ -108,7 +108,7 @@ ON_DEMAND = (
 )  # sections of stages that only their own commands run
 
 
-def test_what_only_its_own_command_makes_is_no_part_of_a_report(results):
+def test_report_excludes_stages_that_only_their_command_runs(results):
     makers = [make for make in SECTIONS if make.__module__.endswith(ON_DEMAND)]
     assert len(makers) == len(ON_DEMAND)
     assert [make(results) for make in makers] == [None] * len(ON_DEMAND)
@@ -123,20 +123,20 @@ OF_EVERY_REPORT = [
 @pytest.mark.parametrize(
     "make", OF_EVERY_REPORT, ids=lambda make: f"{make.__module__.rpartition('.')[2]}.{make.__name__}"
 )
-def test_a_section_has_something_to_show_of_real_results(results, run, make):
+def test_sections_of_real_results_are_not_empty(results, run, make):
     section = make(results)
     assert section is not None
     assert section.blocks
 
 
 @pytest.mark.parametrize("stage", made.EVERYTHING)
-def test_results_made_by_hand_have_no_key_that_real_ones_lack(results, stage):
+def test_synthetic_results_have_only_keys_of_real_ones(results, stage):
     by_hand, real = made.EVERYTHING[stage](), results.stored[stage]
     assert set(by_hand.summary) <= set(real.summary)
     for name, group in by_hand.groups.items():
         assert set(group.variables) <= set(real.groups[name].variables)
 
 
-def test_every_table_of_the_page_fits_the_text_block_of_an_article(run, tmp_path):
+def test_every_table_fits_the_text_block_of_an_article(run, tmp_path):
     texts = [as_tex(content).decode() for content in page_tables(run[1]).values()]
     assert compile_tables(texts, "twocolumn", tmp_path) == []
