@@ -120,7 +120,8 @@ _MEASURED: Final = "the measured error against run time"
 
 
 def method(default: Method) -> Any:
-    return key(default, "", "integration method", _MEASURED)
+    bounds = "dop853, radau5, or a method of SciPy or CVODE to check them (docs/numerics.md)"
+    return key(default, "", "integration method", _MEASURED, bounds=bounds)
 
 
 def relative(default: float) -> Any:
