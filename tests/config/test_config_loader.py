@@ -304,7 +304,7 @@ def test_resolving_a_start_twice_changes_nothing(loaded: Loaded) -> None:
         ("equations: as_printed\n", r"; did you mean as-printed\? Allowed: one of corrected, as-printed"),
         (
             "solver: {rigid: {method: dop835}}\n",
-            r"; did you mean dop853\? Allowed: one of dop853, radau5, scipy-rk45",
+            r"; did you mean dop853\? Allowed: one of dop853, radau5, or a method of SciPy",
         ),
         ("solver: {contact: {method: radau}}\n", r"did you mean (radau5|scipy-radau)\?"),
         ("contact: {pad_pitch: -1}\n", r"-1 is out of bounds; allowed: rigid, own, or 1e-6 to 1e4 \(m\)"),
