@@ -54,7 +54,7 @@ from walkerlab.physics.orbits.rigid_map import state_on_section
 from walkerlab.physics.orbits.small_slope import seeds
 from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages.continuation import FamilyQuestion, search_of
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene.contact import contact_scene, start_state

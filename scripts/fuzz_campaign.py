@@ -31,7 +31,7 @@ from hypothesis import strategies as st
 from walkerlab.config.files import BUILTIN_FOLDER
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.errors import WalkerlabError
-from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.runfolder import RunFolder
 

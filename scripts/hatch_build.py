@@ -42,10 +42,12 @@ class PackageHook(BuildHookInterface[Any]):
         """Compile all kernels of the built-in walkers; what $WALKERLAB_CACHE has is taken from there."""
         code = Path(self.folder.name, "machine_code")
         environment = {"WALKERLAB_CACHE": str(Path(self.folder.name, "cache")), "OMP_NUM_THREADS": "1", **os.environ}
-        command = [sys.executable, "-c", f"from walkerlab.pipeline.compile_ahead import build; build({str(code)!r})"]
+        call = f"from walkerlab.pipeline.run.compile_ahead import build; build({str(code)!r})"
         # an isolated build has its requirements on this path
         path = os.pathsep.join(filter(None, (self.root, os.environ.get("PYTHONPATH"))))
-        done = subprocess.run(command, cwd=self.root, env=environment | {"PYTHONPATH": path}, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", call], cwd=self.root, env=environment | {"PYTHONPATH": path}, text=True
+        )
         if done.returncode:
             raise SystemExit("walkerlab's kernels do not compile here; WALKERLAB_BUILD_KERNELS=0 builds without them.")
         if code.is_dir():

@@ -21,7 +21,7 @@ from statistics import median
 from walkerlab.config import loader
 from walkerlab.config.schema import Config
 from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.artifact import write
 from walkerlab.pipeline.store.key import Identity
@@ -119,7 +119,7 @@ def outputs(*names: str) -> str:
 def reductions() -> list[Reduction]:
     """Every reduction there is, and one that there is not."""
     whole, none = contact(), contact(outputs())
-    import_stage = "import walkerlab.{}, walkerlab.pipeline.runner"
+    import_stage = "import walkerlab.{}, walkerlab.pipeline.run.runner"
     walking, drawing = import_stage.format("pipeline.stages.simulate"), import_stage.format("views.figures.stage")
     return [
         Reduction(

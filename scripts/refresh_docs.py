@@ -37,8 +37,8 @@ from walkerlab.config.fields import block_of
 from walkerlab.config.loader import load
 from walkerlab.config.reference import KeyReference, keys
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store.runfolder import RunFolder
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from walkerlab.config.reads import RigidConfig
-from walkerlab.pipeline.stage import Graph, Stage
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.store.content import Content
 
 HERE = Path(__file__)

@@ -9,7 +9,7 @@ import os
 import pytest
 from hypothesis import settings
 
-from walkerlab.pipeline.workers import ONE_THREAD
+from walkerlab.pipeline.run.workers import ONE_THREAD
 
 # As the command line does, before anything imports NumPy: the last digits of library methods depend on it.
 for name in ONE_THREAD:

@@ -22,7 +22,7 @@ LIBRARIES = [
     "email.parser", "filelock", "h5py", "jinja2", "numba", "numpy", "pydantic.type_adapter", "ruamel.yaml",
     "scipy.integrate", "scipy.optimize", "typer",
 ]  # fmt: skip
-PACKAGES = ["views.cli", "config", "views.report", "pipeline.runner", "pipeline.store", "pipeline.sweeps"]
+PACKAGES = ["views.cli", "config", "views.report", "pipeline.run", "pipeline.plan", "pipeline.store", "pipeline.sweeps"]
 LONGEST_S = 120
 
 

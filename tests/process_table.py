@@ -24,7 +24,7 @@ def processes_below(parent):
 
 def workers_below(parent):
     """Those that are workers of the package."""
-    return [pid for pid in processes_below(parent) if "walkerlab.pipeline.workers" in command_of(pid)]
+    return [pid for pid in processes_below(parent) if "walkerlab.pipeline.run.workers" in command_of(pid)]
 
 
 def command_of(pid):

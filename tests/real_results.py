@@ -7,8 +7,8 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.physics.orbits import family_search, two_parameters
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.plan.results import MemoryResults
+from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store.content import Group, Variable
 
 SMALL = {

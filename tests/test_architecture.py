@@ -9,7 +9,7 @@ from pathlib import Path
 
 import walkerlab
 from walkerlab.physics.kernel_cache import KERNEL_HOMES
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 
 PACKAGE = Path(walkerlab.__file__).parent
 # each imports only those after it
@@ -25,6 +25,8 @@ LAYERS = (
     "views.prose",
     "pipeline.sweeps",
     "pipeline.stages",
+    "pipeline.run",
+    "pipeline.plan",
     "pipeline",
     "pipeline.store",
     "exchange",

@@ -23,8 +23,8 @@ import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.physics.ground.friction import friction_coefficient, missing_members
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.stage import Stage, results_of
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.stage import Stage, results_of
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures import illustration

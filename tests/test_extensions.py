@@ -14,7 +14,7 @@ import pytest
 import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.extensions import Extension, refuse_other_versions
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.sweeps.chunk import compute_point
 
 ROOT = Path(__file__).parent.parent
@@ -248,7 +248,7 @@ def extension(**adds):
     return f"import json\nfrom walkerlab.extensions import Extension\nEXTENSION = Extension(1, {listed})\n"
 
 
-STAGE = "from walkerlab.pipeline.stage import Stage\nfrom walkerlab.extensions import Extension\n"
+STAGE = "from walkerlab.pipeline.plan.stage import Stage\nfrom walkerlab.extensions import Extension\n"
 CLASHES = {
     "walkerlab and second 1.0 both add the friction coulomb": extension(friction="{'coulomb': 'json:dumps'}"),
     "second 1.0 and tanh-friction 1.0 both add the friction tanh": extension(friction="{'tanh': 'json:dumps'}"),

@@ -120,7 +120,7 @@ def test_unwritable_cache_is_reported_once_and_workers_share_a_substitute(copy, 
 
 IN_WORKERS = """
 from walkerlab.physics.kernel_cache import cache_root
-from walkerlab.pipeline.workers import in_order
+from walkerlab.pipeline.run.workers import in_order
 print(cache_root(), *in_order([cache_root] * 4, jobs=2))
 """
 IMPORT_ALL = """
@@ -369,7 +369,7 @@ os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"] = kernel_cache.bu
 import walkerlab.physics.orbits.trial_of_code as trial
 trial.twice(3.0)
 from walkerlab.physics.compiler import files_in_use
-from walkerlab.pipeline.compile_ahead import write_machine_code
+from walkerlab.pipeline.run.compile_ahead import write_machine_code
 write_machine_code(kernel_cache.BUILT, files_in_use)
 """
 USE = """

@@ -11,7 +11,7 @@ import pytest
 import walkerlab
 from walkerlab.code_digest import Sources
 from walkerlab.extensions import extensions
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 
 NUMBER = itertools.count()
 NO_CACHES = shutil.ignore_patterns("__pycache__")
@@ -113,7 +113,7 @@ WRITTEN = [
     stage.module for stage in PIPELINE.stages if (ROOT / stage.module.replace(".", "/")).with_suffix(".py").exists()
 ]
 DRAWINGS = [stage.module for stage in PIPELINE.stages if stage.draws]
-STARTS = ["walkerlab.pipeline.runner", "walkerlab.views.cli.stored", "walkerlab.physics.kernels", *WRITTEN]
+STARTS = ["walkerlab.pipeline.run.runner", "walkerlab.views.cli.stored", "walkerlab.physics.kernels", *WRITTEN]
 LIBRARIES = [
     "h5py", "jinja2", "matplotlib.figure", "multiprocessing.connection", "numba.extending", "numba.typed", "PIL.Image",
     "pydantic.main", "pydantic.functional_validators", "ruamel.yaml", "scipy.integrate", "scipy.optimize", "typer",

@@ -13,7 +13,7 @@ import worker_calls as calls
 from process_table import THERE, is_alive, workers_below
 
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.workers import Worker, WorkerDiedError, WorkerPool, WorkerTimeoutError, in_order
+from walkerlab.pipeline.run.workers import Worker, WorkerDiedError, WorkerPool, WorkerTimeoutError, in_order
 
 DEADLINE_S = 60.0
 
@@ -148,7 +148,7 @@ def test_pool_starts_no_more_workers_than_needed(pool):
 
 WAITS = """
 import worker_calls as calls
-from walkerlab.pipeline.workers import WorkerPool
+from walkerlab.pipeline.run.workers import WorkerPool
 with WorkerPool(2) as pool:
     pool.start_all()
     futures = [pool.start(calls.sleep) for _ in range(3)]
@@ -181,7 +181,7 @@ import sys
 print("the script runs")
 from functools import partial
 import worker_calls as calls
-from walkerlab.pipeline.workers import in_order
+from walkerlab.pipeline.run.workers import in_order
 print(list(in_order([partial(calls.square, n) for n in range(4)], 2)))
 """
 
@@ -207,7 +207,7 @@ def test_modules_beside_the_script_are_found_from_any_folder(tmp_path):
     (tmp_path / "beside.py").write_text("def answer():\n    return 42\n")
     script = tmp_path / "script.py"
     script.write_text(
-        "import beside\nfrom walkerlab.pipeline.workers import WorkerPool\n"
+        "import beside\nfrom walkerlab.pipeline.run.workers import WorkerPool\n"
         "with WorkerPool(1) as pool:\n    print(pool.start(beside.answer).result())\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}

@@ -7,7 +7,7 @@ import sys
 import time
 
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.workers import in_order, tell
+from walkerlab.pipeline.run.workers import in_order, tell
 
 
 def square(number):

@@ -28,18 +28,19 @@ from walkerlab.config.validation import align_start, validate_tree
 from walkerlab.config.walkers import CompassWalker, Kneed, Walker
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.extensions import check_names
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.extending_config import run_and_write
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.resolve import resolve
-from walkerlab.pipeline.results import MemoryResults
-from walkerlab.pipeline.runner import Options
-from walkerlab.pipeline.runs import config_of, headline_values, result_in, run_named
+from walkerlab.pipeline.headlines import headline_values
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.resolve import resolve
+from walkerlab.pipeline.plan.results import MemoryResults
+from walkerlab.pipeline.plan.survey import result_in
+from walkerlab.pipeline.run.executor import answer_in_memory
+from walkerlab.pipeline.run.runner import Options, run_and_write
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged, Identified
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import config_of, run_named
 from walkerlab.views.report.text import in_words
 
 if TYPE_CHECKING:

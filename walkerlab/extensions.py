@@ -50,7 +50,7 @@ class Extension:
     """A package's additions. Code is named as "module:name" and imported on first use."""
 
     interface: int  # the `INTERFACE` that it was written for
-    stages: Sequence[Any] = ()  # of type `pipeline.stage.Stage`
+    stages: Sequence[Any] = ()  # of type `pipeline.plan.stage.Stage`
     figures: str = ""  # a tuple of `views.figures.illustration.Illustration`
     sections: Mapping[str, Sequence[str]] = field(default_factory=dict)  # makers of sections, by `SLOTS` of the page
     answers: Mapping[str, str] = field(default_factory=dict)  # what a stage's command prints, by stage

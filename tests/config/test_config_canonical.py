@@ -21,8 +21,8 @@ from walkerlab.config.reads import ContactConfig, SceneConfig, SimulateConfig, S
 from walkerlab.config.robustness import Robustness
 from walkerlab.config.schema import Config, Contact
 from walkerlab.config.stability import Case
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.stage import Stage
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.stage import Stage
 
 CONFIG = Config(contact=Contact())
 

@@ -16,7 +16,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import SAMPLE, RecordedWalk
 from walkerlab.exchange.leg_angles import mend_angles
 from walkerlab.exchange.walk_in_steps import divide_into_steps
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, simulate
 from walkerlab.scene.rigid import rigid_walker

@@ -13,7 +13,7 @@ from walkerlab.exchange.rate_jumps import MOST_FOUND, sums_at_jumps
 from walkerlab.exchange.recording import TIME, Recording
 from walkerlab.exchange.walk_in_steps import divide_into_steps
 from walkerlab.physics.mechanics.rigid_model import feet_on_slope
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, simulate
 from walkerlab.scene.rigid import rigid_walker

@@ -10,9 +10,9 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.pipeline.executor import Executor
-from walkerlab.pipeline.results import FolderResults
-from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.plan.planner import Planner
+from walkerlab.pipeline.plan.results import FolderResults
+from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.store.runfolder import RunFolder
 
 HERE = Path(__file__).parent
@@ -41,7 +41,7 @@ class Toy:
     def plan(self, target, *sets, config=None, force=False):
         loaded, folder = self.loaded(*sets, config=config)
         stages = self.graph.needed_for(target, loaded)
-        return Executor(loaded, FolderResults(folder, self.graph), stages, force=force).plan()
+        return Planner(loaded, FolderResults(folder, self.graph), stages, force=force).plan()
 
     def preview(self, target, *sets, config=None, **options):
         loaded, folder = self.loaded(*sets, config=config)

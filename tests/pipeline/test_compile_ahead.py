@@ -16,9 +16,9 @@ import sys
 from pathlib import Path
 from walkerlab.config.loader import load
 from walkerlab.physics.compiler import files_in_use
-from walkerlab.pipeline.compile_ahead import PARTS
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.run.compile_ahead import PARTS
+from walkerlab.pipeline.run.executor import answer_in_memory
+from walkerlab.pipeline.plan.results import MemoryResults
 
 name, *sets = sys.argv[1:]
 config = load(Path(name), ("strides=1", *sets)).config

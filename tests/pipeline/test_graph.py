@@ -18,9 +18,9 @@ from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.reads import CompassCasesConfig, ContactConfig, SceneCasesConfig, dotted_keys, keys_of, only
 from walkerlab.config.schema import QUESTIONS, Config
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys, added_code
-from walkerlab.pipeline.stage import Graph, Stage, results_of
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.keys import Keys, added_code
+from walkerlab.pipeline.plan.stage import Stage, results_of
 from walkerlab.pipeline.store.key import differences
 
 NAMES = [stage.name for stage in PIPELINE.stages]
@@ -147,7 +147,7 @@ def test_results_of_ignores_the_config():
 
 def test_table_imports_neither_config_nor_arrays():
     heavy = "'numpy', 'h5py', 'scipy', 'numba', 'pydantic', 'ruamel'"
-    code = f"import sys, walkerlab.pipeline.graph; print([name for name in ({heavy}) if name in sys.modules])"
+    code = f"import sys, walkerlab.pipeline.plan.graph; print([name for name in ({heavy}) if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr
 
@@ -169,7 +169,11 @@ def test_editing_an_evidence_stage_changes_only_its_key(made_of, stage):
 
 @pytest.mark.parametrize("stage", [stage.name for stage in PIPELINE.stages if not stage.draws])
 def test_results_do_not_depend_on_the_registries(made_of, stage):
-    registries = {"walkerlab.pipeline.graph", "walkerlab.views.figures.registry", "walkerlab.views.report.registry"}
+    registries = {
+        "walkerlab.pipeline.plan.graph",
+        "walkerlab.views.figures.registry",
+        "walkerlab.views.report.registry",
+    }
     registries |= {f"walkerlab{code.partition(':')[0]}" for code in walkerlab.EXTENSIONS.values()}
     assert not registries & made_of[stage]
 

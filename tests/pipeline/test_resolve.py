@@ -6,7 +6,7 @@ import pytest
 
 from walkerlab.config.files import builtin_config
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.resolve import resolve
+from walkerlab.pipeline.plan.resolve import resolve
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,10 @@ import pytest
 
 from walkerlab.config.reads import StartConfig
 from walkerlab.errors import ConfigError, LockedError, StorageError
-from walkerlab.pipeline.executor import survey
-from walkerlab.pipeline.runner import execute
-from walkerlab.pipeline.stage import Graph, Stage
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.plan.stage import Stage
+from walkerlab.pipeline.plan.survey import survey
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store.artifact import read
 
 EXPLICIT = "start=[null, 0.2, 0.3, 0.4]"
@@ -278,7 +279,7 @@ from pathlib import Path
 from toy.pipeline import GRAPH
 from walkerlab.config.loader import load
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store.runfolder import RunFolder
 class Notes(Silent):
     def note(self, text):

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 from process_table import workers_below
 
-from walkerlab.pipeline.executor import any_side_by_side
-from walkerlab.pipeline.stage import Graph
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.run.executor import any_side_by_side
+from walkerlab.pipeline.run.workers import WorkerDiedError
 from walkerlab.pipeline.store.artifact import read
-from walkerlab.pipeline.workers import WorkerDiedError
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED
 
 STEEP = "slope_rad=1.2"

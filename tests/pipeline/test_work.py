@@ -7,9 +7,9 @@ import worker_calls as calls
 
 from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.run.work import WorkUnit, complete
+from walkerlab.pipeline.run.workers import WorkerDiedError
 from walkerlab.pipeline.store.checkpoint import Checkpoint
-from walkerlab.pipeline.work import WorkUnit, complete
-from walkerlab.pipeline.workers import WorkerDiedError
 
 
 @pytest.fixture

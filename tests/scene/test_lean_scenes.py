@@ -18,7 +18,7 @@ from walkerlab.physics.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
 from walkerlab.physics.mechanics.parts import Assembly, Body, Particle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages import contact_sim, simulate
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene import omissions

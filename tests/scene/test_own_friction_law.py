@@ -18,7 +18,7 @@ from walkerlab.physics.ground.friction import FRICTION_LAWS, Frictionless, frict
 from walkerlab.physics.orbits.contact_gait import why_no_gait, with_rigidity, with_scaled_laws
 from walkerlab.physics.orbits.rigid_limit import STICTION_SERIES, series_settings
 from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages.contact_sim import tell_unresolved_slip
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state

@@ -47,6 +47,12 @@ class LoadedConfig:
     warnings: tuple[str, ...]  # adjustments and suspicious values, as sentences
     source: str  # name of the config's file in messages
     tree: BlockNode  # untyped tree of the config, with positions
+    base_tree: BlockNode  # the same without settings
+
+    @property
+    def base(self) -> Config:
+        """The config without settings."""
+        return align_start(validate_tree(self.base_tree), self.base_tree)[0]
 
     def placed(self, error: ConfigError) -> ConfigError:
         """Prepend the position of the key at fault to an error's message, if the key is in the config's text."""
@@ -104,7 +110,7 @@ def load(
     if isinstance(named, Scalar) and named.position == start and named.value != file.path.stem:
         cannot = "since the file's name is not valid for a run folder"
         warnings.insert(0, f"{file.label}: the run is named {named.value}, {cannot}")
-    return LoadedConfig(config, name or folder, changes, tuple(warnings), file.label, changed_tree)
+    return LoadedConfig(config, name or folder, changes, tuple(warnings), file.label, changed_tree, tree)
 
 
 def safe_name(text: str) -> str:

@@ -1,1 +1,1 @@
-"""Pipeline of stages: their order, the keys of their results, and the code that runs them."""
+"""Pipeline of stages on three floors: `plan` decides what to do, `run` does it, and `store` keeps the results."""

@@ -1,8 +1,17 @@
-"""Headline quantities of each stage's summary, and the quantities that a sweep can record."""
+"""Headline quantities of each stage's summary, those that a sweep can record, and comparison of two runs by them."""
+
+from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+from walkerlab.config.canonical import flatten
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+    from walkerlab.pipeline.store.content import Content
 
 HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "fixedpoint": (
@@ -94,3 +103,59 @@ def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     """
     judged: Sequence[Mapping[str, Any]] = compared.get("paper_numbers", ())
     return () if compared.get("departures") else judged
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Values of a quantity in two runs, and the change relative to the first (None if undefined)."""
+
+    name: str
+    first: Any
+    second: Any
+    change: float | None
+
+
+@dataclass(frozen=True)
+class RunDifference:
+    """Differences between two runs."""
+
+    config: tuple[tuple[str, Any, Any], ...]  # config keys that differ, with both values as JSON
+    numbers: Mapping[str, tuple[Pair, ...]]  # all values of both summaries, for each stage that both runs have
+    headlines: Mapping[str, tuple[Pair, ...]]  # headline quantities, for the same stages
+    # only_first, only_second: stages with a result in one run only
+    only_first: tuple[str, ...]
+    only_second: tuple[str, ...]
+
+
+def difference(
+    first: Mapping[str, Content], second: Mapping[str, Content], configs: Sequence[Config | None]
+) -> RunDifference:
+    """Compare the results and configs of two runs; an unknown config counts as empty."""
+    both = [name for name in first if name in second]
+    keys = pairs(*({} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs))
+    return RunDifference(
+        tuple((pair.name, pair.first, pair.second) for pair in keys if pair.first != pair.second),
+        {name: pairs(*(dict(flatten(run[name].summary, lists=True)) for run in (first, second))) for name in both},
+        {name: pairs(*(headline_values(name, run[name].summary) for run in (first, second))) for name in both},
+        tuple(name for name in first if name not in second),
+        tuple(name for name in second if name not in first),
+    )
+
+
+def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ...]:
+    """Pair the values of two results by name."""
+    both = {name: (first.get(name), second.get(name)) for name in {**first, **second}}
+    return tuple(Pair(name, *values, change(*values)) for name, values in both.items())
+
+
+def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the headline quantities of a stage's summary, by name."""
+    last = {name: summary[list_name][-1] for name, list_name in LAST_OF.items() if summary.get(list_name)}
+    every = dict(flatten(summary, lists=True)) | last
+    return {name: every[name] for name in headlines(stage, every)}
+
+
+def change(first: Any, second: Any) -> float | None:
+    """Return the relative change from `first` to `second`; None unless both are numbers and `first` is not 0."""
+    numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (first, second))
+    return float(second / first - 1.0) if numbers and first else None

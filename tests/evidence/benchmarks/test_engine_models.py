@@ -20,8 +20,8 @@ from walkerlab.physics.ground.walker import BENT, LOCKED
 from walkerlab.physics.hybrid.contact_result import walk_contact
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.plan.results import MemoryResults
+from walkerlab.pipeline.run.executor import answer_in_memory
 
 
 @pytest.fixture(params=[(), ("contact.terrain=after-mid-swing",)], ids=["pads", "after-mid-swing"])

@@ -14,8 +14,8 @@ from walkerlab.evidence.benchmarks.engines.process import TaskLost
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES, Engine
 from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
 from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, three_digits
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.keys import Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.key import differences
 

@@ -11,9 +11,9 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.evidence.paper import compare
 from walkerlab.evidence.paper.study import study_the_paper
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages import simulate
 from walkerlab.pipeline.stages.walk import over_time, step_columns
 from walkerlab.pipeline.store.content import Content, Group

@@ -13,7 +13,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.evidence.paper import tune
 from walkerlab.evidence.paper.tune_limit import LimitFindings, causes
 from walkerlab.physics.orbits.rigid_limit import ALL_SERIES, NORMAL_SERIES, ContactFactors, Distance, Extrapolation
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint
 from walkerlab.views.report.blocks import Statements

@@ -16,7 +16,7 @@ from walkerlab.evidence.verification.maps import (
     units_of,
 )
 from walkerlab.outcome import Outcome
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 

@@ -16,8 +16,8 @@ from walkerlab.evidence.verification.stability import with_numbers
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, STANCE, kinetic_energy
 from walkerlab.physics.orbits.similarity import Units
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.keys import Keys
 from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import rigid_walker

@@ -10,7 +10,7 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
 from walkerlab.outcome import Outcome
 from walkerlab.physics.orbits.basin import ATOL, RTOL
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import basin
 from walkerlab.pipeline.stages.basin import RigidQuestion

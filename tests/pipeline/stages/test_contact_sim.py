@@ -12,7 +12,7 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, simulate
 from walkerlab.pipeline.stages.walk import numbers_of, step_columns

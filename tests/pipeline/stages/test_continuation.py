@@ -18,10 +18,10 @@ from walkerlab.physics.orbits.families import ValueSpan
 from walkerlab.physics.orbits.family_search import THOROUGHNESS
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.step_map import gait_near
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.stages import continuation
 from walkerlab.pipeline.stages.continuation import (
     FamilyQuestion,

@@ -14,7 +14,7 @@ from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.gradients import gait_quantities
 from walkerlab.physics.orbits.robustness import LARGEST, largest_disturbance
 from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import design, fixedpoint
 from walkerlab.pipeline.store.checkpoint import Checkpoint

@@ -7,7 +7,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, fixedpoint, simulate
 

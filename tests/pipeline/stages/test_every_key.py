@@ -16,10 +16,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.physics.orbits.families import ValueSpan
 from walkerlab.physics.orbits.family_search import CONTACT, RIGID
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.stages import robustness
 from walkerlab.pipeline.stages.continuation import FamilyQuestion, models_of
 from walkerlab.pipeline.stages.design import Gaits

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.keys import Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, identify, simulate
 from walkerlab.pipeline.stages.measured_walk import NO_FILE, digests, read_measured

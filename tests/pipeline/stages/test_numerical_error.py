@@ -9,7 +9,7 @@ from walkerlab.config.schema import SolverSettings
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.hybrid import recorded_walk
 from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, simulate
 from walkerlab.pipeline.stages.numerical_error import LEAST_RTOL, change, tightened

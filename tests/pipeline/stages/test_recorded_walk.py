@@ -17,11 +17,11 @@ from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.paper.sections import recorded_tables, recorded_words
 from walkerlab.exchange.walk_in_steps import MOST_SAMPLES
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.results import MemoryResults
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.run.executor import answer_in_memory
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages import recorded_walk
 from walkerlab.pipeline.store.runfolder import RunFolder
 

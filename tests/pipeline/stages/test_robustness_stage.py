@@ -13,7 +13,7 @@ from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.hybrid.rigid_measures import reactions
 from walkerlab.physics.mechanics.impact import pushed_at_hip
 from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, robustness
 from walkerlab.pipeline.store.checkpoint import Checkpoint

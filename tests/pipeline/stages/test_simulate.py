@@ -16,7 +16,7 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.hybrid import recorded_walk
 from walkerlab.physics.orbits.rigid_map import EXACT_STEPS
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, simulate
 from walkerlab.scene.rigid import rigid_scene

@@ -13,11 +13,12 @@ from late_imports import import_late
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.benchmarks.engines import registry
-from walkerlab.pipeline.executor import Executor, answer_in_memory
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.results import FolderResults, MemoryResults
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.keys import Keys
+from walkerlab.pipeline.plan.planner import Planner
+from walkerlab.pipeline.plan.results import FolderResults, MemoryResults
+from walkerlab.pipeline.run.executor import answer_in_memory
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages.numerical_error import SAMPLE
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import untimed
@@ -176,7 +177,7 @@ def test_point_has_the_key_of_its_single_run(name, tmp_path):
     loaded = load(Path(name))
     stages = [stage for stage in PIPELINE.stages if not stage.draws and stage.why_unsuited(loaded.config) is None]
     folder = RunFolder(tmp_path, loaded.run_name)
-    steps = Executor(loaded.config, FolderResults(folder), stages).plan()
+    steps = Planner(loaded.config, FolderResults(folder), stages).plan()
     single = {step.stage.name: step.identity.key for step in steps}
     assert {stage.name: Keys().of(loaded.config, stage.name)[stage.name] for stage in stages} == single
 

@@ -17,7 +17,9 @@ import pytest
 from process_table import THERE, is_alive, processes_below
 
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline import work
+from walkerlab.pipeline.run import work
+from walkerlab.pipeline.run.work import JobEndedError, Spread, WorkUnit, compute
+from walkerlab.pipeline.run.workers import ONE_THREAD, WorkerPool
 from walkerlab.pipeline.sweeps import engines
 from walkerlab.pipeline.sweeps.engines import (
     ENGINES,
@@ -28,8 +30,6 @@ from walkerlab.pipeline.sweeps.engines import (
     environment_of_workers,
     until_told,
 )
-from walkerlab.pipeline.work import JobEndedError, Spread, WorkUnit, compute
-from walkerlab.pipeline.workers import ONE_THREAD, WorkerPool
 
 LOCAL = ENGINES["local"]
 

@@ -1,6 +1,7 @@
 """The graph."""
 
-from walkerlab.pipeline.stage import STRIDES, Graph, Stage, results_of
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.plan.stage import STRIDES, Stage, results_of
 
 
 def keys(*names):

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 import walkerlab
 from walkerlab.config.fields import block_of, words_of
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.stage import Graph, Option, Stage
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.stage import Option, Stage
+from walkerlab.pipeline.run.workers import ONE_THREAD
 from walkerlab.pipeline.store.provenance import git_commit
-from walkerlab.pipeline.workers import ONE_THREAD
 from walkerlab.views.cli import main
 from walkerlab.views.cli.main import program
 

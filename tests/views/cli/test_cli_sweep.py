@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.pipeline.headlines import MOST
-from walkerlab.pipeline.runs import Pair, difference
+from walkerlab.pipeline.headlines import MOST, Pair, difference
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.clean import file_lines

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.runner import StageReport
+from walkerlab.pipeline.run.runner import StageReport
 from walkerlab.views.cli import console
 from walkerlab.views.cli.console import Console, StageLine
 from walkerlab.views.cli.request import Request

@@ -69,7 +69,7 @@ def test_report_lists_shares_and_attractors():
 
 @pytest.mark.parametrize("stage", ["plot", "report"])
 def test_drawings_include_the_basin_once_it_exists(stage):
-    from walkerlab.pipeline.graph import PIPELINE
+    from walkerlab.pipeline.plan.graph import PIPELINE
 
     assert "basin" in PIPELINE[stage].if_current
 

@@ -19,7 +19,7 @@ from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.artifact import read, write
 from walkerlab.pipeline.store.content import Content

@@ -8,7 +8,7 @@ from synthetic_walks import both_models, rigid_alone
 
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import index
 from walkerlab.scene.omissions import LeftOut
 from walkerlab.views.figures import stage as plot

@@ -3,9 +3,8 @@
 import pytest
 
 import walkerlab
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headlines
-from walkerlab.pipeline.runs import headline_values
+from walkerlab.pipeline.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headline_values, headlines
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.sweeps.chunk import by_name
 

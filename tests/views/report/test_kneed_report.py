@@ -9,7 +9,7 @@ from html_page import Page
 
 from walkerlab.config.loader import load
 from walkerlab.evidence.paper.compared_releases import CONTACT_STEPS, RELEASES
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.report.blocks import Player

@@ -8,7 +8,7 @@ from synthetic_results import EVERYTHING, config, stored
 
 from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.index import broken_file, indexed_files
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut

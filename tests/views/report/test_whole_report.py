@@ -14,8 +14,8 @@ from walkerlab.evidence.benchmarks.trials import ContactTrial, RigidTrial
 from walkerlab.evidence.verification import known_problems, stability
 from walkerlab.evidence.verification.catalogue import package_cases
 from walkerlab.physics.orbits import rigid_limit
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.runner import execute
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli import exports

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, later
-from walkerlab.pipeline.stage import DRAWINGS, Stage, gait_for_start_or_pads
+from walkerlab.pipeline.plan.stage import DRAWINGS, Stage, gait_for_start_or_pads
 
 STAGES = (
     Stage(

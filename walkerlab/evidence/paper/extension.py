@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, Study, later
-from walkerlab.pipeline.stage import DRAWINGS, Option, Stage, results_of, walks_and
+from walkerlab.pipeline.plan.stage import DRAWINGS, Option, Stage, results_of, walks_and
 
 STAGES = (
     Stage(

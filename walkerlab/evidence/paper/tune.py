@@ -29,6 +29,7 @@ from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress, track
+from walkerlab.pipeline.run.workers import in_order
 from walkerlab.pipeline.stages.numerical_error import numerical_error
 from walkerlab.pipeline.stages.rigid_groups import leg_variables
 from walkerlab.pipeline.stages.walk import (
@@ -43,7 +44,6 @@ from walkerlab.pipeline.stages.walk import (
 )
 from walkerlab.pipeline.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.pipeline.workers import in_order
 from walkerlab.scene.contact import (
     SAMPLES_PER_PENDULUM_TIME,
     ContactScene,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, later
-from walkerlab.pipeline.stage import DRAWINGS, Stage, gait_for_start_or_pads
+from walkerlab.pipeline.plan.stage import DRAWINGS, Stage, gait_for_start_or_pads
 from walkerlab.scene.studies import is_studied
 
 if TYPE_CHECKING:

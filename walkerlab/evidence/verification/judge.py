@@ -16,7 +16,7 @@ from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, Sta
 from walkerlab.evidence.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS, Method, method_named
-from walkerlab.pipeline.workers import in_order
+from walkerlab.pipeline.run.workers import in_order
 
 TIGHTER_FACTOR = 0.1
 SAMPLED_STEPS = 100  # walks of more steps are not sampled

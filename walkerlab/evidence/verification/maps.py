@@ -24,7 +24,7 @@ from walkerlab.evidence.verification.ordinary import (
 from walkerlab.evidence.verification.starts import ContactStart, case_tolerances, prepare_start
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.physics.solvers.registry import Tolerances
-from walkerlab.pipeline.work import WorkUnit
+from walkerlab.pipeline.run.work import WorkUnit
 
 PAPER_STIFFNESS: Final = Contact().in_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)

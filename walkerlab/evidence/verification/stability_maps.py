@@ -10,10 +10,10 @@ from walkerlab.evidence.verification import maps
 from walkerlab.evidence.verification.ordinary import COMPARED_STEPS, FINE_ERROR
 from walkerlab.outcome import Outcome
 from walkerlab.pipeline.progress import Progress
+from walkerlab.pipeline.run.work import complete
 from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.pipeline.work import complete
 
 STICTION_COLUMNS = {
     "outcome": "how the walk ended, see attribute outcomes",

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, later
-from walkerlab.pipeline.stage import (
+from walkerlab.pipeline.plan.stage import (
     DRAWINGS,
     STRIDES,
     Option,

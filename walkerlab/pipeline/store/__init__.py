@@ -1,1 +1,1 @@
-"""Results as files: contents, keys, provenance and locks."""
+"""Keep: results as files with contents, keys, provenance and locks, in run folders."""

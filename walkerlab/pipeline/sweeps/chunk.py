@@ -16,9 +16,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import WalkerlabError
 from walkerlab.extensions import refuse_other_versions
 from walkerlab.labels import Label, labels_of
-from walkerlab.pipeline.executor import answer_in_memory
-from walkerlab.pipeline.results import MemoryResults
-from walkerlab.pipeline.stage import STRIDES, Graph
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.plan.results import MemoryResults
+from walkerlab.pipeline.plan.stage import STRIDES
+from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged, OtherLayout
 from walkerlab.pipeline.store.columns import rows_group

@@ -20,25 +20,17 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.extensions import declared, load
 from walkerlab.labels import join_words, with_unit
-from walkerlab.pipeline.executor import Executor
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.resolve import warn_of_edits
-from walkerlab.pipeline.results import FolderResults
-from walkerlab.pipeline.runs import (
-    command,
-    config_of,
-    read_all,
-    refusing_older,
-    results_in,
-    results_to_show,
-    run_named,
-    the_result,
-)
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.planner import Planner
+from walkerlab.pipeline.plan.resolve import warn_of_edits
+from walkerlab.pipeline.plan.results import FolderResults
+from walkerlab.pipeline.plan.survey import command, refusing_older, results_in, results_to_show, the_result
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Group
 from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.pipeline.store.files import as_text
 from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import config_of, read_all, run_named
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.request import Request
 from walkerlab.views.cli.target import Target, write_file
@@ -172,13 +164,13 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     raise ConfigError(f"this run has no item {name}.{near}", advice)
 
 
-def plan_run(folder: RunFolder) -> Executor:
-    """Return an executor with the run's current results, but without stages if the run's config is no longer valid."""
+def plan_run(folder: RunFolder) -> Planner:
+    """Return a planner with the run's current results, but without stages if the run's config is no longer valid."""
     config = config_of(folder)
     stages = () if config is None else PIPELINE.stages
-    executor = Executor(config or Config(), FolderResults(folder, elsewhere=False), stages)
-    executor.plan()
-    return executor
+    planner = Planner(config or Config(), FolderResults(folder, elsewhere=False), stages)
+    planner.plan()
+    return planner
 
 
 def figure(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from walkerlab.errors import ConfigError, StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
-from walkerlab.pipeline.interrupts import raise_on
+from walkerlab.pipeline.run.interrupts import raise_on
 
 if TYPE_CHECKING:
     from walkerlab.views.cli.request import Request

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from walkerlab.extensions import registry
-from walkerlab.pipeline.stage import Graph
+from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.views.cli.failures import exit_on_failure, print_result
 from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
 
@@ -45,7 +45,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
             raise typer.BadParameter("give only one run", param_hint="RUN")
         request_for_stage = replace(request, command=stage, config=runs[0] if runs else request.config)
         with exit_on_failure(request_for_stage):
-            from walkerlab.pipeline.runs import run_named
+            from walkerlab.pipeline.store.runs import run_named
             from walkerlab.views.cli.stored import print_stored
 
             located = (

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from walkerlab.errors import StoppedError
-from walkerlab.pipeline.interrupts import raise_on
-from walkerlab.pipeline.stage import Graph
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.run.interrupts import raise_on
 from walkerlab.views.cli.request import OF_TALK, Request, command
 from walkerlab.views.figures.style import EXPORT_DPI
 
@@ -53,7 +53,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     @command(app, "config", "sets", "runs", "jobs", "quiet", "verbose", name="compile")
     def compile_kernels(request: Request) -> None:
         """Compile all code that a config's runs need, for example before many of them start on a cluster."""
-        from walkerlab.pipeline.compile_ahead import compile_ahead
+        from walkerlab.pipeline.run.compile_ahead import compile_ahead
 
         began = time.monotonic()
         config = request.resolved_run.loaded.config
@@ -65,7 +65,7 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     def open_run(request: Request, run: RunArgument = "paper") -> None:
         """Show a run's page in the browser."""
         from walkerlab.errors import StaleError
-        from walkerlab.pipeline.runs import run_named
+        from walkerlab.pipeline.store.runs import run_named
 
         folder = run_named(run, request.runs)
         page = (folder.path / "report.html").resolve()

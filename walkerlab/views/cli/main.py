@@ -12,9 +12,9 @@ import typer
 from typer.core import TyperGroup
 
 import walkerlab
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.stage import STRIDES, Graph, Stage
-from walkerlab.pipeline.workers import ONE_THREAD
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.stage import STRIDES, Stage
+from walkerlab.pipeline.run.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
 from walkerlab.views.cli import runs as whole_runs
 from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.export import ENDINGS, export_model, law_named, slope_named
-from walkerlab.pipeline.resolve import resolve, warn_of_edits
-from walkerlab.pipeline.runner import Options, execute
+from walkerlab.pipeline.plan.resolve import resolve, warn_of_edits
+from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages.walk import rigid_start
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.provenance import git_commit

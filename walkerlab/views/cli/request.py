@@ -24,8 +24,8 @@ from walkerlab.views.cli.failures import exit_on_failure
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
-    from walkerlab.pipeline.resolve import ResolvedRun
-    from walkerlab.pipeline.stage import Option
+    from walkerlab.pipeline.plan.resolve import ResolvedRun
+    from walkerlab.pipeline.plan.stage import Option
     from walkerlab.pipeline.store.runfolder import RunFolder
 
 RUNS = Path("runs")
@@ -192,7 +192,7 @@ class Request:
         This command repeats its own options; other stages get only those that they read, as settings, and all other
         commands get every one. Settings by --set go to every command.
         """
-        from walkerlab.pipeline.graph import PIPELINE
+        from walkerlab.pipeline.plan.graph import PIPELINE
 
         stage = next((stage for stage in PIPELINE.stages if stage.name == command), None)
         words = [] if self.config is None else ["-c", self.config]
@@ -219,8 +219,8 @@ class Request:
     @cached_property
     def resolved_run(self) -> "ResolvedRun":
         """Resolve the config and its run folder, and show the config's warnings; ConfigError if it is invalid."""
-        from walkerlab.pipeline.graph import PIPELINE
-        from walkerlab.pipeline.resolve import resolve
+        from walkerlab.pipeline.plan.graph import PIPELINE
+        from walkerlab.pipeline.plan.resolve import resolve
 
         run = resolve(self.config, self.settings, self.strides, self.runs, self.name)
         loaded = run.loaded

@@ -6,8 +6,8 @@ from pathlib import Path
 from walkerlab.config.files import ConfigFile
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.pipeline.runner import execute
-from walkerlab.pipeline.stage import Graph
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store.artifact import Damaged, read
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.failures import print_result

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from walkerlab.pipeline.stage import Graph
+from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request, command
 
 if TYPE_CHECKING:
-    from walkerlab.pipeline.runs import Pair, RunDifference
+    from walkerlab.pipeline.headlines import Pair, RunDifference
     from walkerlab.pipeline.store.runfolder import RunFolder
 
 SAME_CHANGE = 1e-12
@@ -36,7 +36,9 @@ def add_to(app: typer.Typer, graph: Graph) -> None:
     ) -> None:
         """Compare two runs: configs, headline values with relative change, both walks overlaid."""
         from walkerlab.errors import StaleError
-        from walkerlab.pipeline.runs import config_of, difference, results_to_show, run_named
+        from walkerlab.pipeline.headlines import difference
+        from walkerlab.pipeline.plan.survey import results_to_show
+        from walkerlab.pipeline.store.runs import config_of, run_named
 
         folders = (run_named(first, request.runs), run_named(second, request.runs))
         names = [stage.name for stage in graph.stages]

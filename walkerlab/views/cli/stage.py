@@ -5,11 +5,10 @@ from dataclasses import replace
 
 from walkerlab.config.walkers import why_rigid_alone
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.pipeline.executor import short_reason
-from walkerlab.pipeline.extending_config import run_and_write
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.runner import Options, StageReport
-from walkerlab.pipeline.stage import Graph, Stage
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.stage import Stage
+from walkerlab.pipeline.run.executor import short_reason
+from walkerlab.pipeline.run.runner import Options, StageReport, run_and_write
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 from walkerlab.views.report.answers import answer, further_tables, verdict

@@ -6,13 +6,14 @@ from dataclasses import asdict
 from typing import Any
 
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.pipeline.executor import short_reason, survey
-from walkerlab.pipeline.results import UP_TO_DATE, Step
-from walkerlab.pipeline.runs import RunSummary, config_of, run_named, runs_in
-from walkerlab.pipeline.stage import Graph
+from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.plan.results import UP_TO_DATE, Step
+from walkerlab.pipeline.plan.survey import RunSummary, runs_in, survey
+from walkerlab.pipeline.run.executor import short_reason
 from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
 from walkerlab.pipeline.store.content import Variable
 from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import config_of, run_named
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 from walkerlab.views.report.tables import aligned

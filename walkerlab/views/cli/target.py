@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.errors import ConfigError, StorageError
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store.clean import owner_of
 from walkerlab.pipeline.store.files import storing, write_through
 from walkerlab.views.cli.console import Console

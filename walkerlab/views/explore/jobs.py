@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from walkerlab.pipeline.interrupts import PATIENCE_S
+from walkerlab.pipeline.run.interrupts import PATIENCE_S
 from walkerlab.views.explore.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
 EARLY = re.compile(r"page: (.+) \(partial")
 """Progress line that announces a partial page."""
 JOB_PROGRAM = (
-    "from walkerlab.pipeline.interrupts import end_with_parent; end_with_parent(); "
+    "from walkerlab.pipeline.run.interrupts import end_with_parent; end_with_parent(); "
     "from walkerlab.views.cli.main import main; main()"
 )
 """Program that runs a command as `python -m walkerlab` does, and ends when the server ends."""

@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.workers import Worker, WorkerDiedError
+from walkerlab.pipeline.run.workers import Worker, WorkerDiedError
 from walkerlab.views.explore import walks
 from walkerlab.views.explore.jobs import Job
 from walkerlab.views.explore.page import choices, render_page, start_name

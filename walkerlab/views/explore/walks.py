@@ -14,10 +14,10 @@ from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_extending_yaml, to_yaml
 from walkerlab.errors import ConfigError, WalkerlabError
-from walkerlab.pipeline.executor import answer_in_memory
+from walkerlab.pipeline.plan.resolve import resolve
+from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.resolve import resolve
-from walkerlab.pipeline.results import MemoryResults
+from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.views.explore.numbers import adjustable
 from walkerlab.views.report.results import Results

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from walkerlab.config.reads import NamedConfig
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store import artifact, index
 from walkerlab.pipeline.store.artifact import Stored

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension
-from walkerlab.pipeline.stage import STRIDES, WALKED, Stage, walks_and
+from walkerlab.pipeline.plan.stage import STRIDES, WALKED, Stage, walks_and
 
 STAGES = (
     Stage(

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store import index
 from walkerlab.pipeline.store.artifact import Stored

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from walkerlab.pipeline.workers import Worker, WorkerDiedError, WorkerTimeoutError
+from walkerlab.pipeline.run.workers import Worker, WorkerDiedError, WorkerTimeoutError
 
 START_UP_S = 60.0  # extra time for the first task, which loads the engine and compiles
 R = TypeVar("R")

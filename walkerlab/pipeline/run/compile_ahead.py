@@ -15,7 +15,7 @@ from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.physics import kernel_cache
-from walkerlab.pipeline.workers import in_order
+from walkerlab.pipeline.run.workers import in_order
 
 HALF_ANGLE = 0.2  # rad, from the slope's normal to each leg at the start of a walk
 BUDGET = 200  # right-hand sides, enough for the first step of each method

@@ -1,20 +1,31 @@
-"""Bring a stage in a run's folder up to date under the folder's lock, and report the outcome."""
+"""Bring a stage in a run's folder up to date under the folder's lock, and report the outcome.
 
+If the stage found parameters, `run_and_write` also writes them as a config that extends the one it ran under.
+"""
+
+import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from walkerlab.config.files import DEFAULT, builtin_names
+from walkerlab.config.layers import parse_setting
+from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.schema import Config
+from walkerlab.config.writer import to_extending_yaml
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.executor import Executor, omission_of
-from walkerlab.pipeline.graph import PIPELINE
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.planner import Planner, omission_of
+from walkerlab.pipeline.plan.resolve import ResolvedRun
+from walkerlab.pipeline.plan.results import FolderResults, Step
+from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.progress import Reporter
-from walkerlab.pipeline.results import FolderResults, Step
-from walkerlab.pipeline.runs import claim, refuse_another_config
-from walkerlab.pipeline.stage import Graph, Stage
+from walkerlab.pipeline.run.executor import Executor
+from walkerlab.pipeline.store.files import write_numbered
 from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import claim, refuse_another_config
 from walkerlab.scene.omissions import LeftOut
 
 
@@ -89,11 +100,11 @@ def execute(
     stages = graph.needed_for(target, config) + (graph.campaigns_of(target) if options.full else ())
 
     def executor() -> Executor:
-        results = FolderResults(folder, graph)
-        return Executor(config, results, stages, force=options.force, jobs=options.jobs, reporter=reporter)
+        planner = Planner(config, FolderResults(folder, graph), stages, force=options.force)
+        return Executor(planner, options.jobs, reporter)
 
     run = executor()
-    steps = run.plan()
+    steps = run.planner.plan()
     changes = any(step.action == "run" or step.origin is not None for step in steps)
     if changes and options.dry:
         refuse_another_config(folder, config)
@@ -111,6 +122,33 @@ def execute(
     return report_of(run, folder, graph[target], time.perf_counter() - started)
 
 
+def run_and_write(
+    run: ResolvedRun, target: str, options: Options = USUAL, reporter: Reporter | None = None, graph: Graph = PIPELINE
+) -> StageReport:
+    """Execute a stage of a run; if it found parameters, write a config with them and add its file to the summary.
+
+    Raises the errors of `execute`, and StorageError if the config cannot be written.
+    """
+    report = execute(run.loaded.config, target, run.folder, options, reporter, graph)
+    name = graph[target].finds
+    if name and report.summary and report.no_answer is None and not options.dry:
+        report.summary["config"] = str(write_config(run, report, name))
+    return report
+
+
+def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
+    """Write the parameters that a stage found as a config of this name; return its file."""
+    summary = report.summary
+    values = summary["best"] if "best" in summary else {row["key"]: row["value"] for row in summary["estimates"]}
+    found = run.loaded.variant([parse_setting(f"{key}={value!r}") for key, value in values.items()])
+    base = paper_config_with({}) if run.extends == DEFAULT else run.loaded.base
+    changed = found.model_copy(update={report.stage: getattr(base, report.stage)})
+    typed = run.extends if run.extends in builtin_names() else os.path.relpath(run.extends, report.run_dir)
+    return write_numbered(
+        report.run_dir / f"{name}.yaml", to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
+    )
+
+
 def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
     """Raise ConfigError for an incomplete user-defined friction law before anything is compiled."""
     if config.contact is not None and any("contact" in step.stage.requires for step in steps if step.action == "run"):
@@ -121,11 +159,12 @@ def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
 
 
 def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) -> StageReport:
-    result = run.answers.get(target.name)
+    answers = run.planner.answers
+    result = answers.get(target.name)
     summary = dict(result.summary) if result is not None else {}
-    for campaign in run.graph.campaigns_of(target.name):
-        if campaign.name in run.answers:
-            summary[campaign.name] = run.answers[campaign.name].summary
+    for campaign in run.planner.graph.campaigns_of(target.name):
+        if campaign.name in answers:
+            summary[campaign.name] = answers[campaign.name].summary
     return StageReport(
         stage=target.name,
         run_dir=folder.path,
@@ -136,7 +175,7 @@ def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) ->
         summary=summary,
         steps=tuple(run.done),
         no_answer=no_answer_of(run, summary.get("no_answer")),
-        results={name: dict(answer.summary) for name, answer in run.answers.items() if answer.complete},
+        results={name: dict(answer.summary) for name, answer in answers.items() if answer.complete},
     )
 
 
@@ -145,13 +184,13 @@ def all_left_out(run: Executor, target: Stage, by_stage: Sequence[dict[str, str]
 
     Optional results that nobody requested are not listed.
     """
-    missing = run.missing_inputs(target) if target.draws else ()
-    absent = [entry for entry in missing if not run.graph[entry.what].only_by]
+    missing = run.planner.missing_inputs(target) if target.draws else ()
+    absent = [entry for entry in missing if not run.planner.graph[entry.what].only_by]
     absent += [omission_of(done.stage.name, done.reason) for done in run.done if done.action == "leave out"]
     entries = [*by_stage]
     for done in run.done:
         if done.action != "leave out":
-            entries += done.stage.does_without(run.config)
+            entries += done.stage.does_without(run.planner.config)
     absent += [LeftOut(**entry) for entry in entries]
     return tuple(dict.fromkeys(absent))
 
@@ -163,7 +202,7 @@ def no_answer_of(run: Executor, message: dict[str, str] | None) -> NoAnswer | No
     """
     if message is not None:
         return NoAnswer(message["message"], message["advice"])
-    for name, answer in ((done.stage.name, run.answers.get(done.stage.name)) for done in run.done):
+    for name, answer in ((done.stage.name, run.planner.answers.get(done.stage.name)) for done in run.done):
         reason = None if answer is None else answer.summary.get("no_answer")
         if reason is not None:
             return NoAnswer(f"{name}: {reason['message']}", reason["advice"])

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from walkerlab.config import reads
 from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
 from walkerlab.errors import ConfigError
-from walkerlab.extensions import load
 from walkerlab.scene.studies import is_studied
 
 if TYPE_CHECKING:
@@ -165,47 +164,3 @@ class Stage:
     def on_demand(self) -> bool:
         """Whether only the stage's own command runs it."""
         return self.only_by == self.name
-
-
-class Graph:
-    """Stages of a pipeline, each after the stages that it needs.
-
-    at  import path, module:NAME, by which other processes find it; sweeps need it
-    """
-
-    def __init__(self, *stages: Stage, at: str = "") -> None:
-        """Store the stages; raises ValueError if two have the same name."""
-        self.stages, self.at = stages, at
-        self._by_name = {stage.name: stage for stage in stages}
-        if len(self._by_name) != len(stages):
-            raise ValueError("two stages have the same name")
-
-    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
-        """Pickle the import path alone: stages hold functions that cannot be pickled."""
-        if not self.at:
-            raise TypeError("a graph needs `at`, its import path, to be sent to other processes")
-        return load, (self.at,)
-
-    def __getitem__(self, name: str) -> Stage:
-        return self._by_name[name]
-
-    def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """Return the target and all stages that it needs under a config, in running order."""
-        needed = {target}
-        for stage in reversed(self.stages):
-            if stage.name in needed:
-                needed.update(stage.inputs(config))
-        return tuple(stage for stage in self.stages if stage.name in needed)
-
-    def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """Return the stages as `needed_for` does; raises ConfigError if one lacks a config block or draws files."""
-        stages = self.needed_for(target, config)
-        for stage in stages:
-            if stage.draws:
-                raise ConfigError(f"{stage.name} only draws files into a run folder; it has no result in memory.")
-            stage.refuse_unsuited(target, config)
-        return stages
-
-    def campaigns_of(self, target: str) -> tuple[Stage, ...]:
-        """Return the stages that `target --full` runs in addition."""
-        return tuple(stage for stage in self.stages if stage.only_by == f"{target} --full")

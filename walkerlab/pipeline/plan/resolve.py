@@ -21,11 +21,11 @@ from walkerlab.config.problems import problem_error
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.runs import SHOWN_CHANGES, config_text, find_run, read_all, stored_in
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.key import brief
 from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import SHOWN_CHANGES, config_text, find_run, read_all, stored_in
 
 SUFFIX = ".h5"
 BUILTIN = "built-in "

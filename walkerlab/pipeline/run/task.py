@@ -12,11 +12,11 @@ from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.physics import kernel_cache
+from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.progress import StageReporter
-from walkerlab.pipeline.stage import Stage
+from walkerlab.pipeline.run.workers import tell
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import drawing_into
-from walkerlab.pipeline.workers import tell
 
 Task = Callable[[StageReporter], Content]
 """A stage with its arguments; called with a reporter, it runs the stage."""

@@ -11,8 +11,8 @@ from walkerlab.config.canonical import slice_of
 from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.schema import Config
 from walkerlab.extensions import WORDS, declared, extensions
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.stage import Graph, Stage
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.store.key import Identity
 
 

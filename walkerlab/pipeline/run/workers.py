@@ -26,7 +26,7 @@ from typing import Any, TypeVar
 
 from walkerlab.errors import WalkerlabError
 from walkerlab.physics.kernel_cache import cache_root
-from walkerlab.pipeline.interrupts import raise_on
+from walkerlab.pipeline.run.interrupts import raise_on
 
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 PATIENCE_S = 5.0
@@ -35,7 +35,7 @@ START = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 sys.path[:] = {path!r}
-from walkerlab.pipeline.workers import serve
+from walkerlab.pipeline.run.workers import serve
 serve({line}, {modules!r})
 """
 

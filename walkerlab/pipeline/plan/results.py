@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from walkerlab.config.schema import Config
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.identity import Keys
-from walkerlab.pipeline.stage import Graph, Stage
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.keys import Keys
+from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.store import artifact, provenance
 from walkerlab.pipeline.store.artifact import Stored, Verdict
 from walkerlab.pipeline.store.checkpoint import Checkpoint

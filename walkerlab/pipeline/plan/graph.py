@@ -1,0 +1,85 @@
+"""Graphs of stages, and the pipeline: the stages of all extensions, drawings last and the report at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from walkerlab.errors import ConfigError
+from walkerlab.extensions import extensions, load
+from walkerlab.pipeline.plan.stage import DRAWINGS, Stage
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+
+class Graph:
+    """Stages of a pipeline, each after the stages that it needs.
+
+    at  import path, module:NAME, by which other processes find it; sweeps need it
+    """
+
+    def __init__(self, *stages: Stage, at: str = "") -> None:
+        """Store the stages; raises ValueError if two have the same name."""
+        self.stages, self.at = stages, at
+        self._by_name = {stage.name: stage for stage in stages}
+        if len(self._by_name) != len(stages):
+            raise ValueError("two stages have the same name")
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
+        """Pickle the import path alone: stages hold functions that cannot be pickled."""
+        if not self.at:
+            raise TypeError("a graph needs `at`, its import path, to be sent to other processes")
+        return load, (self.at,)
+
+    def __getitem__(self, name: str) -> Stage:
+        return self._by_name[name]
+
+    def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
+        """Return the target and all stages that it needs under a config, in running order."""
+        needed = {target}
+        for stage in reversed(self.stages):
+            if stage.name in needed:
+                needed.update(stage.inputs(config))
+        return tuple(stage for stage in self.stages if stage.name in needed)
+
+    def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
+        """Return the stages as `needed_for` does; raises ConfigError if one lacks a config block or draws files."""
+        stages = self.needed_for(target, config)
+        for stage in stages:
+            if stage.draws:
+                raise ConfigError(f"{stage.name} only draws files into a run folder; it has no result in memory.")
+            stage.refuse_unsuited(target, config)
+        return stages
+
+    def campaigns_of(self, target: str) -> tuple[Stage, ...]:
+        """Return the stages that `target --full` runs in addition."""
+        return tuple(stage for stage in self.stages if stage.only_by == f"{target} --full")
+
+
+by_name: dict[str, Stage] = {}
+for extension in extensions().values():
+    for stage in extension.stages:
+        by_name.setdefault(stage.name, stage)  # commands refuse equal names, with advice
+STAGES = tuple(by_name.values())
+
+
+def complete(drawing: Stage) -> Stage:
+    """Add the stages to a drawing that say that it needs or shows their results."""
+    needed = tuple(stage.name for stage in STAGES if drawing.name in stage.needed_by)
+    shown = tuple(stage.name for stage in STAGES if drawing.name in stage.shown_by)
+
+    def inputs(config: Config) -> tuple[str, ...]:
+        return (*drawing.inputs(config), *needed)
+
+    return replace(drawing, inputs=inputs, if_current=(*drawing.if_current, *shown))
+
+
+PIPELINE = Graph(
+    *(stage for stage in STAGES if not stage.draws),
+    # the report shows what all others have drawn
+    *(complete(stage) for stage in STAGES if stage.draws and stage.name not in DRAWINGS),
+    *(complete(stage) for stage in STAGES if stage.name in DRAWINGS),
+    at="walkerlab.pipeline.plan.graph:PIPELINE",
+)

@@ -1,0 +1,1 @@
+"""Carry out: run stages, here or in workers, and resume long work."""
