@@ -85,7 +85,7 @@ def stages(_results: Results) -> str:
     """What the stages are, what they need under the paper config, and what they read."""
     config = load(None, ()).config
     rows = [
-        [f"`{stage.name}`", stage.purpose, ", ".join(stage.inputs(config)) or "nothing", ", ".join(stage.reads)]
+        [f"`{stage.name}`", stage.purpose, ", ".join(stage.inputs(config)) or "nothing", ", ".join(stage.reads(config))]
         for stage in PIPELINE.stages
     ]
     return table(["stage", "purpose", "needs (paper config)", "reads of the config"], rows)

@@ -112,7 +112,7 @@ def test_example_stage_of_the_docs_runs():
     exec(type_it_takes + module, names | {"Progress": object, "Stage": Stage, "results_of": results_of}, names)
     reads = SimpleNamespace(SpeedConfig=names["SpeedConfig"])
     stage = eval(entry, {"Stage": Stage, "results_of": results_of, "reads": reads}, names)
-    assert stage.reads == ("gravity_m_s2",)
+    assert stage.reads(load().config) == ("gravity_m_s2",)
     steps = {name: Variable(np.array([0.5]), ("step",), "1", name) for name in ("length_m", "period_s")}
     found = names["run"](SimpleNamespace(gravity_m_s2=10.0), {"simulate": Content({"steps": Group(steps)}, {})}, None)
     assert found.summary == {"speed_m_s": 1.0, "froude": 0.1}

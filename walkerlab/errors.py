@@ -1,20 +1,43 @@
 """Failures that a user can act on, each with its exit code; any other exception is a bug."""
 
 import re
+import shlex
 import unicodedata
 from collections.abc import Callable
 from typing import Any, ClassVar, Final
 
-COMMAND_PATTERN: Final = re.compile(r"`(walkerlab (?!schema|open|init)[a-z-]+(?: [A-Za-z0-9-]+)*)`")
-"""Pattern for commands in a message, except those that do not act on a run."""
+COMMAND_PATTERN: Final = re.compile(
+    r"`(walkerlab (?!schema|open|init)([a-z-]+)(?: [A-Za-z0-9-]+)*?)(?: --set ([\w.]+)=([\w.+-]+))?`"
+)
+"""Pattern for commands in a message, with at most one setting, except those that do not act on a run."""
+
+SLOPES: Final = ("slope_rad", "slope_deg")
 
 CONTROLS: Final = ("Cc", "Cf", "Zl", "Zp")
 """Categories of control characters in Unicode, with those that change the direction of writing."""
 
 
 def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
-    """Append the options that select the run to every command in a message; `options_of` returns those of a command."""
-    return COMMAND_PATTERN.sub(lambda match: f"`{match[1]}{options_of(match[1].split()[1])}`", text)
+    """Append the options that select the run to every command in a message; `options_of` returns those of a command.
+
+    A setting of the command, `--set KEY=VALUE`, replaces those of its key.
+    """
+
+    def with_options(match: re.Match[str]) -> str:
+        start, command, key, value = match.groups()
+        options = options_of(command)
+        return f"`{start}{options if key is None else f'{without_key(options, key)} --set {key}={value}'}`"
+
+    return COMMAND_PATTERN.sub(with_options, text)
+
+
+def without_key(options: str, key: str) -> str:
+    """Return options, each preceded by a space, without settings of a key; the slope has two keys."""
+    words, same = shlex.split(options), SLOPES if key in SLOPES else (key,)
+    settings = [place for place, word in enumerate(words[:-1]) if word == "--set"]
+    dropped = [place for place in settings if words[place + 1].partition("=")[0].strip() in same]
+    kept = (word for place, word in enumerate(words) if not {place, place - 1} & {*dropped})
+    return "".join(f" {shlex.quote(word)}" for word in kept)
 
 
 def escape_controls(text: str) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from walkerlab.config.loader import load
+from walkerlab.errors import add_run_options
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.gait_suggestions import find_slopes_with_gaits, suggest_gaits
 from walkerlab.scene.rigid import rigid_walker
@@ -45,7 +46,7 @@ def test_kneed_walker_without_gait_is_pointed_to_steeper_slopes(degrees):
 
 @pytest.mark.parametrize("slope", ["slope_deg=40", "slope_rad=0.7"])
 def test_suggested_command_finds_a_stable_gait(slope):
-    said = suggest_gaits(config(slope), f" --set {slope}")
+    said = add_run_options(suggest_gaits(config(slope)), lambda _: f" --set {slope}")
     command = re.search("`(.*)`", said)[1]
     sets = [word for word in shlex.split(command) if "=" in word]
     assert said.startswith("A stable gait exists at least from ")
@@ -56,7 +57,7 @@ def test_suggested_command_finds_a_stable_gait(slope):
 def test_kneed_walker_without_gait_is_advised_to_move_its_feet_ahead(degrees):
     sets = (MCGEER, f"slope_deg={degrees}")
     assert gait_of(config(*sets, base=Path("kneed"))) is None
-    advice = suggest_gaits(config(*sets, base=Path("kneed")), " -c mcgeer.yaml")
+    advice = add_run_options(suggest_gaits(config(*sets, base=Path("kneed"))), lambda _: " -c mcgeer.yaml")
     command = re.search("`walkerlab fixedpoint -c mcgeer.yaml --set (walker.foot_centre_ahead_m=[0-9.]+)`", advice)[1]
     assert gait_of(config(*sets, command, base=Path("kneed"))).stable
     assert advice.count("--set") <= 2

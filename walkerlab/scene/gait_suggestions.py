@@ -5,22 +5,21 @@ few slopes, and their branches are followed over the slope.
 """
 
 import math
-import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load
+from walkerlab.config.reads import RigidConfig, keys_of
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import Kneed
 from walkerlab.physics.orbits.families import BranchFollower, GaitBranch, Seed, ValueSpan
 from walkerlab.physics.orbits.fixed_point import RigidGait, SearchSettings, find_gaits
 from walkerlab.physics.orbits.rigid_map import RigidMap, WalkerAt
-from walkerlab.scene.parameter import SLOPE, SLOPE_DEG, SLOPE_RAD, Parameter
+from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
 SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # slopes to try in this order, relative to the config's slope
@@ -85,22 +84,23 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
         yield SlopeRange(slopes, max(proper, key=lambda ends: ends[1] - ends[0], default=None))
 
 
-def suggest_gaits(config: Config, typed: str = "") -> str:
-    """Suggest gaits near a config that has none, as commands that repeat the options `typed` by the user."""
-    if config.slope_rad <= 0.0:
+def suggest_gaits(scene: RigidConfig) -> str:
+    """Suggest gaits near a scene that has none, as commands; empty on slopes that do not descend."""
+    if scene.slope_rad <= 0.0:
         return ""
+    config = rigid_alone(scene)
     feet, suitable = find_gait_with_feet_ahead(config), find_slopes_with_gaits(config)
     advice = []
     if feet is not None:
         ahead_m, gait = feet
         description = "a stable gait" if gait.stable else "a gait, unstable"
-        command = f"`walkerlab fixedpoint{set_instead(typed, f'walker.{FOOT_KEY}={ahead_m:.3g}')}`"
+        command = f"`walkerlab fixedpoint --set walker.{FOOT_KEY}={ahead_m:.3g}`"
         advice.append(f"With its feet {ahead_m:.3g} m ahead of the shanks this walker has {description}: {command}.")
     if suitable is not None:
         in_degrees = tuple(math.degrees(value) for value in suitable.stable or suitable.slopes)
         description = "A stable gait" if suitable.stable else "A gait, unstable,"
         slope_deg = math.degrees(suitable.nearest_slope(config.slope_rad))
-        command = f"`walkerlab fixedpoint{set_instead(typed, f'slope_deg={slope_deg:.3g}')}`"
+        command = f"`walkerlab fixedpoint --set slope_deg={slope_deg:.3g}`"
         advice.append(f"{description} exists at least from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: {command}.")
     if not advice:
         feet_tried = name_feet_tried(config)
@@ -108,17 +108,10 @@ def suggest_gaits(config: Config, typed: str = "") -> str:
     return " ".join(advice)
 
 
-def set_instead(typed: str, setting: str) -> str:
-    """Return the `typed` options with a setting, KEY=VALUE, in place of those of the same key."""
-    words, key = shlex.split(typed), setting.partition("=")[0]
-    same = (SLOPE_RAD, SLOPE_DEG) if key == SLOPE_DEG else (key,)
-    replaced = [
-        place
-        for place, (option, word) in enumerate(pairwise(words))
-        if option == "--set" and word.partition("=")[0].strip() in same
-    ]
-    remaining = (word for place, word in enumerate(words) if not {place, place - 1} & {*replaced})
-    return "".join(f" {shlex.quote(word)}" for word in (*remaining, "--set", setting))
+def rigid_alone(scene: RigidConfig) -> Config:
+    """Return a config with the keys of the rigid model that has a gait, and no others."""
+    data = {name: getattr(scene, name) for name in keys_of(RigidConfig)}
+    return Config.model_validate({**data, "push_off": {"impulse_N_s": scene.push_off.impulse_N_s}})
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:

@@ -1,6 +1,8 @@
 """The fixedpoint stage: what it stores and says, for slopes with and without a gait."""
 
 import json
+import math
+import re
 
 import numpy as np
 import pytest
@@ -29,9 +31,9 @@ FIXED_KEYS = {
 }
 
 
-def run(**changes):
+def run(again=True, **changes):
     config = Config.model_validate(changes)
-    return fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent(), again)
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +104,17 @@ def test_slope_without_a_gait_is_explained(slope, begins, said, advised):
     assert said in caught.value.message
     assert advised in caught.value.advice
     assert caught.value.partial.summary["equation_sets"]["corrected"]["reason"] in caught.value.message
+
+
+def test_failure_advises_a_slope_with_a_gait():
+    with pytest.raises(NoAnswer) as caught:
+        run(slope_rad=0.7)
+    command = re.search("`walkerlab fixedpoint --set slope_deg=([0-9.]+)`", caught.value.advice)
+    assert run(slope_rad=math.radians(float(command[1]))).summary["stable"]
+    with pytest.raises(NoAnswer) as quick:
+        run(slope_rad=0.7, again=False)
+    assert caught.value.advice.endswith(quick.value.advice)
+    assert "slope_deg=" not in quick.value.advice
 
 
 def test_drive_without_a_gait_is_named_as_the_cause():

@@ -193,7 +193,7 @@ def test_unknown_option_gets_the_usual_message():
 
 
 def test_flag_may_contain_a_hyphen():
-    option = Option("--from-step", "strides", "N", "First step.", int)
+    option = Option("--from-step", "strides", "N", "First step.", "int")
     graph = Graph(Stage("settle", "stages.settle", "Settle.", None, options=(option,)))
     done = CliRunner().invoke(program(graph), ["settle", "--help"])
     assert done.exit_code == 0

@@ -150,7 +150,7 @@ def test_equal_results_give_equal_files(tmp_path):
 
 
 def test_report_stage_reads_the_whole_config():
-    assert set(PIPELINE["report"].reads) == set(Config.model_fields)
+    assert set(PIPELINE["report"].reads(Config())) == set(Config.model_fields)
 
 
 def test_page_of_a_slope_without_a_gait_says_so_first(tmp_path):

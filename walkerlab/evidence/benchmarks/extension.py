@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from walkerlab.config import reads
-from walkerlab.extensions import INTERFACE, Extension, later
-from walkerlab.pipeline.plan.stage import DRAWINGS, Stage, gait_for_start_or_pads
+from walkerlab.extensions import INTERFACE, Extension
+from walkerlab.pipeline.plan.stage import DRAWINGS, Stage, dependency, gait_for_start_or_pads
 
 STAGES = (
     Stage(
@@ -15,7 +15,7 @@ STAGES = (
         "engines", "walkerlab.evidence.benchmarks.engines.stage",
         "Simulate the walk in MuJoCo, Drake and Exudyn: our contact law in their integrators, then their own contact.",
         reads.SceneConfig, gait_for_start_or_pads, requires=("contact",), only_by="engines", shown_by=DRAWINGS,
-        programs=later("walkerlab.evidence.benchmarks.engines.registry:installed_versions"),
+        depends_on=dependency("programs", "walkerlab.evidence.benchmarks.engines.registry:installed_versions"),
     ),
 )  # fmt: skip
 EXTENSION = Extension(

@@ -6,16 +6,17 @@ from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, Study, later
 from walkerlab.pipeline.plan.stage import DRAWINGS, Option, Stage, results_of, walks_and
 
+WITH = ("--with",)
 STAGES = (
     Stage(
         "compare", "walkerlab.evidence.paper.compare",
         "Compare both models with each other and with every value of the paper.", reads.CompareConfig,
         walks_and(), requires=("contact",), needed_by=DRAWINGS,
         options=(
-            Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV."),
-            Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Columns of that file.", needs=("--with",)),
-            Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", needs=("--with",)),
-            Option("--walks", "recording.walks", "left|right|away|towards", "Direction of markers.", needs=("--with",)),
+            Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV.", "text"),
+            Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Columns of that file.", "pairs", WITH),
+            Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", "units", WITH),
+            Option("--walks", "recording.walks", "left|right|away|towards", "Direction of markers.", needs=WITH),
         ),
     ),
     Stage(

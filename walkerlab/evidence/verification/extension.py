@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, later
@@ -12,6 +12,20 @@ from walkerlab.scene.studies import is_studied
 if TYPE_CHECKING:
     from walkerlab.config.reads import SceneConfig
     from walkerlab.config.schema import Config
+
+
+def cases_config(config: SceneConfig) -> type:
+    """Return what `stability` takes: of a study's walker, whose cases vary the paper's config, less than a scene."""
+    return reads.CompassCasesConfig if is_studied(config) else reads.SceneCasesConfig
+
+
+def paper_walks(_config: object) -> dict[str, Any]:
+    """Return the part of the paper's config that the cases depend on."""
+    # imported here, because the command line's help does not need it
+    from walkerlab.config.canonical import slice_of
+    from walkerlab.config.overlay import paper_config_with
+
+    return {"paper": slice_of(paper_config_with({}), reads.WalksConfig)}
 
 
 def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
@@ -36,14 +50,13 @@ STAGES = (
     Stage(
         "stability", "walkerlab.evidence.verification.stability",
         "Verify extreme cases and problems with known answers.",
-        reads.CompassCasesConfig, known_problems_and_start, takes_of_scene=reads.SceneCasesConfig,
-        takes_of_paper=reads.WalksConfig, needed_by=("report",), checks=check_cases,
+        cases_config, known_problems_and_start, depends_on=paper_walks, needed_by=("report",), checks=check_cases,
         does_without=later("walkerlab.evidence.verification.omissions:verification_omissions"),
     ),
     Stage(
         "stability-maps", "walkerlab.evidence.verification.stability_maps",
         "Map stability over stiffness, stiction velocity and step size; resumes where it was interrupted.",
-        reads.MapsConfig, only_by="stability --full", shown_by=DRAWINGS, takes_of_paper=reads.WalksConfig,
+        reads.MapsConfig, only_by="stability --full", shown_by=DRAWINGS, depends_on=paper_walks,
     ),
 )  # fmt: skip
 EXTENSION = Extension(

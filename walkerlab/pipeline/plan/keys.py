@@ -2,23 +2,15 @@
 
 import json
 from collections.abc import Mapping, Set
-from importlib import import_module
-from inspect import signature
 from typing import Any
 
 from walkerlab.code_digest import Sources, digest_of
 from walkerlab.config.canonical import slice_of
-from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.schema import Config
 from walkerlab.extensions import WORDS, declared, extensions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.store.key import Identity
-
-
-def takes_again(stage: Stage) -> bool:
-    """Whether a stage's `run` can skip the second walk, which measures the numerical error."""
-    return "again" in signature(import_module(stage.module).run).parameters
 
 
 class Keys:
@@ -29,7 +21,6 @@ class Keys:
         self.graph = graph
         self._sources = Sources()
         self._digests: dict[tuple[str, ...], str] = {}
-        self._fixed: dict[str, dict[str, Any]] = {}
 
     def of(self, config: Config, target: str) -> dict[str, str]:
         """Return the keys of a stage and of all its inputs, by stage; raises as `Graph.needed_in_memory` does."""
@@ -43,18 +34,11 @@ class Keys:
         """Return the identity of a stage's result under a config.
 
         input_keys  keys of its inputs, by stage
-        again       whether walks are repeated to measure their numerical error, as for every stored result
+        again       as for `call_stage`; true for every stored result
         """
-        if stage.name not in self._fixed:
-            fixed = self._fixed[stage.name] = {}
-            if stage.takes_of_paper is not None:
-                fixed["paper"] = slice_of(paper_config_with({}), stage.takes_of_paper)
-            if stage.programs is not None:
-                fixed["programs"] = dict(stage.programs())
-        files = {} if stage.files is None else {"files": dict(stage.files(config))}
-        once = {} if again or not takes_again(stage) else {"again": False}
-        own = {**slice_of(config, stage.takes_under(config)), **self._fixed[stage.name], **files, **once}
-        return Identity(stage.name, own, input_keys, self.code_digest(stage.name, added_code(stage, config, own)))
+        once = {} if again else {"again": False}
+        own = {**slice_of(config, stage.takes_under(config)), **stage.depends_on(config), **once}
+        return Identity(stage.name, own, input_keys, self.code_digest(stage.name, added_code(stage, own)))
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:
         """Return the digest of a stage's code, and of code of extensions that it uses, computed at the first call."""
@@ -66,12 +50,13 @@ class Keys:
         return self._digests[used]
 
 
-def added_code(stage: Stage, config: Config, own: Mapping[str, Any]) -> set[str]:
+def added_code(stage: Stage, own: Mapping[str, Any]) -> set[str]:
     """Return the code of extensions, as "module:name", that a stage's result depends on.
 
-    They are the laws named by words in its part of the config, `own`, and for drawings everything that is drawn.
+    They are the laws named by words in its part of the config and what else it depends on, `own`, and for drawings
+    everything that is drawn.
     """
-    text = json.dumps([own, stage.uses(config)])
+    text = json.dumps(own)
     used = {code for key in WORDS for word, code in declared(key).items() if json.dumps(word) in text}
     if stage.draws:
         used |= {code for extension in extensions().values() for code in extension.views()}

@@ -21,6 +21,7 @@ from walkerlab.config.problems import problem_error
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.key import brief
@@ -67,6 +68,8 @@ def resolve(
     else:
         read, source = load(path, sets, strides, name), source_of(path, runs)
     refuse_what_makes_no_walker(read)
+    for stage in PIPELINE.stages:
+        stage.checks(read.config)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
     if name is not None and changes:
         source += f" with {', '.join(changes)}"

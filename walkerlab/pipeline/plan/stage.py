@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from walkerlab.config import reads
-from walkerlab.config.reads import RigidConfig, SceneConfig, StartConfig
+from walkerlab.config.reads import SceneConfig, StartConfig
 from walkerlab.errors import ConfigError
-from walkerlab.scene.studies import is_studied
+from walkerlab.extensions import load
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -23,6 +23,10 @@ Inputs = Callable[["Config"], tuple[str, ...]]
 WALKED = ("fixedpoint", "simulate", "contact-sim")
 DRAWINGS = ("plot", "report")
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
+OptionKind = Literal[
+    "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
+]
+"""How an option's value is read; docs/adding.md has a table."""
 
 
 def without_block(name: str) -> str:
@@ -33,6 +37,16 @@ def without_block(name: str) -> str:
 def nothing(_config: object) -> tuple[Any, ...]:
     """Return an empty tuple, for stages without inputs or omitted parts."""
     return ()
+
+
+def no_more(_config: object) -> Mapping[str, Any]:
+    """Return an empty mapping, for stages whose results depend on nothing else."""
+    return {}
+
+
+def dependency(name: str, code: str) -> Callable[[Config], Mapping[str, Any]]:
+    """Return a function that returns the value of a function of the config, "module:name", under a name."""
+    return lambda config: {name: load(code)(config)}
 
 
 def results_of(*names: str) -> Inputs:
@@ -63,16 +77,14 @@ class Option:
 
     flag: str  # as typed, such as --steps
     key: str  # dotted config key
-    # placeholder in the help, which also sets the syntax: "KEY" is a config key; a form with "=" may be repeated and
-    # takes a name with two numbers ("...=A:B"), with optional numbers ("[=A:B]") or with a value ("...=...,...")
-    metavar: str
+    metavar: str  # placeholder in the help
     help: str
-    type: type = str  # type of the option's value; list for an option that may be repeated
+    kind: OptionKind = "word"
     needs: tuple[str, ...] = ()  # flags that must be given with it
     runs: str = ""  # stage that the command then runs instead of its own; such an option sets no key
 
 
-STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", int)
+STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", "int")
 
 
 @dataclass(frozen=True)
@@ -82,8 +94,9 @@ class Stage:
     name: str  # name of the stage, its command and its artifact
     module: str  # module of its `run` function; imported only when the stage runs
     purpose: str  # one line for the user
-    # type of the config slice that `run` takes and its result depends on; None for the whole config
-    takes: type | None
+    # type of the config slice that `run` takes and its result depends on, or a function from a config to this type;
+    # None for the whole config
+    takes: type | Callable[[Config], type] | None
     inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
     if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
     options: tuple[Option, ...] = ()  # options of the stage's command in addition to those of all stages
@@ -95,30 +108,20 @@ class Stage:
     finds: str = ""  # name of the config that the command writes with the parameters found; empty if it writes none
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
-    takes_of_scene: type | None = None  # replaces `takes` for a walker that belongs to no study
-    takes_of_paper: type | None = None  # type of the slice of the built-in paper config that the stage's own cases use
-    # returns the versions of other programs that the stage's result depends on, by name
-    programs: Callable[[], Mapping[str, str]] | None = None
-    # returns the digests of files that the stage's result depends on, by config key
-    files: Callable[[Config], Mapping[str, str]] | None = None
-    # returns the words whose laws (see extensions.py) it uses in addition to those in its part of the config
-    uses: Inputs = nothing
+    # returns what else the result depends on, by name, such as digests of files and versions of other programs
+    depends_on: Callable[[Config], Mapping[str, Any]] = no_more
     checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
     needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
     shown_by: tuple[str, ...] = ()  # those that show it if it is current
 
-    @property
-    def reads(self) -> tuple[str, ...]:
+    def takes_under(self, config: Config) -> type | None:
+        """Return the type of the config slice that the stage's result depends on; None for the whole config."""
+        return self.takes if self.takes is None or isinstance(self.takes, type) else self.takes(config)
+
+    def reads(self, config: Config) -> tuple[str, ...]:
         """Return the dotted config keys that the stage's result depends on."""
-        if self.takes is not None:
-            return tuple(reads.dotted_keys(self.takes))
-        from walkerlab.config.schema import Config  # imported here: the command line's help does not need it
-
-        return tuple(Config.model_fields)
-
-    def takes_under(self, config: RigidConfig) -> type | None:
-        """Return the type of the config slice that the stage's result depends on."""
-        return self.takes if self.takes_of_scene is None or is_studied(config) else self.takes_of_scene
+        takes = self.takes_under(config)
+        return tuple(type(config).model_fields if takes is None else reads.dotted_keys(takes))
 
     def results(self, config: Config) -> tuple[str, ...]:
         """Return the stages whose results this stage uses: required ones, then optional ones."""

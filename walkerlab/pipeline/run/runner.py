@@ -109,7 +109,6 @@ def execute(
     if changes and options.dry:
         refuse_another_config(folder, config)
     if changes and not options.dry:
-        refuse_incomplete_law(config, steps)
         reused = "" if options.force else "; its results will be reused"
         with folder.locked(options.wait, lambda message: run.reporter.note(message + reused)):
             claim(folder, config)
@@ -147,15 +146,6 @@ def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
     return write_numbered(
         report.run_dir / f"{name}.yaml", to_extending_yaml(typed, base, changed, f"{base.name}-{name}")
     )
-
-
-def refuse_incomplete_law(config: Config, steps: Sequence[Step]) -> None:
-    """Raise ConfigError for an incomplete user-defined friction law before anything is compiled."""
-    if config.contact is not None and any("contact" in step.stage.requires for step in steps if step.action == "run"):
-        # Imported here: it loads the compiler, which the stages load anyway.
-        from walkerlab.scene.contact import friction_law
-
-        friction_law(config.contact)
 
 
 def report_of(run: Executor, folder: RunFolder, target: Stage, wall_s: float) -> StageReport:

@@ -37,7 +37,7 @@ def call_stage(
     offered  optional arguments, by name:
                jobs        maximum number of processes for independent work units
                checkpoint  work units that an interrupted run has computed
-               again       whether to repeat walks to measure their numerical error
+               again       whether to repeat walks to measure their numerical error, and to search for advice
                folder      run folder that the stage draws into
                left_out    results that are missing in a drawing, with the reasons
                early       what this run has drawn early from some of the results; None if nothing

@@ -41,8 +41,11 @@ OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel st
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
 
-def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Find the gaits of each set of equations; raises NoAnswer if the config's own set has no physical gait."""
+def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
+    """Find the gaits of each set of equations; raises NoAnswer if the config's own set has no physical gait.
+
+    again  whether the advice then names nearby gaits, which takes a second
+    """
     sets = equation_sets(config)
     searches: dict[str, GaitSearch] = {
         equations: find_gaits(rigid_walker(config, equations), config.seed)
@@ -55,8 +58,17 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
     )
     if chosen.gait is None:
         nothing = "no gait was found" if chosen.random_starts and not chosen.gaits else "no gait"
-        raise NoAnswer(f"{nothing} at a slope of {config.slope_rad:.4g} rad: {chosen.reason}", advice(config), content)
+        message = f"{nothing} at a slope of {config.slope_rad:.4g} rad: {chosen.reason}"
+        nearby = suggest_nearby(config) if again else ""
+        raise NoAnswer(message, f"{nearby} {advice(config)}".strip(), content)
     return content
+
+
+def suggest_nearby(config: RigidConfig) -> str:
+    # imported here: most walkers have a gait
+    from walkerlab.scene.gait_suggestions import suggest_gaits
+
+    return suggest_gaits(config)
 
 
 def advice(config: RigidConfig) -> str:

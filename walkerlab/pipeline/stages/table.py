@@ -6,40 +6,52 @@ The command line builds its help from this file, so the file imports no stage, n
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from walkerlab.config import reads
-from walkerlab.extensions import INTERFACE, Extension, later
+from walkerlab.extensions import INTERFACE, WORDS, Extension, load
 from walkerlab.pipeline.plan.stage import (
     DRAWINGS,
     STRIDES,
     Option,
     Stage,
+    dependency,
     gait_for_start_or_pads,
     gait_unless_start_is_given,
     results_of,
 )
 from walkerlab.scene.omissions import contact_walk_omissions, rigid_walk_omissions
-from walkerlab.scene.studies import equation_sets
+
+if TYPE_CHECKING:
+    from walkerlab.config.schema import Config
+
+
+def check_friction(config: Config) -> None:
+    """Raise ConfigError for an incomplete law of friction of another package, before anything is compiled."""
+    if config.contact is not None and config.contact.friction not in WORDS["friction"]:
+        load("walkerlab.scene.contact:friction_law")(config.contact)
+
 
 MODEL_HELP = "Model whose gaits to study."
 ESTIMATED = (
-    Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds."),
-    Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Value known beforehand, and its standard deviation."),
-    Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate as well.", list),
+    Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds.", "bounds-or-none"),
+    Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Known value, and its standard deviation.", "bounds"),
+    Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate as well.", "texts"),
     Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),
 )
 ERRORS_TO_REACH = Option(
-    "--error", "plan.errors", "KEY=SIGMA,...", "Standard error to plan for, in the key's unit.", float
+    "--error", "plan.errors", "KEY=SIGMA,...", "Standard error to plan for, in the key's unit.", "numbers"
 )
 WALKS = (
     Stage(
         "recorded-walk", "walkerlab.pipeline.stages.recorded_walk",
         "Read a walk recorded elsewhere and find its steps.", reads.RecordedWalkConfig, requires=("recording",),
-        files=later("walkerlab.pipeline.stages.recorded_walk:digests"),
+        depends_on=dependency("files", "walkerlab.pipeline.stages.recorded_walk:digests"),
     ),
     Stage(
         "fixedpoint", "walkerlab.pipeline.stages.fixedpoint",
-        "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig, uses=equation_sets,
+        "Find the periodic gait of the rigid model and its multipliers.", reads.FixedPointConfig,
+        depends_on=dependency("equation_sets", "walkerlab.scene.studies:equation_sets"),
     ),
     Stage(
         "simulate", "walkerlab.pipeline.stages.simulate", "Simulate a walk of the rigid model.", reads.SimulateConfig,
@@ -49,7 +61,7 @@ WALKS = (
         "contact-sim", "walkerlab.pipeline.stages.contact_sim",
         "Simulate a walk of the contact model, with contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
-        does_without=contact_walk_omissions,
+        does_without=contact_walk_omissions, checks=check_friction,
     ),
 )  # fmt: skip
 QUESTIONS = (
@@ -58,11 +70,11 @@ QUESTIONS = (
         "Follow families of gaits over a parameter: branches, bifurcations, cascades, chaos.",
         reads.ContinuationConfig, only_by="continuation", shown_by=DRAWINGS,
         options=(
-            Option("--over", "continuation.over", "KEY", "Key to vary, e.g. slope_deg.", needs=("--from", "--to")),
-            Option("--from", "continuation.from", "A", "First value, in the key's unit.", float),
-            Option("--to", "continuation.to", "B", "Last value.", float),
+            Option("--over", "continuation.over", "KEY", "Key to vary, e.g. slope_deg.", "key", ("--from", "--to")),
+            Option("--from", "continuation.from", "A", "First value, in the key's unit.", "float"),
+            Option("--to", "continuation.to", "B", "Last value.", "float"),
             Option("--model", "continuation.model", "rigid|contact|both", MODEL_HELP),
-            Option("--periods", "continuation.periods", "N", "Maximum number of steps in a gait's period.", int),
+            Option("--periods", "continuation.periods", "N", "Maximum number of steps in a gait's period.", "int"),
         ),
     ),
     Stage(
@@ -83,8 +95,8 @@ QUESTIONS = (
         options=(
             Option("--minimise", "design.minimise", "QUANTITY", "Gait quantity to minimise."),
             Option("--maximise", "design.maximise", "QUANTITY", "Gait quantity to maximise."),
-            Option("--over", "design.over", "KEY=A:B", "Key to vary, with its bounds."),
-            Option("--keep", "design.keep", "QUANTITY=A:B", "Gait quantity to keep within bounds."),
+            Option("--over", "design.over", "KEY=A:B", "Key to vary, with its bounds.", "bounds"),
+            Option("--keep", "design.keep", "QUANTITY=A:B", "Gait quantity to keep within bounds.", "bounds"),
             Option("--model", "design.model", "rigid|contact", "Model whose gait to design."),
         ),
     ),
@@ -92,17 +104,17 @@ QUESTIONS = (
         "identify", "walkerlab.pipeline.stages.identify",
         "Estimate parameters of the walker from a measured walk, with error bars.",
         reads.IdentifyConfig, results_of("fixedpoint"), only_by="identify", shown_by=DRAWINGS, finds="identified",
-        files=later("walkerlab.pipeline.stages.measured_walk:digests"),
+        depends_on=dependency("files", "walkerlab.pipeline.stages.measured_walk:digests"),
         options=(
-            Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time."),
+            Option("--data", "identify.data", "FILE", "Measured walk: a table of steps, or angles over time.", "text"),
             *ESTIMATED,
             Option("--level", "identify.level", "steps|angles", "Kind of data."),
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
-            Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", bool),
-            Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file."),
-            Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file lacks."),
+            Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", "switch"),
+            Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file.", "pairs"),
+            Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file lacks.", "units"),
             Option("--walks", "identify.walks", "left|right|away|towards", "Direction of markers."),
-            Option("--plan", "", "", "Without data: predict the errors of each way of measuring.", bool, runs="plan"),
+            Option("--plan", "", "", "Without data: predict the errors of each way to measure.", "switch", runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),
     ),
@@ -112,7 +124,7 @@ QUESTIONS = (
         reads.PlanConfig, results_of("fixedpoint"), only_by="plan", shown_by=DRAWINGS,
         options=(
             *ESTIMATED, ERRORS_TO_REACH,
-            Option("--steps", "plan.steps", "N", "Number of steps to report errors for.", int),
+            Option("--steps", "plan.steps", "N", "Number of steps to report errors for.", "int"),
         ),
     ),
 )  # fmt: skip

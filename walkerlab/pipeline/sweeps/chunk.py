@@ -138,7 +138,7 @@ def is_regular(value: list[Any]) -> bool:
 
 def without_outputs(config: Config, target: str, graph: Graph) -> Config:
     """Return the config without time series of the target's walk, unless another stage needs them."""
-    asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads]
+    asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads(config)]
     return config.model_copy(update={"outputs": ()}) if asking == [target] else config
 
 

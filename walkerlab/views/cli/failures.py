@@ -1,7 +1,5 @@
 """Turns a command's expected failures into a message, advice and an exit code; bugs keep their traceback."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import json
@@ -9,15 +7,13 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from walkerlab.errors import ConfigError, StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
 from walkerlab.pipeline.run.interrupts import raise_on
-
-if TYPE_CHECKING:
-    from walkerlab.views.cli.request import Request
+from walkerlab.views.cli.request import Request
 
 FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
@@ -35,7 +31,7 @@ def exit_on_failure(request: Request) -> Iterator[None]:
         if request.as_json:
             run_dir = None if request.run_dir is None else str(request.run_dir)
             nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
-            print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": error.as_json()})
+            print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": as_json(error, request)})
 
     try:
         yield
@@ -79,12 +75,16 @@ def print_result(
 ) -> None:
     """Print a result as text lines or, with `--json`, as the object `value`; exit non-zero if there is an error."""
     if request.as_json:
-        print_json(value if error is None else value | {"error": error.as_json()})
+        print_json(value if error is None else value | {"error": as_json(error, request)})
     else:
         sys.stdout.writelines(f"{escape_controls(line)}\n" for line in lines)
     if error is not None:
         print_error(error, request.typed_for)
         raise typer.Exit(error.exit_code)
+
+
+def as_json(error: WalkerlabError, request: Request) -> dict[str, Any]:
+    return error.as_json() | {"advice": add_run_options(error.advice, request.typed_for)}
 
 
 def print_error(error: WalkerlabError, options_of: Callable[[str], str] = lambda _: "") -> None:

@@ -7,8 +7,9 @@ import typer
 
 from walkerlab.extensions import registry
 from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.views.cli.command import command
 from walkerlab.views.cli.failures import exit_on_failure, print_result
-from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
+from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request
 
 
 def add_to(app: typer.Typer, graph: Graph) -> None:

@@ -10,7 +10,8 @@ import typer
 from walkerlab.errors import StoppedError
 from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.pipeline.run.interrupts import raise_on
-from walkerlab.views.cli.request import OF_TALK, Request, command
+from walkerlab.views.cli.command import command
+from walkerlab.views.cli.request import OF_TALK, Request
 from walkerlab.views.figures.style import EXPORT_DPI
 
 RunArgument = Annotated[

@@ -17,7 +17,8 @@ from walkerlab.pipeline.plan.stage import STRIDES, Stage
 from walkerlab.pipeline.run.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
 from walkerlab.views.cli import runs as whole_runs
-from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command
+from walkerlab.views.cli.command import command
+from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request
 
 
 def main() -> None:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.views.cli.command import command
 from walkerlab.views.cli.failures import print_result
-from walkerlab.views.cli.request import Request, command
+from walkerlab.views.cli.request import Request
 
 if TYPE_CHECKING:
     from walkerlab.pipeline.headlines import Pair, RunDifference

@@ -1,10 +1,9 @@
 """A stage's command: run the stage or show what would be computed, then print the result."""
 
 import shlex
-from dataclasses import replace
 
 from walkerlab.config.walkers import why_rigid_alone
-from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.errors import ConfigError
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.run.executor import short_reason
@@ -14,8 +13,6 @@ from walkerlab.views.cli.request import Request
 from walkerlab.views.report.answers import answer, further_tables, verdict
 from walkerlab.views.report.tables import aligned
 
-SEARCHING = ("fixedpoint", "report")
-"""Stages whose advice suggests nearby gaits if the config has none."""
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
@@ -31,27 +28,14 @@ def report_on(request: Request, stage: Stage, graph: Graph) -> None:
     """Run a stage as requested and print its result; a ConfigError does not give the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     report = run_and_write(request.resolved_run, stage.name, options, None if options.dry else request.console, graph)
+    value, error = report.as_json(), report.no_answer
     if options.dry:
-        print_result(request, report.as_json() | {"dry_run": True}, plan_lines(report))
-        return
-    report = with_nearby_gaits(report, request)
-    lines = report_lines(request, report)
-    if request.open_page and "html" in report.summary and not request.console.shown:
-        request.console.show(report.run_dir / str(report.summary["html"]))
-    print_result(request, report.as_json(), lines, report.no_answer)
-
-
-def with_nearby_gaits(report: StageReport, request: Request) -> StageReport:
-    """Begin the advice with suggestions of nearby gaits if no gait was found."""
-    error = report.no_answer
-    if error is None or report.stage not in SEARCHING or "no gait" not in error.message:
-        return report
-    # Imported here: most commands find a gait.
-    from walkerlab.scene.gait_suggestions import suggest_gaits
-
-    typed = request.typed_for("fixedpoint")
-    suggestions = suggest_gaits(request.resolved, typed)
-    return replace(report, no_answer=NoAnswer(error.message, f"{suggestions} {error.advice}".strip()))
+        value, error, lines = value | {"dry_run": True}, None, plan_lines(report)
+    else:
+        lines = report_lines(request, report)
+        if request.open_page and "html" in report.summary and not request.console.shown:
+            request.console.show(report.run_dir / str(report.summary["html"]))
+    print_result(request, value, lines, error)
 
 
 def report_lines(request: Request, report: StageReport) -> list[str]:

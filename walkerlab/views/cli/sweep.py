@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.views.cli.command import command
 from walkerlab.views.cli.failures import print_result
-from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, command, option
+from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, option
 from walkerlab.views.report.text import paragraph
 
 if TYPE_CHECKING:

@@ -59,5 +59,5 @@ def installed() -> tuple[Engine, ...]:
     return tuple(engine for engine in PHYSICS_ENGINES.values() if engine.is_installed)
 
 
-def installed_versions() -> dict[str, str]:
+def installed_versions(_config: object = None) -> dict[str, str]:
     return {engine.name: engine.version for engine in installed()}
