@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import f as fisher
 
-from walkerlab.api import in_memory
+from walkerlab.api.memory import in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome

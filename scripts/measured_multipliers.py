@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from walkerlab.api import in_memory
+from walkerlab.api.memory import in_memory
 from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.orbits.family_search import RIGID

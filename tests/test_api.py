@@ -6,6 +6,7 @@ import doctest
 import inspect
 import itertools
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,11 +22,33 @@ from walkerlab.config.loader import load
 from walkerlab.config.walkers import CompassWalker, Kneed
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 
+OFFERED = {name: getattr(api, name) for name in api.__all__}
+DESCRIBED = [name for name, offer in OFFERED.items() if offer.__module__.startswith("walkerlab.api")]
 
-def test_docstring_examples_show_the_actual_output(tmp_path):
-    found = doctest.testmod(api, extraglobs={"folder": tmp_path})
-    assert found.attempted > 10
+
+@pytest.mark.parametrize("module", ["memory", "models", "results", "runs"])
+def test_docstring_examples_show_the_actual_output(module, tmp_path):
+    names = {**OFFERED, "folder": tmp_path}
+    found = doctest.testmod(sys.modules[f"walkerlab.api.{module}"], extraglobs=names)
+    assert found.attempted > 5
     assert found.failed == 0
+
+
+@pytest.mark.parametrize("name", DESCRIBED)
+def test_public_names_describe_arguments_and_show_an_example(name):
+    text = OFFERED[name].__doc__
+    assert "\n    >>> " in text or "\n>>> " in inspect.cleandoc(text)
+    if inspect.isfunction(OFFERED[name]):
+        code = OFFERED[name].__code__
+        arguments = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+        assert [each for each in arguments if not re.search(rf"^ *{each}  +\S", text, re.MULTILINE)] == []
+        assert {"Returns", "Raises"} <= {*text.split()}
+
+
+def test_python_interface_names_its_types():
+    texts = [path.read_text() for path in Path(api.__file__).parent.glob("*.py")]
+    assert len(texts) > 3
+    assert not any(re.search(r"\bAny\b", text) for text in texts)
 
 
 def test_every_public_name_exists_and_has_a_docstring():
@@ -38,8 +61,9 @@ def test_every_public_name_exists_and_has_a_docstring():
 
 def test_type_stub_lists_the_same_names():
     stub = ast.parse((Path(walkerlab.__file__).parent / "__init__.pyi").read_text())
-    imported = [one.name for node in stub.body if isinstance(node, ast.ImportFrom) for one in node.names]
-    assert sorted(imported) == sorted(walkerlab.__all__)
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    assert [(node.module, node.names[0].name) for node in imports] == [("walkerlab.api", "*")]
+    assert walkerlab.__all__ == api.__all__
 
 
 def test_importing_the_package_loads_nothing():
@@ -142,7 +166,7 @@ def test_arguments_that_are_not_a_config_are_rejected(asked, message):
 
 def test_omitted_arguments_default_to_the_built_in_config(monkeypatch):
     asked = []
-    monkeypatch.setattr(api, "in_memory", lambda stage, config: asked.append(config))
+    monkeypatch.setattr("walkerlab.api.memory.in_memory", lambda stage, config: asked.append(config))
     walkerlab.find_gait()
     walkerlab.simulate()
     walkerlab.continue_gait()
@@ -303,7 +327,7 @@ def test_measurement_plan_runs_in_memory():
 )
 def test_walker_and_ground_signatures_list_every_key(maker, block):
     signature = inspect.signature(maker)
-    assert set(signature.parameters) == {*block.model_fields, "others"} - {"type"}
+    assert set(signature.parameters) == {*block.model_fields} - {"type"}
     assert signature.return_annotation is block
     assert isinstance(maker(), block)
 

@@ -1,7 +1,6 @@
 """Passive-dynamic walking as a reproducible experiment; see README.md, and docs/python.md for use from Python.
 
-Names in `__all__` are imported on first access, so importing the package takes no time. `__init__.pyi` lists the same
-names for type checkers.
+Names that `walkerlab.api` lists are imported on first access, so importing the package takes no time.
 """
 
 from typing import Any
@@ -18,47 +17,21 @@ EXTENSIONS = {
 }
 """The package's own extensions (see extensions.py), in the order of their stages. Other packages announce theirs."""
 
-__all__ = [
-    "Config",
-    "ConfigError",
-    "Gait",
-    "Result",
-    "Run",
-    "basin",
-    "compass",
-    "contact",
-    "continue_gait",
-    "dataset",
-    "design",
-    "explore",
-    "export_model",
-    "find_gait",
-    "identify",
-    "kneed",
-    "mujoco_model",
-    "open_run",
-    "plan_measurements",
-    "read_walk",
-    "robustness",
-    "run",
-    "simulate",
-    "sweep",
-    "walker",
-]
-
 
 def __getattr__(name: str) -> Any:
-    """Load an exported name on first access."""
-    if name not in __all__:
+    """Load an exported name, or the list of all of them, on first access."""
+    if name.startswith("_") and name != "__all__":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     # An import statement would put the API, which no stage needs, into the code digest of every stage.
     from importlib import import_module
 
-    value = getattr(import_module(".api", __name__), name)
-    globals()[name] = value
+    api = import_module(".api", __name__)
+    if name not in (*api.__all__, "__all__"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(api, name)
     return value
 
 
 def __dir__() -> list[str]:
     """Return all names of the package, including exports that are not loaded yet."""
-    return sorted([*globals(), *__all__])
+    return sorted([*globals(), *__getattr__("__all__")])

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from adams_dataset import Dataset
 
-from walkerlab.api import in_memory
+from walkerlab.api.memory import in_memory
 from walkerlab.config.loader import load
 from walkerlab.exchange.export import export_model, with_stops
 from walkerlab.exchange.exported import prepare_export

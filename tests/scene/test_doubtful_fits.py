@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from measured_plain_walk import measure_angles, measure_steps
 
-from walkerlab.api import in_memory
+from walkerlab.api.memory import in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.fit import SETTLED_MOVE

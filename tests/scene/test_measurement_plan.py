@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.api import in_memory
+from walkerlab.api.memory import in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.config.plan import Plan

@@ -44,11 +44,11 @@ def test_unknown_quantity_is_rejected_before_anything_is_computed(option):
 
 
 def test_zip_pairs_values():
-    pairs = question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10, 15]", zip=True)
+    pairs = question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10, 15]", zipped=True)
     assert [pairs.places(index) for index in range(len(pairs))] == [(0, 0), (1, 1), (2, 2)]
     assert pairs.dims == ("point",)
     with pytest.raises(ConfigError, match=r"different numbers of values: slope_deg 3, walker\.hip_mass_kg 2"):
-        question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10]", zip=True)
+        question("slope_deg=1:3:3", "walker.hip_mass_kg=[5, 10]", zipped=True)
 
 
 @pytest.mark.parametrize("sampler", ["latin-hypercube", "sobol", "random"])

@@ -103,11 +103,12 @@ def distinct_ends(keys: Sequence[str]) -> tuple[str, ...]:
 
 
 def build_sweep(
-    stage: str, over: Sequence[tuple[str, Any, str]], zip: bool = False, sample: str = "", seed: int = 1
+    stage: str, over: Sequence[tuple[str, Any, str]], zipped: bool = False, sample: str = "", seed: int = 1
 ) -> SweptStage:
     """Build a sweep from command-line options or a `sweep` block.
 
     over    key of each parameter, its values (a list, or FROM:TO:N) and their origin
+    zipped  whether the n-th values form the n-th point, instead of the full grid
     sample  such as latin-hypercube:500; empty to use the values themselves
 
     Raises ConfigError for invalid options.
@@ -115,7 +116,7 @@ def build_sweep(
     axes: tuple[Axis, ...] = ()
     for key, values, source in over:
         axes = (*axes, axis(key, values, source))
-        if not (zip or sample):  # checked before the next parameter's values are created
+        if not (zipped or sample):  # checked before the next parameter's values are created
             refuse_too_many("sweep", math.prod(max(1, len(parameter.values)) for parameter in axes))
     keys = [parameter.key for parameter in axes]
     repeated = {key for key in keys if keys.count(key) > 1}
@@ -127,10 +128,10 @@ def build_sweep(
     for parameter in axes:
         if not parameter.values:
             raise bad(parameter.source, f"{parameter.key}: the number of values is missing", FORMS)
-    if zip and len({len(parameter.values) for parameter in axes}) > 1:
+    if zipped and len({len(parameter.values) for parameter in axes}) > 1:
         lengths = ", ".join(f"{parameter.key} {len(parameter.values)}" for parameter in axes)
         raise problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
-    return SweptStage(stage, axes, "list" if zip else "grid")
+    return SweptStage(stage, axes, "list" if zipped else "grid")
 
 
 def refuse_too_many(what: str, count: int) -> None:

@@ -146,17 +146,6 @@ class SweepRun:
             raise ConfigError("\n".join(problems.values()), "Nothing was run; leave these values out.")
         return keys
 
-    def unread(self) -> Iterator[str]:
-        """Iterate over swept parameters that neither the stage nor its inputs read."""
-        base = self.keys.of(self.config(0), self.question.stage)
-        for number, axis in enumerate(self.question.axes):
-            settings = self.question.settings(0)
-            settings[number] = axis.setting(len(axis.values) - 1)
-            if axis.values[-1] != axis.values[0]:
-                with contextlib.suppress(ConfigError):  # this combination of values may be invalid
-                    if self.keys.of(self.loaded.variant(settings), self.question.stage) == base:
-                        yield axis.key
-
     def foresee(self, workers: int, max_points: int) -> Foreseen:
         """Return the plan without changing a file; raises ConfigError if the folder holds results of another config."""
         refuse_another_config(self.folder, self.loaded.config)
@@ -181,7 +170,7 @@ class SweepRun:
         StorageError, and NoAnswer if workers keep dying.
         """
         started, count, reporter = time.perf_counter(), len(self.question), reporter or Silent()
-        for key in self.unread():
+        for key in unread_keys(self):
             reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it are equal")
         make_folder(self.folder.path)
         with self.folder.locked(work.wait, reporter.note):
@@ -258,6 +247,19 @@ class SweepRun:
             yield WorkUnit(
                 key, 1, partial(compute_point, config, key, graph, stage, index in sample, forced, versions())
             )
+
+
+def unread_keys(run: SweepRun) -> Iterator[str]:
+    """Iterate over swept parameters that neither the stage nor its inputs read."""
+    question = run.question
+    base = run.keys.of(run.config(0), question.stage)
+    for number, axis in enumerate(question.axes):
+        settings = question.settings(0)
+        settings[number] = axis.setting(len(axis.values) - 1)
+        if axis.values[-1] != axis.values[0]:
+            with contextlib.suppress(ConfigError):  # this combination of values may be invalid
+                if run.keys.of(run.loaded.variant(settings), question.stage) == base:
+                    yield axis.key
 
 
 def refuse_unknown_stage(name: str, graph: Graph) -> None:

@@ -1,0 +1,490 @@
+"""Walkers and grounds built in Python, and stages that are computed in memory, without files."""
+
+import inspect
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, ParamSpec, TypedDict, TypeVar, Unpack, cast
+
+import numpy as np
+
+from walkerlab.api.results import Gait, Result, Setting, result_of
+from walkerlab.api.runs import RUNS, check_stage, folder_of, warn
+from walkerlab.config.contact import Contact
+from walkerlab.config.fields import Block, block_of, kinds_of
+from walkerlab.config.files import DEFAULT, builtin_config, read_layers
+from walkerlab.config.layers import merge_layers
+from walkerlab.config.loader import suspicious_values
+from walkerlab.config.overlay import tree_of
+from walkerlab.config.schema import Config
+from walkerlab.config.tree import NOWHERE
+from walkerlab.config.validation import align_start, validate_tree
+from walkerlab.config.walkers import CompassWalker, Kneed, Walker
+from walkerlab.errors import ConfigError
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.resolve import resolve
+from walkerlab.pipeline.plan.results import MemoryResults
+from walkerlab.pipeline.run.executor import answer_in_memory
+from walkerlab.pipeline.store.artifact import Identified
+from walkerlab.pipeline.store.csv_text import csv_text
+
+if TYPE_CHECKING:
+    from walkerlab.views.explore.server import Server
+
+MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
+    "walker": (
+        tuple(kinds_of(Config.model_fields["walker"]).values()),
+        "walkerlab.compass(), kneed() and walker(type) make one.",
+    ),
+    "contact": ((Contact,), "walkerlab.contact() makes one."),
+}
+"""Allowed types of arguments that are config blocks, and advice on how to build a block."""
+
+KEYWORD = inspect.Parameter.KEYWORD_ONLY
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class CompassKeys(TypedDict, total=False):
+    """Keys of a compass walker; `walkerlab schema walker` has their defaults and bounds."""
+
+    leg_length_m: float
+    foot_to_mass_m: float
+    leg_mass_kg: float
+    hip_mass_kg: float
+    leg_inertia_kg_m2: float
+    foot_radius_m: float
+    torso: Mapping[str, Setting]
+    hip: Mapping[str, Setting]
+
+
+class KneedKeys(TypedDict, total=False):
+    """Keys of a walker with knees; `walkerlab schema walker` has their defaults and bounds."""
+
+    thigh: Mapping[str, Setting]
+    shank: Mapping[str, Setting]
+    hip_mass_kg: float
+    foot_radius_m: float
+    foot_centre_ahead_m: float
+    knee: Mapping[str, Setting]
+    torso: Mapping[str, Setting]
+    hip: Mapping[str, Setting]
+
+
+class ContactKeys(TypedDict, total=False):
+    """Keys of the contact model's ground; `walkerlab schema contact` has their defaults and bounds."""
+
+    units: Literal["adams", "si"]
+    stiffness: float
+    exponent: float
+    damping: float
+    full_damping_penetration: float
+    friction: str
+    static_friction: float
+    dynamic_friction: float
+    stiction_velocity: float
+    friction_velocity: float
+    terrain: Literal["checkerboard", "after-mid-swing", "plane"]
+    pad_pitch: float | Literal["rigid", "own"]
+    stance: Literal["free", "pinned"]
+
+
+def shows(keys: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return a decorator that shows the names of a TypedDict as parameters, so that notebooks complete them."""
+
+    def with_signature(function: Callable[P, R]) -> Callable[P, R]:
+        named = [inspect.Parameter(key, KEYWORD, default=None) for key in keys.__annotations__]
+        vars(function)["__signature__"] = inspect.signature(function).replace(parameters=named)
+        return function
+
+    return with_signature
+
+
+def passed(keys: Mapping[str, object]) -> dict[str, Setting]:
+    """Return the keys that a caller passed; None leaves a key at its default."""
+    return {name: cast(Setting, value) for name, value in keys.items() if value is not None}
+
+
+def walker(type: Literal["compass", "straight-legs", "kneed", "parts"], **keys: Setting) -> Walker:
+    """Build the config block of a walker.
+
+    type  type of the walker
+    keys  keys of the config's block `walker`, in the units that their names end in; omitted ones have their defaults
+
+    Returns the block, an argument of the functions below. Raises ConfigError for a key or value that the type does not
+    allow.
+
+    >>> walker("straight-legs", foot_radius_m=0.3).leg_length_m
+    0.4
+    """
+    return validate_tree(tree_of({"walker": {"type": type, **keys}}, NOWHERE)).walker
+
+
+@shows(CompassKeys)
+def compass(**keys: Unpack[CompassKeys]) -> CompassWalker:
+    """Build a compass walker: two straight legs with a mass on each, and a mass at the hip; by default the paper's.
+
+    keys  keys of the config's block `walker`, in m, kg and kg m^2; see docs/config.md
+
+    Returns the block, an argument of the functions below. Raises ConfigError for other keys and for values that are not
+    allowed.
+
+    >>> compass(hip_mass_kg=20).total_mass_kg
+    30.0
+    """
+    return cast(CompassWalker, walker("compass", **passed(keys)))
+
+
+@shows(KneedKeys)
+def kneed(**keys: Unpack[KneedKeys]) -> Kneed:
+    """Build a walker with knees that lock; by default Hsu Chen's walker.
+
+    keys  keys of the config's block `walker`, in m, kg and kg m^2; see docs/config.md
+
+    Returns the block, an argument of the functions below. Raises ConfigError for other keys and for values that are not
+    allowed.
+
+    >>> kneed(hip_mass_kg=1.0).total_mass_kg
+    2.1
+    """
+    return cast(Kneed, walker("kneed", **passed(keys)))
+
+
+@shows(ContactKeys)
+def contact(**keys: Unpack[ContactKeys]) -> Contact:
+    """Build the ground of the contact model.
+
+    keys  keys of the config's block `contact`, in N, mm, s as in ADAMS dialogs, unless `units="si"`; see docs/config.md
+
+    Returns the block, an argument of `simulate` and `explore`. Raises ConfigError for other keys and for values that
+    are not allowed.
+
+    >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
+    100000.0
+    """
+    block = validate_tree(tree_of({"contact": passed(keys)}, NOWHERE)).contact
+    assert block is not None, "a block set by an argument is in the config"
+    return block
+
+
+def find_gait(walker: Walker | None = None, slope_deg: float | None = None, **keys: Setting) -> Gait:
+    """Find the periodic gaits of a walker on a slope, in memory.
+
+    Here and in the functions below, omitted arguments have the values of the built-in `paper` config.
+
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    keys       other config keys, such as gravity_m_s2, equations, seed
+
+    Returns a result whose `summary` has the chosen gait, and whose arrays have all gaits, one a row; `no_answer` says
+    why there is none. Raises ConfigError for values that are not allowed.
+
+    >>> gait = find_gait(compass(hip_mass_kg=10), slope_deg=3)
+    >>> gait.stable, round(gait.period_s, 4)
+    (True, 0.7343)
+    """
+    return cast(Gait, in_memory("fixedpoint", config_of_scene(walker, {"slope_deg": slope_deg}, keys)))
+
+
+def simulate(
+    walker: Walker | None = None,
+    slope_deg: float | None = None,
+    contact: Contact | None = None,
+    strides: int | None = None,
+    **keys: Setting,
+) -> Result:
+    """Simulate a walk in memory; it starts on the gait unless `start` is passed.
+
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    contact    ground of the contact model, built by `contact`; None simulates the rigid model
+    strides    number of strides to walk, two steps each
+    keys       other config keys, such as start, gravity_m_s2, solver
+
+    Returns a result with the outcome, one row for each step, and one for each sample of the trajectory. Raises
+    ConfigError for values that are not allowed.
+
+    >>> walk = simulate(slope_deg=1, strides=2)
+    >>> walk.outcome, walk.steps
+    ('walked', 4)
+    >>> walk.dataset("trajectory").angle.dims
+    ('time', 'leg')
+    """
+    values = {"slope_deg": slope_deg, "contact": contact, "strides": strides}
+    config = config_of_scene(walker, values, keys)
+    return in_memory("simulate" if contact is None else "contact-sim", config)
+
+
+def continue_gait(
+    walker: Walker | None = None,
+    over: str | None = None,
+    span: tuple[float, float] | None = None,
+    slope_deg: float | None = None,
+    **keys: Setting,
+) -> Result:
+    """Follow families of gaits over a config parameter, in memory.
+
+    walker     built by `compass`, `kneed` or `walker`
+    over       config key to vary
+    span       first and last value, in the key's unit
+    slope_deg  slope in deg, positive downhill, if `over` is another key
+    keys       other keys of the block `continuation`, such as model, or of the config, such as contact, seed
+
+    Returns a result whose `summary` has the branches and bifurcations, and whose arrays have a row for each point of a
+    branch. Raises ConfigError for values that are not allowed.
+
+    >>> families = continue_gait(over="slope_deg", span=(3, 5), periods=1)
+    >>> [row["kind"] for row in families.bifurcations]
+    ['flip']
+    """
+    ends = {} if span is None else dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
+    values = {"slope_deg": slope_deg, **stage_block("continuation", keys, over=over, **ends)}
+    return in_memory("continuation", config_of_scene(walker, values, keys))
+
+
+def basin(
+    walker: Walker | None = None, slope_deg: float | None = None, cells: tuple[int, int] | None = None, **keys: Setting
+) -> Result:
+    """Find which starts lead to which attractor, in memory.
+
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    cells      number of cells of the grid of starts, along each of its two axes
+    keys       other keys of the block `basin`, such as model, or of the config, such as seed
+
+    Returns a result whose `summary` has the share of starts that walk on, and whose arrays have the outcome of each
+    cell. Raises ConfigError for values that are not allowed.
+
+    >>> basin(cells=(6, 4)).dataset("basin").outcome.shape
+    (6, 4)
+    """
+    values = {"slope_deg": slope_deg, **stage_block("basin", keys, cells=cells)}
+    return in_memory("basin", config_of_scene(walker, values, keys))
+
+
+def robustness(
+    walker: Walker | None = None,
+    slope_deg: float | None = None,
+    to: Sequence[str] = (),
+    walks: int | None = None,
+    **keys: Setting,
+) -> Result:
+    """Find the largest disturbances that a gait survives and the parameter that matters most, in memory.
+
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    to         parameters with respect to which the gait is differentiated; by default all that the model reads
+    walks      number of walks on each rough ground
+    keys       other keys of the block `robustness`, such as model, steps, roughness_m, or of the config
+
+    Returns a result whose `summary` has the largest steps up and down (m), the largest pushes (N s) and the
+    sensitivities. Raises ConfigError for values that are not allowed.
+
+    >>> limits = robustness(slope_deg=3, to=["slope_deg"], model="rigid", roughness_m=[])
+    >>> limits.largest_step[0]["down_m"] > 0.001
+    True
+    """
+    values = {"slope_deg": slope_deg, **stage_block("robustness", keys, to=to or None, walks=walks)}
+    return in_memory("robustness", config_of_scene(walker, values, keys))
+
+
+def design(walker: Walker | None = None, over: Mapping[str, Setting] | None = None, **keys: Setting) -> Result:
+    """Find, in memory, the walker with the smallest or largest gait quantity.
+
+    walker  built by `compass`, `kneed` or `walker`
+    over    bounds (low, high) of the parameters to vary, in the key's unit
+    keys    minimise or maximise, keep (bounds of other gait quantities), model, starts; other config keys
+
+    Returns a result whose `summary` has the best values by key, and the quantity before and after. Raises ConfigError
+    for values that are not allowed.
+
+    >>> best = design(over={"slope_deg": (2, 3)}, maximise="speed_m_s", starts=1, slope_deg=2.5)
+    >>> best.best
+    {'slope_deg': 3.0}
+    """
+    return in_memory("design", config_of_scene(walker, stage_block("design", keys, over=over or {}), keys))
+
+
+def read_walk(
+    path: str | Path,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    walker: Walker | None = None,
+    slope_deg: float | None = None,
+    walks: str | None = None,
+    **keys: Setting,
+) -> Result:
+    """Read a walk from a file, in memory.
+
+    path       CSV, table or results (.res) of ADAMS, OpenSim (.mot, .sto), markers (.trc, .c3d), or a stored walk (.h5)
+    columns    column of each quantity that the header does not identify, such as {"angle 1": "hip_r"}
+    units      units by kind, quantity or column, if the file does not state them, such as {"angle": "deg"}
+    walker     walker that made the recording, built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    walks      direction of a walk of markers, as the recording sees it: left, right, away or towards
+    keys       other config keys
+
+    Returns a result whose `summary` has the steps, and whose arrays have a row for each step and each sample. Raises
+    ConfigError for a file without a walk.
+
+    >>> stored = run("simulate", runs=folder, strides=2)
+    >>> read_walk(stored.artifact).steps
+    4
+    """
+    recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {}), "walks": walks}
+    values = {"slope_deg": slope_deg, "recording": recording}
+    return in_memory("recorded-walk", config_of_scene(walker, values, keys))
+
+
+def identify(
+    walk: str | Path | Mapping[str, Sequence[float]],
+    config: str | Path | Config = DEFAULT,
+    fit: Sequence[str] | Mapping[str, Sequence[float] | None] = (),
+    prior: Mapping[str, Sequence[float]] | None = None,
+    **keys: Setting,
+) -> Result:
+    """Estimate, in memory, a walker's parameters from a measured walk.
+
+    walk    file, or columns by name: period_s and optionally length_m of each step (steps,), or time, angle 1 and
+            angle 2 (samples,)
+    config  known properties of the walker: a Config, a config file or built-in name, or a run
+    fit     keys to estimate, or a mapping of each key to its bounds, in the key's unit
+    prior   known value and standard deviation, by key
+    keys    other keys of the block `identify`, such as level, model, nuisance
+
+    Returns a result whose `summary["estimates"]` has one row for each parameter; if the fit does not converge,
+    `no_answer` has the reason. Raises ConfigError for invalid arguments or files.
+
+    >>> walk = simulate(slope_deg=3, strides=4, start=[None, 0.225, -0.37, -1.1])
+    >>> found = identify({"period_s": walk.step_periods_s}, "slope-3deg", ["slope_deg"], level="steps")
+    >>> round(found.estimates[0]["value"], 2)
+    3.0
+    """
+    if isinstance(walk, Mapping):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "walk.csv"
+            path.write_bytes(csv_text(list(walk), zip(*walk.values(), strict=True)))
+            return identify(path, config, fit, prior, **keys)
+    bounds = dict(fit) if isinstance(fit, Mapping) else dict.fromkeys(fit)
+    block: dict[str, Setting] = {**keys, "data": str(walk), "fit": bounds, "prior": dict(prior or {})}
+    return in_memory("identify", with_blocks(config, identify=block))
+
+
+def plan_measurements(
+    config: str | Path | Config = DEFAULT,
+    fit: Sequence[str] = (),
+    prior: Mapping[str, Sequence[float]] | None = None,
+    model: str = "rigid",
+    **keys: Setting,
+) -> Result:
+    """Find, in memory, which measurements would determine a walker's parameters.
+
+    config  known properties of the walker: a Config, a config file or built-in name, or a run
+    fit     keys to estimate
+    prior   known value and standard deviation, by key
+    model   rigid or contact
+    keys    keys of the block `plan`, such as steps, max_steps, errors, period_noise_s
+
+    Returns a result whose `summary["measurements"]` has the expected standard errors of each way to measure; if the
+    walk ends too early, `no_answer` has the reason. Raises ConfigError for invalid arguments.
+
+    >>> plan = plan_measurements("slope-3deg", ["slope_deg"], steps=4, max_steps=4)
+    >>> plan.measurements[3]["measurement"]
+    'angles over time'
+    """
+    question: dict[str, Setting] = {"fit": dict.fromkeys(fit), "prior": dict(prior or {}), "model": model}
+    return in_memory("plan", with_blocks(config, identify=question, plan=keys))
+
+
+def explore(
+    walker: Walker | None = None,
+    slope_deg: float | None = None,
+    contact: Contact | None = None,
+    runs: str | Path = RUNS,
+    **keys: Setting,
+) -> "Server":
+    """Serve the page of `walkerlab explore`, for a notebook.
+
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    contact    ground of the contact model, built by `contact`; None shows only the rigid model
+    runs       folder that holds all runs, for reports and films made from the page
+    keys       other config keys
+
+    Returns the server: its `url` opens in a browser, and `close()` stops it. Raises ConfigError for values that are not
+    allowed.
+
+    >>> page = explore(slope_deg=1)
+    >>> page.url[:17]
+    'http://127.0.0.1:'
+    >>> page.close()
+    """
+    from walkerlab.views.explore.server import Server
+    from walkerlab.views.explore.walks import ExploredConfig, sets_of
+
+    config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": contact}, keys)
+    server = Server(0, ExploredConfig(None, sets_of(config), folder_of(runs), {}, called="your walker"))
+    server.begin()
+    return server
+
+
+def in_memory(stage: str, config: Config) -> Result:
+    """Compute a stage and its inputs without files; ConfigError if the config lacks a block that the stage needs."""
+    check_stage(stage)
+    PIPELINE[stage].refuse_question(config)
+    memory = MemoryResults()
+    answer = answer_in_memory(config, stage, memory)
+    identity = memory.keys.identity(PIPELINE[stage], config, {})
+    content = Identified(answer.groups, answer.summary, answer.timed, complete=answer.complete, identity=identity)
+    return result_of(stage, answer.findings, content, answer.no_answer)
+
+
+def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: Mapping[str, Setting]) -> Config:
+    """Build the paper config with another scene; it has a contact block only if one is passed.
+
+    walker  walker block; None keeps the paper's
+    values  values and blocks by key; None keeps the paper's value
+    keys    further keys
+
+    Raises ConfigError for unknown keys and invalid values.
+    """
+    scene = {key: value for key, value in {"walker": walker, **values}.items() if value is not None}
+    for name in scene.keys() & MADE_HERE.keys():
+        kinds, makers = MADE_HERE[name]
+        if not isinstance(scene[name], kinds):
+            raise ConfigError(f"{name}: {scene[name]!r} is not a {name} block.", makers)
+    lines = {key: plain(value) for key, value in {"name": "memory", **keys, **scene}.items()}
+    replaced = {"source", "contact", *({"walker"} & lines.keys())}
+    upper = tree_of(lines, NOWHERE)
+    tree = merge_layers([*(layer.without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
+    config, moved = align_start(validate_tree(tree), tree)
+    warn([*suspicious_values(config, tree), *moved], inside=1)
+    return config
+
+
+def with_blocks(config: str | Path | Config, **blocks: Setting) -> Config:
+    """Return a config with some blocks replaced; `config` may also be a file, a built-in name or a run."""
+    start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
+    tree = {**start.model_dump(mode="json", exclude_none=True, by_alias=True), **blocks}
+    return validate_tree(tree_of(tree, NOWHERE))
+
+
+def stage_block(stage: str, keys: dict[str, Setting], **values: Setting) -> dict[str, Setting]:
+    """Take the keys of a stage's block out of `keys`; return the block with them and `values`, by its name."""
+    block = block_of(Config.model_fields[stage])
+    assert block is not None, "a stage with a question has a block"
+    own = {name: keys.pop(name) for name in block.model_fields if name in keys}
+    entries = {name: value for name, value in {**own, **values}.items() if value is not None}
+    return {stage: entries or None}
+
+
+def plain(value: Setting) -> Setting:
+    if isinstance(value, Block):
+        return value.model_dump(mode="json")
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def two_numbers(name: str, values: Setting) -> Sequence[Setting]:
+    if not isinstance(values, Sequence) or len(values) != 2:
+        raise ConfigError(f"{name}: {values!r} is not a pair of numbers.", f"For example {name}=(0.001, 0.09).")
+    return values

@@ -1,0 +1,117 @@
+"""Walkers as models for other programs, at the start of their gait."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from walkerlab.api.memory import config_of_scene, in_memory, plain, with_blocks
+from walkerlab.api.results import Setting
+from walkerlab.api.runs import Run
+from walkerlab.config.contact import Contact
+from walkerlab.config.files import DEFAULT
+from walkerlab.config.schema import Config
+from walkerlab.config.walkers import Walker
+from walkerlab.errors import ConfigError, NoAnswer
+
+if TYPE_CHECKING:
+    from mujoco import MjData, MjModel
+
+    from walkerlab.exchange.export import Kind
+
+if TYPE_CHECKING:
+    pass
+
+
+def export_model(
+    path: str | Path,
+    walker: Walker | None = None,
+    slope_deg: float | None = None,
+    contact: Contact | None = None,
+    law: str = "contact",
+    slope: str = "gravity",
+    **keys: Setting,
+) -> tuple[Path, ...]:
+    """Write a walker, started on its gait, as a model for ADAMS (.adm, .cmd) or MuJoCo (.xml).
+
+    path       file of the model; commands (.acf) for an .adm model, or the script of a driven or kneed walker, are
+               written next to it
+    walker     built by `compass`, `kneed` or `walker`
+    slope_deg  slope in deg, positive downhill
+    contact    ground of the contact model, built by `contact`; by default the paper's, on pads
+    law        contact force in ADAMS: `contact` for ADAMS's, `functions` for exactly walkerlab's
+    slope      what is tilted in MuJoCo: `gravity`, or `geometry` for the ground and the walker on it
+    keys       other config keys, such as start, strides, push_off
+
+    Returns all files. Raises ConfigError for an unknown format or a walker that the format cannot express, NoAnswer if
+    no gait is found.
+
+    >>> [path.name for path in export_model(folder / "compass.adm", slope_deg=1)]
+    ['compass.adm', 'compass.acf']
+    """
+    from walkerlab.exchange import export
+    from walkerlab.pipeline.store.files import write_through
+
+    path = Path(path)
+    kind = export.ENDINGS.get(path.suffix.removeprefix("."))
+    if kind is None:
+        raise ConfigError(
+            f"{path}: not a model.", f"Choose a file name that ends in one of .{', .'.join(export.ENDINGS)}."
+        )
+    ground = contact or Contact(terrain="checkerboard")
+    config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": ground}, keys)
+    texts = _export_texts(config, kind, law, slope, path.stem)
+    for name, text in texts.items():
+        write_through(path.with_name(name), text.encode())
+    return tuple(path.with_name(name) for name in texts)
+
+
+def mujoco_model(
+    config: str | Path | Config | Run = DEFAULT, slope: str = "gravity", **blocks: Setting
+) -> "tuple[MjModel, MjData]":
+    """Build a walker as a MuJoCo model with data at the start of its gait; plain `mujoco.mj_step` makes it walk.
+
+    Drives and knees are a control callback, which MuJoCo calls in each step. Callbacks are global: this model walks
+    until the next call, and `mujoco.set_mjcb_control(None)` must come before another model is compiled.
+
+    config  a Config, a config file or built-in name, or a run
+    slope   what is tilted: `gravity`, or `geometry` for the ground and the walker on it
+    blocks  other keys of the config, such as walker, contact, push_off
+
+    Returns the model and its data. Raises ConfigError if MuJoCo is not installed or cannot express the walker, NoAnswer
+    if no gait is found.
+
+    >>> model, data = mujoco_model("kneed")
+    >>> import mujoco
+    >>> mujoco.mj_step(model, data, 10_000)
+    >>> print(f"{data.time:.2f} s, {data.qpos[0]:.2f} m")
+    0.10 s, -0.15 m
+    >>> mujoco.set_mjcb_control(None)
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ConfigError("a MuJoCo model needs MuJoCo, which is not installed.", "pip install mujoco") from error
+    from walkerlab.exchange.mujoco_script import Walk
+
+    start = config.config if isinstance(config, Run) else config
+    scene = with_blocks(start, **{name: plain(value) for name, value in blocks.items()})
+    text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None).values()))
+    mujoco.set_mjcb_control(None)
+    walk = Walk(mujoco.MjModel.from_xml_string(text))
+    return walk.model, walk.data
+
+
+def _export_texts(config: Config, kind: "Kind", law: str, slope: str, stem: str | None) -> dict[str, str]:
+    """Return the files of a model, by name, after finding its gait."""
+    from walkerlab.exchange import export
+    from walkerlab.pipeline.stages.walk import rigid_start
+    from walkerlab.pipeline.store.provenance import git_commit
+
+    inputs = {}
+    if config.start == "fixed-point":
+        gait = in_memory("fixedpoint", config)
+        if gait.no_answer is not None:
+            raise NoAnswer(gait.no_answer)
+        inputs["fixedpoint"] = gait.content
+    adams_law, tilted = export.law_named(law), export.slope_named(slope)
+    start = rigid_start(config, inputs)
+    return export.export_model(config, *start, kind, adams_law, git_commit(), stem, tilted).files
