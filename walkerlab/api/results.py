@@ -119,7 +119,7 @@ class Result:
 
     @property
     def advice(self) -> str:
-        """What to try if there is no answer; empty if there is one.
+        """Advice if there is no answer; empty otherwise.
 
         >>> find_gait(slope_deg=-1).advice.partition(",")[0]
         'Let the slope descend in walking direction (slope_deg above 0)'

@@ -1,4 +1,4 @@
-"""What runs hold: which of their results are up to date, and commands that compute the others."""
+"""Survey runs: which of their results are up to date, and which commands compute the others."""
 
 import contextlib
 import datetime
