@@ -72,7 +72,7 @@ class Run:
     @property
     def stages(self) -> tuple[str, ...]:
         """Stages with a stored result."""
-        return tuple(stage.name for stage in PIPELINE.stages if self.folder.artifact(stage.name).is_file())
+        return tuple(name for name in PIPELINE.names if self.folder.artifact(name).is_file())
 
     @property
     def sweeps(self) -> tuple[str, ...]:
@@ -263,6 +263,5 @@ def sweep_values(key: str, values: Sequence[Setting] | str) -> str | list[Settin
 
 
 def check_stage(stage: str) -> None:
-    names = [known_stage.name for known_stage in PIPELINE.stages]
-    if stage not in names:
-        raise ConfigError(f"{stage}: unknown stage.", f"Choose from {', '.join(names)}.")
+    if stage not in PIPELINE.names:
+        raise ConfigError(f"{stage}: unknown stage.", f"Choose from {', '.join(PIPELINE.names)}.")

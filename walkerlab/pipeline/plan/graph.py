@@ -36,6 +36,10 @@ class Graph:
     def __getitem__(self, name: str) -> Stage:
         return self._by_name[name]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._by_name)
+
     def needed_for(self, target: str, config: Config) -> tuple[Stage, ...]:
         """Return the target and all stages that it needs under a config, in running order."""
         needed = {target}

@@ -6,12 +6,13 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, fields
 from itertools import starmap
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand
 
 from walkerlab.extensions import check_names, foreign
+from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.views.cli.failures import exit_on_failure
 from walkerlab.views.cli.request import Request, SetByOption, keys_to_vary
 
@@ -107,8 +108,18 @@ class KeysAreNoOptions(TyperCommand):
             raise
 
 
+class Offer(NamedTuple):
+    """A function of a request that the program offers as a command, with the fields of the request that are options."""
+
+    function: Callable[..., None]
+    shared: Sequence[str] = ()
+    name: str | None = None  # of the command; default: the function's
+    asks: type[Request] = Request
+
+
 def command(
     app: typer.Typer,
+    graph: Graph,
     *shared: str,
     name: str | None = None,
     purpose: str | None = None,
@@ -117,6 +128,7 @@ def command(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that adds a function of a request and further options to a program as a command.
 
+    graph    stages of the program
     shared   fields of the request that the command offers as options
     name     name of the command; default: the function's
     purpose  help text; default: the function's docstring
@@ -134,7 +146,7 @@ def command(
             values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
             settings = settings_from(sets, values)
             instead = next((option.runs for option in sets if option.runs and values[option.flag]), "")
-            request = asks(typed, settings, instead, **{field: arguments.pop(field) for field in shared})
+            request = asks(typed, settings, instead, graph, **{field: arguments.pop(field) for field in shared})
             with exit_on_failure(request):
                 if foreign() and typed != "extensions":
                     commands = [str(each.name) for each in app.registered_commands]

@@ -152,7 +152,7 @@ def find_item(folder: RunFolder, name: str) -> Illustration | Table:
     for called in (hyphenate(name), caption_name(name)):
         if called in tables:
             return tables[called]
-    stored, _ = read_all(folder, (stage.name for stage in PIPELINE.stages))
+    stored, _ = read_all(folder, PIPELINE.names)
     compared = stored["compare"].summary if "compare" in stored else {}
     names = [illustration.name for illustration in FIGURES if illustration.why_left_out(stored, {}) is None]
     names += [table for table, key in TABLES.items() if key in compared]

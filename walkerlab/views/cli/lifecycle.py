@@ -8,9 +8,8 @@ from typing import Annotated
 import typer
 
 from walkerlab.errors import StoppedError
-from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.pipeline.run.interrupts import raise_on
-from walkerlab.views.cli.command import command
+from walkerlab.views.cli.command import Offer
 from walkerlab.views.cli.request import OF_TALK, Request
 from walkerlab.views.figures.style import EXPORT_DPI
 
@@ -32,177 +31,185 @@ Output = Annotated[
 FIRST_WALK = "default: contact-sim, or simulate if that has not run"
 
 
-def add_to(app: typer.Typer, graph: Graph) -> None:
-    @command(app, "quiet")
-    def init(
-        request: Request,
-        file: Annotated[
-            Path | None,
-            typer.Argument(metavar="[FILE]", help="The config to write; it must not exist. Default: my-TYPE.yaml."),
-        ] = None,
-        walker: Annotated[
-            str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
-        ] = "compass",
-    ) -> None:
-        """Write a commented config to start from, and a schema for checks in editors."""
-        from walkerlab.views.cli.init import write_config
+def init(
+    request: Request,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FILE]", help="The config to write; it must not exist. Default: my-TYPE.yaml."),
+    ] = None,
+    walker: Annotated[
+        str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
+    ] = "compass",
+) -> None:
+    """Write a commented config to start from, and a schema for checks in editors."""
+    from walkerlab.views.cli.init import write_config
 
-        message = write_config(file or Path(f"my-{walker}.yaml"), walker)
-        if not request.quiet:
-            print(message)
+    message = write_config(file or Path(f"my-{walker}.yaml"), walker)
+    if not request.quiet:
+        print(message)
 
-    @command(app, "config", "sets", "runs", "jobs", "quiet", "verbose", name="compile")
-    def compile_kernels(request: Request) -> None:
-        """Compile all code that a config's runs need, for example before many of them start on a cluster."""
-        from walkerlab.pipeline.run.compile_ahead import compile_ahead
 
-        began = time.monotonic()
-        config = request.resolved_run.loaded.config
-        kernels = compile_ahead([config], request.processes)
-        if not request.quiet:
-            print(f"{len(kernels)} kernels are ready for {config.name}, after {time.monotonic() - began:.0f} s.")
+def compile_kernels(request: Request) -> None:
+    """Compile all code that a config's runs need, for example before many of them start on a cluster."""
+    from walkerlab.pipeline.run.compile_ahead import compile_ahead
 
-    @command(app, "runs", "quiet", "verbose", name="open")
-    def open_run(request: Request, run: RunArgument = "paper") -> None:
-        """Show a run's page in the browser."""
-        from walkerlab.errors import StaleError
-        from walkerlab.pipeline.store.runs import run_named
+    began = time.monotonic()
+    config = request.resolved_run.loaded.config
+    kernels = compile_ahead([config], request.processes)
+    if not request.quiet:
+        print(f"{len(kernels)} kernels are ready for {config.name}, after {time.monotonic() - began:.0f} s.")
 
-        folder = run_named(run, request.runs)
-        page = (folder.path / "report.html").resolve()
-        if not page.is_file():
-            advice = f"`walkerlab report -c {folder.quoted_path}` writes it."
-            raise StaleError(f"{folder.path} has no page yet.", advice)
-        request.console.show(page)
-        print(page)
 
-    @command(app, *OF_TALK)
-    def rerun(
-        request: Request,
-        artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
-    ) -> None:
-        """Recompute a stored result from scratch and check that it is the same."""
-        from walkerlab.views.cli.rerun import rerun_artifact
+def open_run(request: Request, run: RunArgument = "paper") -> None:
+    """Show a run's page in the browser."""
+    from walkerlab.errors import StaleError
+    from walkerlab.pipeline.store.runs import run_named
 
-        rerun_artifact(artifact, graph, request)
+    folder = run_named(run, request.runs)
+    page = (folder.path / "report.html").resolve()
+    if not page.is_file():
+        advice = f"`walkerlab report -c {folder.quoted_path}` writes it."
+        raise StaleError(f"{folder.path} has no page yet.", advice)
+    request.console.show(page)
+    print(page)
 
-    @command(app, "sets", "runs")
-    def export(
-        request: Request,
-        run: RunArgument,
-        what: Annotated[str, typer.Argument(metavar="WHAT", help=ITEM_EXAMPLES)],
-        to: Annotated[
-            str | None,
-            typer.Option(
-                "--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; a model: adm, cmd, mjcf."
-            ),
-        ] = None,
-        output: Output = None,
-        columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns of a figure or a LaTeX table.")] = 1,
-        width: Annotated[
-            float | None,
-            typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
-        ] = None,
-        dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = EXPORT_DPI,
-        model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
-        law: Annotated[
-            str | None,
-            typer.Option(metavar="LAW", help="Contact in ADAMS: contact (its own, default) or functions (exact)."),
-        ] = None,
-        slope: Annotated[
-            str | None,
-            typer.Option(metavar="HOW", help="Slope in MuJoCo: gravity (tilted, default) or geometry (tilted ground)."),
-        ] = None,
-    ) -> None:
-        """Write a figure, a table or a trajectory of a run, or its walker for ADAMS or MuJoCo."""
-        from walkerlab.views.cli.target import Target
 
-        if what == "model":
-            # Imported here: only this export needs a walker.
-            from walkerlab.views.cli.models import write_model
+def rerun(
+    request: Request,
+    artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
+) -> None:
+    """Recompute a stored result from scratch and check that it is the same."""
+    from walkerlab.views.cli.rerun import rerun_artifact
 
-            how = slope or "gravity"
-            paths = write_model(run, request.runs, Target(to, output), law, request.console, request.settings, how)
-            for path in paths:
-                print(path)
-            return
-        if slope is not None:
-            raise typer.BadParameter("changes only a model", param_hint="--slope")
-        if request.sets:
-            raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
-        from walkerlab.views.cli.exports import export_from, run_to_export, walk_in
-        from walkerlab.views.report.tex import COLUMN_WIDTHS
+    rerun_artifact(artifact, request)
 
-        folder, points = run_to_export(run, request), width or COLUMN_WIDTHS[columns]
-        whose = walk_in(folder, model)
-        print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi, columns))
 
-    @command(app)
-    def draw(
-        request: Request,
-        file: Annotated[Path, typer.Argument(metavar="FILE", help="A config, or the name of a built-in one.")],
-        to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
-        output: Output = None,
-    ) -> None:
-        """Draw a config's walker to scale, with dimensions labelled by their config keys."""
-        from walkerlab.views.cli.exports import draw_walker
-        from walkerlab.views.cli.target import Target
+def export(
+    request: Request,
+    run: RunArgument,
+    what: Annotated[str, typer.Argument(metavar="WHAT", help=ITEM_EXAMPLES)],
+    to: Annotated[
+        str | None,
+        typer.Option(
+            "--to", metavar="FORMAT", help="pdf, svg, png, eps, tiff, csv, tex or nc; a model: adm, cmd, mjcf."
+        ),
+    ] = None,
+    output: Output = None,
+    columns: Annotated[int, typer.Option(min=1, max=2, help="Journal columns of a figure or a LaTeX table.")] = 1,
+    width: Annotated[
+        float | None,
+        typer.Option(min=72.0, max=7200.0, metavar="PT", help="Width of a figure in points; one column has 252."),
+    ] = None,
+    dpi: Annotated[int, typer.Option(min=30, max=2400, help="Pixels per inch of PNG and TIFF.")] = EXPORT_DPI,
+    model: Annotated[str | None, typer.Option(metavar="STAGE", help=f"Whose trajectory; {FIRST_WALK}.")] = None,
+    law: Annotated[
+        str | None,
+        typer.Option(metavar="LAW", help="Contact in ADAMS: contact (its own, default) or functions (exact)."),
+    ] = None,
+    slope: Annotated[
+        str | None,
+        typer.Option(metavar="HOW", help="Slope in MuJoCo: gravity (tilted, default) or geometry (tilted ground)."),
+    ] = None,
+) -> None:
+    """Write a figure, a table or a trajectory of a run, or its walker for ADAMS or MuJoCo."""
+    from walkerlab.views.cli.target import Target
 
-        print(draw_walker(file, Target(to, output), request.console))
+    if what == "model":
+        # Imported here: only this export needs a walker.
+        from walkerlab.views.cli.models import write_model
 
-    @command(app, "config", "sets", "runs")
-    def explore(
-        request: Request,
-        port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port to serve on; 0: any free one.")] = 0,
-        no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
-    ) -> None:
-        """Serve an interactive page with a slider for every parameter (Ctrl-C stops it)."""
-        from walkerlab.views.explore.server import Server
-        from walkerlab.views.explore.walks import ExploredConfig
+        how = slope or "gravity"
+        paths = write_model(run, request.runs, Target(to, output), law, request.console, request.settings, how)
+        for path in paths:
+            print(path)
+        return
+    if slope is not None:
+        raise typer.BadParameter("changes only a model", param_hint="--slope")
+    if request.sets:
+        raise typer.BadParameter("changes only a model; give the run that has these settings", param_hint="--set")
+    from walkerlab.views.cli.exports import export_from, run_to_export, walk_in
+    from walkerlab.views.report.tex import COLUMN_WIDTHS
 
-        assert request.resolved
-        if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # sent when the terminal closes
-            raise_on(signal.SIGHUP, KeyboardInterrupt)
-        try:
-            server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
-        except OSError as error:
-            raise typer.BadParameter(f"port {port} is not available: {error.strerror}", param_hint="--port") from None
-        try:
-            print(server.url, flush=True)
-            if not no_browser:
-                request.console.show(server.url)
-            server.serve_forever()
-        except KeyboardInterrupt:  # the intended way to stop
-            raise typer.Exit(StoppedError.exit_code) from None
-        finally:
-            server.close()
+    folder, points = run_to_export(run, request), width or COLUMN_WIDTHS[columns]
+    whose = walk_in(folder, model)
+    print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi, columns))
 
-    @command(app, "runs", "quiet")
-    def animate(
-        request: Request,
-        run: RunArgument,
-        to: Annotated[
-            str | None,
-            typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name."),
-        ] = None,
-        output: Output = None,
-        model: Annotated[
-            str | None,
-            typer.Option(
-                metavar="STAGE|both", help=f"Whose walk; both shows both models in one picture; {FIRST_WALK}."
-            ),
-        ] = None,
-        steps: Annotated[
-            int | None,
-            typer.Option(min=1, help="Steps to show, from the first. Default: 4; for a fall, the last 4 and the fall."),
-        ] = None,
-        rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
-        slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
-    ) -> None:
-        """Animate a run's walk, or the walks of both models in one picture."""
-        from walkerlab.views.cli.exports import BOTH, Film, run_to_export, walk_in, write_film
-        from walkerlab.views.cli.target import Target
 
-        folder = run_to_export(run, request)
-        film = Film(BOTH if model == BOTH else walk_in(folder, model), steps, rate, slower)
-        print(write_film(folder, Target(to, output), film, request.console))
+def draw(
+    request: Request,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A config, or the name of a built-in one.")],
+    to: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="svg, pdf or png.")] = None,
+    output: Output = None,
+) -> None:
+    """Draw a config's walker to scale, with dimensions labelled by their config keys."""
+    from walkerlab.views.cli.exports import draw_walker
+    from walkerlab.views.cli.target import Target
+
+    print(draw_walker(file, Target(to, output), request.console))
+
+
+def explore(
+    request: Request,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port to serve on; 0: any free one.")] = 0,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no browser.")] = False,
+) -> None:
+    """Serve an interactive page with a slider for every parameter (Ctrl-C stops it)."""
+    from walkerlab.views.explore.server import Server
+    from walkerlab.views.explore.walks import ExploredConfig
+
+    assert request.resolved
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # sent when the terminal closes
+        raise_on(signal.SIGHUP, KeyboardInterrupt)
+    try:
+        server = Server(port, ExploredConfig(request.config, tuple(request.sets or ()), request.runs, {}))
+    except OSError as error:
+        raise typer.BadParameter(f"port {port} is not available: {error.strerror}", param_hint="--port") from None
+    try:
+        print(server.url, flush=True)
+        if not no_browser:
+            request.console.show(server.url)
+        server.serve_forever()
+    except KeyboardInterrupt:  # the intended way to stop
+        raise typer.Exit(StoppedError.exit_code) from None
+    finally:
+        server.close()
+
+
+def animate(
+    request: Request,
+    run: RunArgument,
+    to: Annotated[
+        str | None,
+        typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name."),
+    ] = None,
+    output: Output = None,
+    model: Annotated[
+        str | None,
+        typer.Option(metavar="STAGE|both", help=f"Whose walk; both shows both models in one picture; {FIRST_WALK}."),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(min=1, help="Steps to show, from the first. Default: 4; for a fall, the last 4 and the fall."),
+    ] = None,
+    rate: Annotated[int, typer.Option(min=1, max=60, help="Frames per second.")] = 25,
+    slower: Annotated[float, typer.Option(min=0.01, help="Slow motion: 2 is half speed.")] = 1.0,
+) -> None:
+    """Animate a run's walk, or the walks of both models in one picture."""
+    from walkerlab.views.cli.exports import BOTH, Film, run_to_export, walk_in, write_film
+    from walkerlab.views.cli.target import Target
+
+    folder = run_to_export(run, request)
+    film = Film(BOTH if model == BOTH else walk_in(folder, model), steps, rate, slower)
+    print(write_film(folder, Target(to, output), film, request.console))
+
+
+COMMANDS = (
+    Offer(init, ("quiet",)),
+    Offer(compile_kernels, ("config", "sets", "runs", "jobs", "quiet", "verbose"), name="compile"),
+    Offer(open_run, ("runs", "quiet", "verbose"), name="open"),
+    Offer(rerun, (*OF_TALK,)),
+    Offer(export, ("sets", "runs")),
+    Offer(draw, ()),
+    Offer(explore, ("config", "sets", "runs")),
+    Offer(animate, ("runs", "quiet")),
+)

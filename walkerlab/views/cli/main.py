@@ -93,10 +93,9 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     app.callback(invoke_without_command=True)(options_of_the_program)
     for stage in graph.stages:
         add_stage(app, stage, graph)
-    housekeeping.add_to(app, graph)
-    lifecycle.add_to(app, graph)
-    sweep.add_to(app, graph)
-    whole_runs.add_to(app, graph)
+    for module in (housekeeping, lifecycle, sweep, whole_runs):
+        for offer in module.COMMANDS:
+            command(app, graph, *offer.shared, name=offer.name, asks=offer.asks)(offer.function)
     return app
 
 
@@ -138,9 +137,9 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     shared += ["full"] if graph.campaigns_of(stage.name) else []
     own = [option for option in stage.options if option is not STRIDES]
 
-    @command(app, *shared, name=stage.name, purpose=stage.purpose, sets=own)
+    @command(app, graph, *shared, name=stage.name, purpose=stage.purpose, sets=own)
     def run(request: Request) -> None:
         # Imported here: help must load neither the config nor NumPy.
         from walkerlab.views.cli.stage import run_stage
 
-        run_stage(request, graph[request.instead or stage.name], graph)
+        run_stage(request, graph[request.instead or stage.name])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.views.cli.console import Console
 
 # Imported for types only: help must load neither the config nor NumPy.
@@ -75,6 +76,7 @@ class Request:
     command: str  # name of the command as typed
     own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
     instead: str = ""  # stage to run instead of the command's own, if an option selects one; otherwise empty
+    graph: Graph = PIPELINE  # the stages of the program
     full: bool = option(
         "--full", default=False, help="Run the long campaign too; if interrupted, it resumes the next time."
     )
@@ -120,9 +122,8 @@ class Request:
         commands get every one. Settings by --set go to every command.
         """
         from walkerlab.config.reads import keys_of
-        from walkerlab.pipeline.plan.graph import PIPELINE
 
-        stage = next((stage for stage in PIPELINE.stages if stage.name == command), None)
+        stage = next((stage for stage in self.graph.stages if stage.name == command), None)
         words = [] if self.config is None else ["-c", self.config]
         for setting in self.sets or ():
             words += ["--set", setting]

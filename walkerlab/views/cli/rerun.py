@@ -6,7 +6,6 @@ from pathlib import Path
 from walkerlab.config.files import ConfigFile
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store.artifact import Damaged, read
 from walkerlab.pipeline.store.runfolder import RunFolder
@@ -16,7 +15,7 @@ from walkerlab.views.cli.request import Request
 SHORT = 12
 
 
-def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
+def rerun_artifact(path: Path, request: Request) -> None:
     """Recompute an artifact in an empty folder; ConfigError if missing, StaleError if damaged or not reproduced."""
     try:
         stored = read(path)
@@ -29,7 +28,7 @@ def rerun_artifact(path: Path, graph: Graph, request: Request) -> None:
     name = path.resolve().parent.name
     config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
     with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
-        report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=graph)
+        report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=request.graph)
         again = None if report.artifact is None else read(report.artifact)
     before, after = stored.digest(), None if again is None else again.digest()
     same_code = again is not None and again.identity.key == stored.identity.key

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from walkerlab.pipeline.plan.graph import Graph
-from walkerlab.views.cli.command import command
+from walkerlab.views.cli.command import Offer
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 
@@ -28,32 +27,29 @@ ROUNDING_SI = 1e-9
 """Magnitude (SI units) below which values are at the level of rounding or of the solver's tolerance."""
 
 
-def add_to(app: typer.Typer, graph: Graph) -> None:
-    @command(app, "runs", "every", "as_json")
-    def diff(
-        request: Request,
-        first: Annotated[str, typer.Argument(metavar="RUN_A", help="Name or folder of a run.")],
-        second: Annotated[str, typer.Argument(metavar="RUN_B", help="Name or folder of another run.")],
-    ) -> None:
-        """Compare two runs: configs, headline values with relative change, both walks overlaid."""
-        from walkerlab.errors import StaleError
-        from walkerlab.pipeline.headlines import difference
-        from walkerlab.pipeline.plan.survey import results_to_show
-        from walkerlab.pipeline.store.runs import config_of, run_named
+def diff(
+    request: Request,
+    first: Annotated[str, typer.Argument(metavar="RUN_A", help="Name or folder of a run.")],
+    second: Annotated[str, typer.Argument(metavar="RUN_B", help="Name or folder of another run.")],
+) -> None:
+    """Compare two runs: configs, headline values with relative change, both walks overlaid."""
+    from walkerlab.errors import StaleError
+    from walkerlab.pipeline.headlines import difference
+    from walkerlab.pipeline.plan.survey import results_to_show
+    from walkerlab.pipeline.store.runs import config_of, run_named
 
-        folders = (run_named(first, request.runs), run_named(second, request.runs))
-        names = [stage.name for stage in graph.stages]
-        with contextlib.ExitStack() as stack:
-            results = [
-                stack.enter_context(results_to_show(folder, names, request.console.warn, graph)) for folder in folders
-            ]
-            for folder, stored in zip(folders, results, strict=True):
-                if not stored:
-                    raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
-            comparison = difference(results[0], results[1], [config_of(folder) for folder in folders])
-            figures = draw(folders, results)
-        output = lines(folders, comparison, figures, request.every)
-        print_result(request, as_object(folders, comparison, figures), output)
+    folders = (run_named(first, request.runs), run_named(second, request.runs))
+    names = request.graph.names
+    with contextlib.ExitStack() as stack:
+        shown = (results_to_show(folder, names, request.console.warn, request.graph) for folder in folders)
+        results = [stack.enter_context(each) for each in shown]
+        for folder, stored in zip(folders, results, strict=True):
+            if not stored:
+                raise StaleError(f"{folder.path} has no results.", "Run a stage first.")
+        comparison = difference(results[0], results[1], [config_of(folder) for folder in folders])
+        figures = draw(folders, results)
+    output = lines(folders, comparison, figures, request.every)
+    print_result(request, as_object(folders, comparison, figures), output)
 
 
 def run_labels(folders: tuple[RunFolder, RunFolder]) -> tuple[str, str]:
@@ -130,3 +126,6 @@ def percent(pair: Pair) -> str:
     if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
         return ""
     return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"
+
+
+COMMANDS = (Offer(diff, ("runs", "every", "as_json")),)

@@ -4,7 +4,7 @@ import shlex
 
 from walkerlab.config.walkers import why_rigid_alone
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.run.executor import short_reason
 from walkerlab.pipeline.run.runner import Options, StageReport, run_and_write
@@ -16,18 +16,19 @@ from walkerlab.views.report.tables import aligned
 DRAWN_AT_ONCE = {stage.name for stage in PIPELINE.stages if stage.on_demand}
 
 
-def run_stage(request: Request, stage: Stage, graph: Graph) -> None:
+def run_stage(request: Request, stage: Stage) -> None:
     """Run a stage and print its result; raises typer.Exit(4) without an answer, and the errors of `run_and_write`."""
     try:
-        report_on(request, stage, graph)
+        report_on(request, stage)
     except ConfigError as error:
         raise request.loaded.placed(error) from None
 
 
-def report_on(request: Request, stage: Stage, graph: Graph) -> None:
+def report_on(request: Request, stage: Stage) -> None:
     """Run a stage as requested and print its result; a ConfigError does not give the position in the config file."""
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
-    report = run_and_write(request.resolved_run, stage.name, options, None if options.dry else request.console, graph)
+    reporter = None if options.dry else request.console
+    report = run_and_write(request.resolved_run, stage.name, options, reporter, request.graph)
     value, error = report.as_json(), report.no_answer
     if options.dry:
         value, error, lines = value | {"dry_run": True}, None, plan_lines(report)

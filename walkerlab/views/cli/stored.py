@@ -6,7 +6,6 @@ from dataclasses import asdict
 from typing import Any
 
 from walkerlab.errors import ConfigError, StaleError
-from walkerlab.pipeline.plan.graph import Graph
 from walkerlab.pipeline.plan.results import UP_TO_DATE, Step
 from walkerlab.pipeline.plan.survey import RunSummary, runs_in, survey
 from walkerlab.pipeline.run.executor import short_reason
@@ -24,7 +23,7 @@ SHORT = 12
 NOT_CURRENT = ("stale", "missing", "damaged")
 
 
-def print_status(request: Request, graph: Graph, check: bool, run: str | None) -> None:
+def print_status(request: Request, check: bool, run: str | None) -> None:
     """Print the state of each stage, and of all runs unless one was selected.
 
     run  name or folder of a run, compared with the config stored in its results; None for the request's run
@@ -36,9 +35,9 @@ def print_status(request: Request, graph: Graph, check: bool, run: str | None) -
     if config is None:
         raise StaleError(f"{folder.path} has no result with a readable config.", "`walkerlab status` lists all runs.")
     is_selected = run is not None or request.config is not None or request.settings or request.strides is not None
-    listed = None if is_selected else list(runs_in(request.runs, graph))
-    steps = survey(config, folder, graph)
-    error = failing(steps, graph.stages[-1].name)
+    listed = None if is_selected else list(runs_in(request.runs, request.graph))
+    steps = survey(config, folder, request.graph)
+    error = failing(steps, request.graph.stages[-1].name)
     rows = [
         {
             "stage": step.stage.name,
@@ -113,10 +112,10 @@ def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
     return StaleError(f"not every result is up to date: {counted_states}.", f"`walkerlab {last}` computes them all.")
 
 
-def print_stored(request: Request, graph: Graph, stage: str) -> None:
+def print_stored(request: Request, stage: str) -> None:
     """Print a stage's artifact, current or not; StaleError if it cannot be read."""
     path = request.folder.artifact(stage)
-    step = next(step for step in survey(request.resolved, request.folder, graph) if step.stage.name == stage)
+    step = next(step for step in survey(request.resolved, request.folder, request.graph) if step.stage.name == stage)
     if not request.folder.path.is_dir():
         raise ConfigError(f"there is no run at {request.folder.path}.", f"`walkerlab {stage}` creates it.")
     if not isinstance(step.found, Stored):

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.pipeline.plan.graph import Graph
-from walkerlab.views.cli.command import command
+from walkerlab.views.cli.command import Offer
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, option
 from walkerlab.views.report.text import paragraph
@@ -64,58 +63,56 @@ class SweepRequest(Request):
 SWEEP_FIELDS = [one.name for one in fields(SweepRequest) if one not in fields(Request)]
 
 
-def add_to(app: typer.Typer, graph: Graph) -> None:
-    @command(app, *SWEEP_FIELDS, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK, asks=SweepRequest)
-    def sweep(request: SweepRequest) -> None:
-        """Run a stage over a range of parameters, reusing results that exist."""
-        from walkerlab.config.sweep import Sweep
-        from walkerlab.pipeline.sweeps.engines import Order, engine_named
-        from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep, refuse_unrecorded
-        from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
+def sweep(request: SweepRequest) -> None:
+    """Run a stage over a range of parameters, reusing results that exist."""
+    from walkerlab.config.sweep import Sweep
+    from walkerlab.pipeline.sweeps.engines import Order, engine_named
+    from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep, refuse_unrecorded
+    from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
 
-        options = dict(text.split("=", 1) for text in request.engine_option or () if "=" in text)
-        if bad := [text for text in request.engine_option or () if "=" not in text]:
-            raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
-        chosen, address = engine_named(request.engine)
-        loaded, over = request.loaded, request.over or ()
-        block = loaded.config.sweep or Sweep()  # used where no option is given
-        own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
-        question = build_sweep(
-            request.stage or block.stage,
-            [axis_of_text(text) for text in over] or own,
-            request.zipped or (block.zip and not over),
-            request.sample if request.sample is not None else "" if over else block.sample,
-            block.seed if request.seed is None else request.seed,
-        )
-        quantities = {f"--show {name}": name for name in request.show or ()}
-        quantities |= {f"--against {request.against}": request.against} if request.against is not None else {}
-        refuse_unrecorded(question, quantities)
-        order = Order(
-            workers=request.at_once,
-            address=address,
-            modules=modules_of(question.stage, loaded.config, graph),
-            folder=request.folder.path,
-            options=options,
-        )
-        if request.dry_run:
-            foreseen = SweepRun(question, loaded, request.folder, graph)
-            show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
-            return
-        with chosen.start_early(order) as engine:
-            run = SweepRun(question, loaded, request.folder, graph)
-            # Modules needed at the end are loaded while the workers compute.
-            threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
+    options = dict(text.split("=", 1) for text in request.engine_option or () if "=" in text)
+    if bad := [text for text in request.engine_option or () if "=" not in text]:
+        raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
+    chosen, address = engine_named(request.engine)
+    loaded, over = request.loaded, request.over or ()
+    block = loaded.config.sweep or Sweep()  # used where no option is given
+    own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
+    question = build_sweep(
+        request.stage or block.stage,
+        [axis_of_text(text) for text in over] or own,
+        request.zipped or (block.zip and not over),
+        request.sample if request.sample is not None else "" if over else block.sample,
+        block.seed if request.seed is None else request.seed,
+    )
+    quantities = {f"--show {name}": name for name in request.show or ()}
+    quantities |= {f"--against {request.against}": request.against} if request.against is not None else {}
+    refuse_unrecorded(question, quantities)
+    order = Order(
+        workers=request.at_once,
+        address=address,
+        modules=modules_of(question.stage, loaded.config, request.graph),
+        folder=request.folder.path,
+        options=options,
+    )
+    if request.dry_run:
+        foreseen = SweepRun(question, loaded, request.folder, request.graph)
+        show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
+        return
+    with chosen.start_early(order) as engine:
+        run = SweepRun(question, loaded, request.folder, request.graph)
+        # Modules needed at the end are loaded while the workers compute.
+        threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
 
-            def check(available: Collection[str]) -> None:
-                from walkerlab.views.report.sweep_page import check_options
+        def check(available: Collection[str]) -> None:
+            from walkerlab.views.report.sweep_page import check_options
 
-                flags = {flag: name for flag, name in quantities.items() if name not in question.names}
-                check_options(question.stage, flags, available)
+            flags = {flag: name for flag, name in quantities.items() if name not in question.names}
+            check_options(question.stage, flags, available)
 
-            seconds, waits = request.chunk_seconds, not request.no_wait
-            work = SweepWork(engine, order, seconds, waits, request.force, check)
-            swept = run.run(work, request.console)
-        show_result(request, swept)
+        seconds, waits = request.chunk_seconds, not request.no_wait
+        work = SweepWork(engine, order, seconds, waits, request.force, check)
+        swept = run.run(work, request.console)
+    show_result(request, swept)
 
 
 def show_plan(request: Request, foreseen: "Foreseen") -> None:
@@ -192,3 +189,8 @@ def result_lines(swept: "Swept", page: Path) -> list[str]:
         f"  results  {swept.path}",
         f"  page     {page}",
     ]
+
+
+COMMANDS = (
+    Offer(sweep, (*SWEEP_FIELDS, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK), asks=SweepRequest),
+)

@@ -44,7 +44,7 @@ class Target:
             raise ConfigError(f"{path} is a folder.", f"Name a file in it: -o {shlex.quote(f'{path}/NAME.{kind}')}")
         if path.exists() and any(file.exists() and path.samefile(file) for file in self.inputs):
             raise ConfigError(f"{path} is an input of this command.", another)
-        owner = owner_of(path, (stage.name for stage in PIPELINE.stages))
+        owner = owner_of(path, PIPELINE.names)
         if owner is not None:
             raise ConfigError(f"{path} belongs to the results of the run {owner.path}.", another)
 
