@@ -123,7 +123,7 @@ def test_parameter_has_the_unit_of_its_key():
     ("over", "options"),
     [
         (["slope_deg=0.5:3:1000000000"], {}),
-        (["slope_deg=0.5:3:1000000000"], {"zip": True}),
+        (["slope_deg=0.5:3:1000000000"], {"zipped": True}),
         (["slope_deg=0.5:3:1000000000"], {"sample": "random:10"}),
         (["slope_deg=0.5:3:5000", "strides=1:5000:5000"], {}),
         (["slope_deg=0.5:3"], {"sample": "sobol:1000000000"}),
