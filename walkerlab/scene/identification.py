@@ -24,10 +24,10 @@ from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES
 from walkerlab.physics.estimation.result import (
     USABLE,
     Estimate,
+    EstimateSensitivity,
     Identification,
     ModelFit,
     Pull,
-    Sensitivity,
     StepTable,
     Uncertain,
 )
@@ -326,7 +326,7 @@ def better_with(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Ite
 
 def sensitivities(
     others: Sequence[Fixed], fitted: Fitted, estimates: Sequence[Estimate], config: ContactConfig
-) -> Iterator[Sensitivity]:
+) -> Iterator[EstimateSensitivity]:
     """Yield how much each determined estimate changes if a fixed parameter is 1 % larger, to first order.
 
     The change of an estimate is that of least squares with the noise as it is, without bounds.
@@ -341,7 +341,7 @@ def sensitivities(
         move = evaluate(reduce(replace(data, residuals=residuals, prior=prior)), fitted.noise).move
         for estimate, by, scale in zip(estimates, move, fitted.forecast.scales, strict=False):
             if estimate.standard_error is not None:
-                yield Sensitivity(estimate.key, other.name, float(by * scale), estimate.unit, change)
+                yield EstimateSensitivity(estimate.key, other.name, float(by * scale), estimate.unit, change)
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:

@@ -69,7 +69,7 @@ class Information:
 
 
 @dataclass(frozen=True)
-class Sensitivity:
+class EstimateSensitivity:
     """Change of an estimate if a fixed parameter is 1 % larger."""
 
     estimate: str  # key of the estimate
@@ -127,7 +127,7 @@ class Identification:
     fitted: Fitted = field(repr=False)
     walk: DisturbedWalk = field(repr=False)  # walk over the most probable floor
     nuisances: dict[str, Uncertain]  # estimated properties of clock and sensors
-    sensitivities: tuple[Sensitivity, ...]  # to parameters that are not estimated
+    sensitivities: tuple[EstimateSensitivity, ...]  # to parameters that are not estimated
     measured_radius: MeasuredRadius | None  # None for few steps, or without a gait
 
     @property
