@@ -1,4 +1,4 @@
-"""Stages and the graph that they form.
+"""Stages of a pipeline, and the options of their commands.
 
 Extensions declare their stages with this file, and the command line builds its help from them, so the file imports no
 stage, no config schema and no NumPy.
@@ -39,7 +39,7 @@ def nothing(_config: object) -> tuple[Any, ...]:
     return ()
 
 
-def no_more(_config: object) -> Mapping[str, Any]:
+def nothing_else(_config: object) -> Mapping[str, Any]:
     """Return an empty mapping, for stages whose results depend on nothing else."""
     return {}
 
@@ -109,7 +109,7 @@ class Stage:
     early_with: tuple[str, ...] = ()  # results that suffice for a partial drawing while other stages still run
     does_without: Lacks = nothing  # returns the parts that the stage omits under a config: name, reason and saving
     # returns what else the result depends on, by name, such as digests of files and versions of other programs
-    depends_on: Callable[[Config], Mapping[str, Any]] = no_more
+    depends_on: Callable[[Config], Mapping[str, Any]] = nothing_else
     checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
     needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
     shown_by: tuple[str, ...] = ()  # those that show it if it is current

@@ -109,59 +109,36 @@ class KeysAreNoOptions(TyperCommand):
 
 
 class Offer(NamedTuple):
-    """A function of a request that the program offers as a command, with the fields of the request that are options."""
+    """A function of a request, and of further options, that the program offers as a command."""
 
     function: Callable[..., None]
-    shared: Sequence[str] = ()
-    name: str | None = None  # of the command; default: the function's
-    asks: type[Request] = Request
+    shared: Sequence[str] = ()  # fields of the request that the command offers as options
+    name: str | None = None  # name of the command; default: the function's
+    asks: type[Request] = Request  # type of the request; its additional fields come first in the help
+    purpose: str | None = None  # help text; default: the function's docstring
+    sets: Sequence["Option"] = ()  # options that set keys of the config; they come first in the help
 
 
-def command(
-    app: typer.Typer,
-    graph: Graph,
-    *shared: str,
-    name: str | None = None,
-    purpose: str | None = None,
-    asks: type[Request] = Request,
-    sets: Sequence["Option"] = (),
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that adds a function of a request and further options to a program as a command.
+def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
+    """Add a command to the program of a graph; errors of its function end it as `exit_on_failure` describes."""
+    function, shared, name, asks, purpose, sets = offer
+    typed = name or function.__name__
+    # Flags such as --from cannot be names of parameters.
+    names = {f"set_{place}": option for place, option in enumerate(sets)}
 
-    graph    stages of the program
-    shared   fields of the request that the command offers as options
-    name     name of the command; default: the function's
-    purpose  help text; default: the function's docstring
-    asks     type of the request; its additional fields come first in the help
-    sets     options that set keys of the config; they come first in the help
-    Errors of the function end the command as `exit_on_failure` describes.
-    """
+    def run(**arguments: Any) -> None:
+        values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
+        settings = settings_from(sets, values)
+        instead = next((option.runs for option in sets if option.runs and values[option.flag]), "")
+        request = asks(typed, settings, instead, graph, **{field: arguments.pop(field) for field in shared})
+        with exit_on_failure(request):
+            if foreign() and typed != "extensions":
+                commands = [str(each.name) for each in app.registered_commands]
+                check_names(request.console.warn, (each for each in commands if commands.count(each) > 1))
+            function(request, **arguments)
 
-    def register(function: Callable[..., None]) -> Callable[..., None]:
-        typed = name or function.__name__
-        # Flags such as --from cannot be names of parameters.
-        names = {f"set_{place}": option for place, option in enumerate(sets)}
-
-        def run(**arguments: Any) -> None:
-            values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
-            settings = settings_from(sets, values)
-            instead = next((option.runs for option in sets if option.runs and values[option.flag]), "")
-            request = asks(typed, settings, instead, graph, **{field: arguments.pop(field) for field in shared})
-            with exit_on_failure(request):
-                if foreign() and typed != "extensions":
-                    commands = [str(each.name) for each in app.registered_commands]
-                    check_names(request.console.warn, (each for each in commands if commands.count(each) > 1))
-                function(request, **arguments)
-
-        _, *own = inspect.signature(function, eval_str=True).parameters.values()
-        options = sorted(
-            (parameter for parameter in fields(asks) if parameter.name in shared), key=fields(Request).__contains__
-        )
-        by_name = [
-            parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in (*own, *map(as_parameter, options))
-        ]
-        run.__signature__ = inspect.Signature([*starmap(own_parameter, names.items()), *by_name])  # type: ignore[attr-defined]
-        app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
-        return function
-
-    return register
+    _, *own = inspect.signature(function, eval_str=True).parameters.values()
+    options = sorted((entry for entry in fields(asks) if entry.name in shared), key=fields(Request).__contains__)
+    by_name = [entry.replace(kind=inspect.Parameter.KEYWORD_ONLY) for entry in (*own, *map(as_parameter, options))]
+    run.__signature__ = inspect.Signature([*starmap(own_parameter, names.items()), *by_name])  # type: ignore[attr-defined]
+    app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)

@@ -17,7 +17,7 @@ from walkerlab.pipeline.plan.stage import STRIDES, Stage
 from walkerlab.pipeline.run.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
 from walkerlab.views.cli import runs as whole_runs
-from walkerlab.views.cli.command import command
+from walkerlab.views.cli.command import Offer, add_command
 from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request
 
 
@@ -95,7 +95,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
         add_stage(app, stage, graph)
     for module in (housekeeping, lifecycle, sweep, whole_runs):
         for offer in module.COMMANDS:
-            command(app, graph, *offer.shared, name=offer.name, asks=offer.asks)(offer.function)
+            add_command(app, graph, offer)
     return app
 
 
@@ -137,9 +137,10 @@ def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     shared += ["full"] if graph.campaigns_of(stage.name) else []
     own = [option for option in stage.options if option is not STRIDES]
 
-    @command(app, graph, *shared, name=stage.name, purpose=stage.purpose, sets=own)
     def run(request: Request) -> None:
         # Imported here: help must load neither the config nor NumPy.
         from walkerlab.views.cli.stage import run_stage
 
         run_stage(request, graph[request.instead or stage.name])
+
+    add_command(app, graph, Offer(run, shared, stage.name, purpose=stage.purpose, sets=own))
