@@ -34,7 +34,7 @@ class ConfigFile:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a path is a file; also False for a path that the system refuses, such as one that is too long."""
+    """Whether a path is a file. A path that the system refuses, such as one that is too long, is not."""
     try:
         return path.is_file()
     except OSError:
@@ -69,7 +69,7 @@ def file_at(path: Path) -> ConfigFile:
 
 
 def read_layers(file: ConfigFile) -> list[BlockNode]:
-    """Read a config file and all files that it extends, directly or indirectly; the file itself comes last.
+    """Read a config file and all files that it extends, directly or indirectly. The file itself comes last.
 
     Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, or if a stored config
     refers to another file.
@@ -90,7 +90,7 @@ def files_read(file: ConfigFile) -> list[Path]:
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]:
-    """Yield (file, block of keys) of a config, then of each file it extends; raises the errors of `read_layers`."""
+    """Yield (file, block of keys) of a config, then of each file it extends. Raises the errors of `read_layers`."""
     seen: list[str] = []
     reference: Position | None = None  # position of the file's name in the config that extends it
     while True:
@@ -119,7 +119,7 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]
 
 
 def _refuse_named_files(root: BlockNode) -> None:
-    """Raise ConfigError if a stored config names another file; stored configs are complete, and may be untrusted."""
+    """Raise ConfigError if a stored config names another file. Stored configs are complete and may be untrusted."""
     cases = cases_file(root, Path())
     places = [root.entries["extends"].position] if "extends" in root.entries else []
     places += [] if cases is None else [cases[1]]
@@ -128,7 +128,9 @@ def _refuse_named_files(root: BlockNode) -> None:
 
 
 def cases_file(layer: BlockNode, folder: Path) -> tuple[ConfigFile, Position] | None:
-    """Return the file under stability.cases (relative to `folder`) and where the config names it; None for a list."""
+    """Return the file under stability.cases (relative to `folder`) and where the config names it, or None
+    for a list.
+    """
     block = layer.entries.get("stability")
     file_name = block.entries.get("cases") if isinstance(block, BlockNode) else None
     if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):

@@ -6,7 +6,7 @@ from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 
 class Footholds(Block):
-    """Heights of the footholds, for uneven ground; even by default."""
+    """Heights of the footholds, for uneven ground. The default is even ground."""
 
     roughness_m: float = key(
         0.0, "m", "standard deviation of the footholds' heights, which are drawn independently", ge=0.0, le=1e3

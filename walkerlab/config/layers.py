@@ -21,7 +21,7 @@ class ConfigSetting:
 
 
 def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
-    """Merge layers into one block; later layers override earlier ones, and only the last one sets the name.
+    """Merge layers into one block. Later layers override earlier ones, and only the last one sets the name.
 
     Raises ConfigError if a layer has more than one slope key.
     """
@@ -55,7 +55,10 @@ def _refuse_two_slopes(keys: dict[str, Position]) -> None:
 
 
 def parse_setting(text: str) -> ConfigSetting:
-    """Parse a `--set` option; ConfigError if it is not KEY=VALUE with a YAML value."""
+    """Parse a `--set` option.
+
+    Raises ConfigError if it is not KEY=VALUE with a YAML value.
+    """
     # If the text has an attribute `source`, it is the option's name in messages.
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
@@ -76,7 +79,10 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
 
 
 def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockNode:
-    """Apply settings in order; lists and blocks are replaced, not merged. ConfigError if a key's parent is no block."""
+    """Apply settings in order. Lists and blocks are replaced, not merged.
+
+    Raises ConfigError if a key's parent is no block.
+    """
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     copies: dict[int, BlockNode] = {}
     for setting in settings:
@@ -87,7 +93,7 @@ def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockN
 
 
 def _placed(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[int, BlockNode]) -> BlockNode:
-    """Place a setting in a copy of a block; `copies` holds, by id, the copies that earlier settings made."""
+    """Place a setting in a copy of a block. `copies` holds, by id, the copies that earlier settings made."""
     result = copies.get(id(block)) or block.without()
     copies[id(result)] = result
     name = setting.path[depth]

@@ -60,7 +60,10 @@ class LoadedConfig:
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
     def variant(self, settings: Sequence[ConfigSetting]) -> Config:
-        """Set some keys and validate the result; ConfigError with positions if it is invalid."""
+        """Return the config with some keys changed.
+
+        Raises ConfigError with positions if it is invalid.
+        """
         tree = apply_settings(self.tree, settings)
         return align_start(validate_tree(tree), tree)[0]
 
@@ -71,7 +74,8 @@ def load(
     strides: int | None = None,
     name: str | None = None,
 ) -> LoadedConfig:
-    """Load a config from a file, by the name of a built-in config, or from a stored run; by default the paper's.
+    """Load a config from a file, by the name of a built-in config, or from a stored run. The default is the paper's
+    config.
 
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, which overrides everything else
@@ -165,7 +169,7 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List each key in which `changed` differs from `base` as KEY=VALUE; slope_deg, if given, replaces slope_rad."""
+    """List each key in which `changed` differs from `base` as KEY=VALUE. If given, slope_deg replaces slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:

@@ -12,7 +12,9 @@ DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
 
 
 def short_number(number: float) -> str:
-    """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6; integers in full."""
+    """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6. Integers are
+    written in full.
+    """
     if isinstance(number, int):
         return str(number)
     plain = repr(number).removesuffix(".0")

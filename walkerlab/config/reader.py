@@ -44,7 +44,7 @@ def value_of(text: str) -> str | int | float | bool | None:
 
 
 def read(text: str, source: str, column: int = 1) -> Node | None:
-    """Parse the text of a single document to a tree; None if it is empty.
+    """Parse the text of a single document to a tree, or return None if it is empty.
 
     Positions name the `source` (a file or option); `column` is the column at which the text starts. Raises ConfigError
     with the position of anything that is not plain YAML.

@@ -27,7 +27,7 @@ EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file'
 
 @dataclass(frozen=True, slots=True)
 class KeyReference:
-    """Description of one config key; every field is text."""
+    """Description of one config key. Every field is text."""
 
     key: str
     type: str
@@ -86,9 +86,11 @@ def as_paragraphs(selection: str = "") -> str:
 
 
 def select_keys(selection: str) -> list[KeyReference]:
-    """Return a block's keys, a single key, or by default all keys; ConfigError with the nearest key if none match.
+    """Return a block's keys, a single key, or by default all keys.
 
     Keys that are equal in every kind of a block are listed only once.
+
+    Raises ConfigError with the nearest key if none match.
     """
     plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
     matches = [

@@ -1,4 +1,4 @@
-"""Validation of a config tree against the schema; all problems are reported together, with positions."""
+"""Validation of a config tree against the schema. All problems are reported together, with positions."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -319,7 +319,7 @@ def _elsewhere(name: str, exactly: bool) -> str:
 
 
 def node_at(tree: BlockNode, location: Location) -> tuple[Node | None, Position]:
-    """Return the value at a location and its position; for a missing key, None and the position of its block.
+    """Return the value at a location and its position. For a missing key, they are None and the position of its block.
 
     Parts of the location that are not in the tree, such as the kind of value that pydantic tried, are skipped.
     """

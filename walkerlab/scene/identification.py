@@ -122,7 +122,7 @@ def identify_walk(
     note: Callable[[str], None] = lambda _: None,
     begin: Begin = lambda _label, _rounds: lambda: None,
 ) -> Identification:
-    """Fit parameters to a measured walk with each model; return the likeliest result, preferring models that fit.
+    """Fit parameters to a measured walk with each model, and return the likeliest result, preferring models that fit.
 
     gait   summary of `fixedpoint` for the config
     note   receives messages
@@ -154,7 +154,7 @@ def identify_with(
     note: Callable[[str], None],
     begin: Begin,
 ) -> Identification | str:
-    """Fit one model; return the reason as text if no walk of the model can be fitted."""
+    """Fit one model, or return the reason as text if no walk of the model can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
@@ -174,7 +174,9 @@ def identify_with(
 
 
 def in_time(first: Fitted, begin: Begin) -> Fitted | None:
-    """Refit angles at their sample times, from the fit at equal phase; None for measured steps or a failed fit."""
+    """Refit angles at their sample times, from the fit at equal phase, or return None for measured steps or a failed
+    fit.
+    """
     forecast, u = first.forecast, first.u
     if not forecast.measured.sampled:
         return None
@@ -398,7 +400,7 @@ def measurement_noise(fitted: Fitted) -> dict[str, float]:
 
 
 def process_noise(fitted: Fitted) -> dict[str, Any]:
-    """Return the floor's roughness and the kicks, with standard errors; kicks are None where they are not estimated."""
+    """Return the floor's roughness and the kicks, with standard errors. Kicks are None if they are not estimated."""
     noise, kicks = fitted.noise, fitted.data.kicks
     reason = "" if kicks else "only lengths or angles tell kicks from a rough floor, and only with the rigid model"
     return {
@@ -413,7 +415,9 @@ def process_noise(fitted: Fitted) -> dict[str, Any]:
 
 
 def error_of_noise(fitted: Fitted, name: str) -> float | None:
-    """Return the standard error of a disturbance from the curvature of the restricted likelihood; None at zero."""
+    """Return the standard error of a disturbance from the curvature of the restricted likelihood, or None if the
+    disturbance is zero.
+    """
     h, value = 1e-2, getattr(fitted.noise, name)
     if value == 0.0:
         return None

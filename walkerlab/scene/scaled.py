@@ -18,7 +18,9 @@ LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and mu
 def starts_of(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Build a scene's starts from a rigid start with scaled velocities; walks must settle on the gait if known."""
+    """Build a scene's starts from a rigid start with scaled velocities. Walks must settle on the gait if it
+    is known.
+    """
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
     def start(swing: float, stance: float) -> State:

@@ -73,7 +73,10 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
 
 
 def resumed_end(trial: Trial, name: str, compute: Callable[[Trial], End], checkpoint: Checkpoint) -> End:
-    """Return an end state from the checkpoint, or compute and keep it; may raise WalkEndsError."""
+    """Return an end state from the checkpoint, or compute and keep it.
+
+    Raises WalkEndsError if the walk ends early.
+    """
     unit = unit_name(trial.name, name)
     if unit not in checkpoint.kept:
         checkpoint.keep(unit, compute(trial).packed())

@@ -81,17 +81,17 @@ class MethodRow:
 
     @property
     def reached(self) -> Annotated[int, Label("1", "whether the end state was reached")]:
-        """1 if the run reached the end state, so that its error is known; otherwise 0."""
+        """1 if the run reached the end state, so that its error is known, otherwise 0."""
         return int(self.error is not None)
 
 
 def unit_name(*parts: object) -> str:
-    """Name a measurement in a checkpoint; one from another machine is not resumed, because run times are compared."""
+    """Name a measurement in a checkpoint. One from another machine is not resumed, because run times are compared."""
     return "/".join(map(str, (platform.node(), *parts)))
 
 
 def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
-    """Run a method at tighter and tighter tolerances until a run is too expensive; resume runs of the checkpoint."""
+    """Run a method at tighter and tighter tolerances until a run is too expensive. Resume runs of the checkpoint."""
     ladder, budget, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
     if method not in METHODS or not METHODS[method].compiled:
         ladder, budget, last = LIBRARY_LADDER, LIBRARY_RUN_BUDGET, LAST_RUN_SIZE

@@ -43,7 +43,7 @@ class End:
 
 @dataclass(frozen=True)
 class Reference:
-    """End states of a walk by two different methods; their difference is the uncertainty."""
+    """End states of a walk by two different methods. Their difference is the uncertainty."""
 
     first: End
     second: End
@@ -98,7 +98,10 @@ def compass_of(trial: Trial) -> RigidWalker | None:
 
 
 def tightest_end(trial: Trial, method: str) -> End:
-    """Compute the end state by one of our methods at its tightest useful tolerance; may raise WalkEndsError."""
+    """Compute the end state by one of our methods at its tightest useful tolerance.
+
+    Raises WalkEndsError if the walk ends early.
+    """
     tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST_CONTACT
     result = trial.prepare(method, tolerances[method], REFERENCE_RUN_BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:

@@ -99,7 +99,7 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
 def against_the_paper(
     config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
 ) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Compare both models with the paper's numbers, tables and errata; returns groups and summary."""
+    """Compare both models with the paper's numbers, tables and errata, and return groups and summary."""
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)

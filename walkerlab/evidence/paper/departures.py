@@ -1,4 +1,6 @@
-"""Differences from the paper's scene; if there are any, a config's numbers neither confirm nor refute the paper's."""
+"""Differences from the scene of the paper. If there are any, a config's numbers neither confirm nor refute
+the paper's.
+"""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
@@ -20,7 +22,7 @@ UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not i
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
-    """Describe the differences from the paper's scene; slopes that agree within the rounding of x_p count as equal."""
+    """Describe the differences from the paper's scene. Slopes that agree within the rounding of x_p count as equal."""
     walker, contact, paper = config.walker, config.contact, CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []

@@ -74,7 +74,7 @@ def name_with_unit(name: str, unit: str | None) -> str:
 
 
 def compared(results: Results, key: str) -> Sequence[Row]:
-    """Return rows of the summary of `compare`; empty if it did not run, or if the walker is not the paper's."""
+    """Return rows of the summary of `compare`, or nothing if it did not run, or if the walker is not the paper's."""
     rows: Sequence[Row] = results.summary("compare").get(key, ())
     return rows
 
@@ -129,7 +129,7 @@ def errors(results: Results) -> Section | None:
 
 
 def paper_section(results: Results) -> Section | None:
-    """Show verdicts on the paper's values and its gravest errors; None for another scene."""
+    """Summarise the verdicts on the paper's values and its most serious errors, or return None for any other scene."""
     rows = results.claims
     if not rows:
         return None
@@ -173,7 +173,7 @@ RECORDED_COLUMNS = (
 
 
 def recorded(results: Results) -> Section | None:
-    """Compare the recorded walk with both models; None if no walk was recorded."""
+    """Compare the recorded walk with both models, or return None if no walk was recorded."""
     stored = results.summary("compare").get("recorded")
     if stored is None:
         return None

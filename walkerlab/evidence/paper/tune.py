@@ -1,4 +1,4 @@
-"""Stage `tune`: repeat the paper's parameter adjustment for any walker; report its need, size and causes."""
+"""Stage `tune`: repeat the paper's parameter adjustment for any walker, and report its need, size and causes."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -67,7 +67,10 @@ WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengt
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Adjust the start; possibly no start walks. Raises NoAnswer if the pads need a gait that does not exist."""
+    """Adjust the start, which fails if no start walks.
+
+    Raises NoAnswer if the pads need a gait that does not exist.
+    """
     rigid_step, rigid_state = rigid_start(config, inputs)
     rigid_gait = inputs["fixedpoint"].summary  # gait of the rigid model; the start may be far from it
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
@@ -136,7 +139,9 @@ class TuneRun:
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
-        """Return the smallest change of the velocities with which the contact model walks; None if it never walks."""
+        """Return the smallest change of the velocities with which the contact model walks, or None if it
+        never walks.
+        """
         cells = self.contact_map
         if self.as_it_stands.walks:
             return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)
@@ -147,7 +152,7 @@ class TuneRun:
 
     @property
     def gait_factors(self) -> tuple[float, float] | None:
-        """Position of the gait on the map, from the end of the adjusted walk; None if it cannot be determined.
+        """Position of the gait on the map, from the end of the adjusted walk, or None if it cannot be determined.
 
         The factors are velocities of the last step, once the rear foot has lifted, divided by those of the rigid start.
         """
@@ -247,7 +252,7 @@ def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
 
 
 def percent(value: float, reference: float, base: float) -> float | None:
-    """Return the increase in magnitude over `reference`, in percent of `base`; None for a base of zero."""
+    """Return the increase in magnitude over `reference`, in percent of `base`, or None for a base of zero."""
     return 100.0 * (abs(value) - abs(reference)) / abs(base) if base else None
 
 
@@ -346,7 +351,7 @@ def groups(tune: TuneRun) -> dict[str, Group]:
 
 
 def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Variable]:
-    """Return angles and velocities of the legs; empty if the walk has no samples."""
+    """Return angles and velocities of the legs, or none if the walk has no samples."""
     if walk.samples is None:
         return {}
     angle, velocity = leg_motion(walk.samples.states, walker)

@@ -48,7 +48,10 @@ def read_catalogue(path: Path) -> Any:
 
 
 def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
-    """Return a catalogue's cases (default: the package's), then a config's; raises ConfigError if two share a name."""
+    """Return a catalogue's cases (default: the package's), then a config's.
+
+    Raises ConfigError if two share a name.
+    """
     catalogue = package_cases() if catalogue is None else catalogue
     shared = {case.name for case in catalogue} & {case.name for case in own}
     if shared:
@@ -57,7 +60,10 @@ def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> t
 
 
 def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """Return the cases as a tuple; raises ConfigError if two share a name."""
+    """Return the cases as a tuple.
+
+    Raises ConfigError if two share a name.
+    """
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
@@ -66,7 +72,10 @@ def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
 
 
 def config_of(case: Case) -> Config:
-    """Apply a case's changes to the paper's config; raises ConfigError if the result is invalid."""
+    """Apply a case's changes to the paper's config.
+
+    Raises ConfigError if the result is invalid.
+    """
     return paper_config_with(case.config, f"case {case.name}")
 
 
@@ -98,7 +107,7 @@ def features(config: Config) -> set[str]:
 
 
 def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
-    """Apply a case's changes to a scene; a new slope also turns the start's angles, so that both feet stand on it."""
+    """Apply a case's changes to a scene. A new slope also turns the start's angles, so that both feet stand on it."""
     start, slope = changes.get("start", 1.0), changes.get("slope", 1.0) * config.slope_rad
     values = dict(changes.get("set", {}))
     values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}

@@ -1,4 +1,4 @@
-"""Judgement of cases; walks are repeated with a ten times tighter tolerance, another method and a scaled twin."""
+"""Judgement of cases. Each walk is repeated with a ten times tighter tolerance, another method and a scaled twin."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -48,14 +48,14 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile; the others start by decreasing budget."""
+    """Yield results in case order. One case per model runs first, to compile. The others start by decreasing budget."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
 
 
 def judge(case: Case, config: Config) -> CaseResult:
-    """Walk a case and judge it; walks of more than `SAMPLED_STEPS` steps are not sampled."""
+    """Walk a case and judge it. Walks of more than `SAMPLED_STEPS` steps are not sampled."""
     about = case.name, case.family, case.model, case.reason, case.expected
     start = prepare_start(config, case)
     if start is None:
@@ -109,7 +109,9 @@ def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> li
 
 
 def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
-    """Compare the touch times of two walks, or their end times if one has no touch; empty if an end time is missing."""
+    """Compare the touch times of two walks, or their end times if one has no touch, or return an empty list if an end
+    time is missing.
+    """
     steps = min(first.touches.size, second.touches.size, case.compared_steps)
     if steps:
         difference = float(np.max(np.abs(first.touches[:steps] - second.touches[:steps])))
@@ -128,7 +130,7 @@ def other_methods(configured: str) -> tuple[Method, ...]:
 
 
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Walk with other methods until one has an answer; `budget` limits right-hand sides (libraries may get fewer)."""
+    """Walk with other methods until one has an answer. `budget` limits right-hand sides (libraries may get fewer)."""
     tried: list[str] = []
     for method in other_methods(configured):
         result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))

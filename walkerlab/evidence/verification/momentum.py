@@ -102,14 +102,18 @@ def with_middles(grid: Floats) -> Floats:
 
 
 def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
-    """Return the ends of intervals after splitting those marked in `wanting` into four; times: ends and midpoints."""
+    """Return the ends of intervals after splitting those marked in `wanting` into four. `times` holds ends and
+    midpoints.
+    """
     first, middle, last = times[:-1:2], times[1::2], times[2::2]
     halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
     return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
 
 
 def impulse(times: Floats, rate: Floats) -> Floats:
-    """Integrate a rate (times, components) by Simpson's rule up to each interval's end; returns (ends, components)."""
+    """Integrate a rate (times, components) by Simpson's rule up to the end of each interval. Returns (ends,
+    components).
+    """
     widths = np.diff(times[::2])[:, None]
     pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])

@@ -98,7 +98,7 @@ class Arrival:
     units: Floats  # unit of each component of the state
 
     def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
-        """Judge a method by its end state y (None if it was not reached); count: number of right-hand sides."""
+        """Judge a method by its end state y (None if it was not reached) and the `count` of right-hand sides."""
         if y is None:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))

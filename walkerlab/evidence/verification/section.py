@@ -21,7 +21,7 @@ Rows = Sequence[Row]
 
 @stage_section("stability")
 def section(results: Results, summary: Row) -> Section | None:
-    """Build the section; None if the stage did not run."""
+    """Build the section, or return None if the stage did not run."""
     cases, problems = summary["cases"], summary["known"]
     unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
     unmeasured = [
@@ -64,7 +64,7 @@ def failures(summary: Row) -> list[str]:
 
 
 def worst_measure(row: Row) -> float | None:
-    """Return the largest ratio of a measure to its limit; use of the budget does not count."""
+    """Return the largest ratio of a measure to its limit, not counting the use of the budget."""
     measures = [measure for measure in row["measures"] if measure["limit"] > 0.0 and measure["measure"] != BUDGET_USED]
     return max((measure["value"] / measure["limit"] for measure in measures), default=None)
 

@@ -67,7 +67,7 @@ def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
 def summarise(
     cases: Sequence[CaseResult], problems: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
 ) -> dict[str, Any]:
-    """Build the summary; it contains `no_answer` if a case or problem failed.
+    """Build the summary. It contains `no_answer` if a case or problem failed.
 
     problems  results of the known problems, as stored by their stage
     """

@@ -60,7 +60,7 @@ class CaseResult:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Descriptions of all faults; empty if the case passed."""
+        """Descriptions of all faults, or return () if the case passed."""
         failed = [] if self.outcome in self.expected else [f"ended as {self.outcome}, not {' or '.join(self.expected)}"]
         return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
 

@@ -12,7 +12,7 @@ FAR = 1e6  # m; the first level begins this far behind the first foothold, outsi
 
 
 def ground_levels(steps: Group) -> tuple[Array, Array] | None:
-    """Return where each ground level begins along the slope, and its height (m); levels meet midway between footholds.
+    """Return where each ground level begins along the slope, and its height (m). Levels meet midway between footholds.
 
     steps  stored group of the walk's steps
 

@@ -63,14 +63,16 @@ class Chunk:
 
 @lru_cache(maxsize=MEMORIES)
 def memory_for(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
-    """Return this process's cache of stage inputs, which is kept between chunks; arguments as in `compute_point`."""
+    """Return the cache of stage inputs of this process, which is kept between chunks. Arguments are as in
+    `compute_point`.
+    """
     return MemoryResults(graph)
 
 
 def compute_point(
     config: Config, key: str, graph: Graph, target: str, again: bool, forced: str = "", expected: str | None = None
 ) -> Chunk:
-    """Compute one point in this process; an error becomes its result.
+    """Compute one point in this process. An error becomes its result.
 
     key       stage key of the point's result
     again     whether to repeat its walk to measure the numerical error
@@ -152,7 +154,10 @@ def labels_in(content: Content) -> dict[str, tuple[str, str]]:
 
 
 def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provenance: Provenance) -> None:
-    """Store a chunk without its failed points; raises StorageError if that fails."""
+    """Store a chunk without its failed points.
+
+    Raises StorageError if that fails.
+    """
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
         return

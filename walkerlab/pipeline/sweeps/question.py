@@ -75,7 +75,7 @@ class SweptStage:
         return math.prod(self.shape)
 
     def places(self, index: int) -> tuple[int, ...]:
-        """Return the index of each parameter's value at a point; the last parameter changes fastest."""
+        """Return the index of each parameter's value at a point. The last parameter changes fastest."""
         if self.layout == "list":
             return (index,) * len(self.axes)
         import numpy as np
@@ -135,13 +135,16 @@ def build_sweep(
 
 
 def refuse_too_many(what: str, count: int) -> None:
-    """Raise ConfigError for more than MAX_POINTS points; `what` is the option or key that requests them."""
+    """Raise ConfigError for more than MAX_POINTS points. `what` is the option or key that requests them."""
     if count > MAX_POINTS:
         raise problem_error(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
-    """Parse one `--over KEY=VALUES` into key, values and origin; raises ConfigError for any other form."""
+    """Parse one `--over KEY=VALUES` into key, values and origin.
+
+    Raises ConfigError for any other form.
+    """
     key, equals, values = text.partition("=")
     source = f"--over {text}"
     key = key.strip()
@@ -155,7 +158,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
 
 
 def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
-    """Build the error for an invalid parameter, option or key; its message gives `source`, not a file position."""
+    """Build the error for an invalid parameter, option or key. Its message gives `source`, not a file position."""
     return problem_error(Position(source, 0, 0), text, allowed, near)
 
 
@@ -166,7 +169,10 @@ def key_fields() -> dict[str, FieldInfo]:
 
 
 def axis(key: str, values: Any, source: str) -> Axis:
-    """Build the axis of one parameter; raises ConfigError for an unknown key or invalid values."""
+    """Build the axis of one parameter.
+
+    Raises ConfigError for an unknown key or invalid values.
+    """
     fields = key_fields()
     if key not in fields and not any(key.startswith(f"{known_key}.") for known_key in fields):
         if any(known_key.startswith(f"{key}.") for known_key in fields):
@@ -195,7 +201,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
 
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
-    """Convert whole numbers to int if the key takes integers; the schema rejects other numbers."""
+    """Convert whole numbers to int if the key takes integers. The schema rejects other numbers."""
     field = key_fields().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
@@ -203,7 +209,7 @@ def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
 
 
 def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
-    """Return `count` values from `low` to `high`, both included; a single value is `low`."""
+    """Return `count` values from `low` to `high`, both included. A single value is `low`."""
     import numpy as np
 
     space = np.geomspace if logarithmic else np.linspace
@@ -211,9 +217,11 @@ def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[floa
 
 
 def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
-    """Draw points from the intervals or lists of all parameters; raises ConfigError for an invalid sampler.
+    """Draw points from the intervals or lists of all parameters.
 
     sample  SAMPLER:N
+
+    Raises ConfigError for an invalid sampler.
     """
     name, _, number = sample.partition(":")
     if name not in SAMPLERS or not re.fullmatch("[0-9]{1,18}", number) or int(number) < 1:

@@ -17,7 +17,10 @@ SCHEMA = ".walkerlab-schema.json"
 
 
 def write_config(file: Path, walker: str) -> str:
-    """Write a walker's commented config and schema; ConfigError for an unknown type, StorageError if writing fails."""
+    """Write a walker's commented config and schema.
+
+    Raises ConfigError for an unknown type, StorageError if writing fails.
+    """
     config = load(Path(template(walker))).config
     if file.exists():
         raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")

@@ -16,7 +16,10 @@ SHORT = 12
 
 
 def rerun_artifact(path: Path, request: Request) -> None:
-    """Recompute an artifact in an empty folder; ConfigError if missing, StaleError if damaged or not reproduced."""
+    """Recompute an artifact in an empty folder.
+
+    Raises ConfigError if missing, StaleError if damaged or not reproduced.
+    """
     try:
         stored = read(path)
     except (FileNotFoundError, NotADirectoryError):

@@ -83,7 +83,7 @@ class Curve:
 
 
 def curve_of(group: Group, name: str) -> Curve:
-    """Read a quantity along a branch and at its bifurcations; a stretch between two points is stable if both are."""
+    """Read a quantity along a branch and at its bifurcations. A stretch between two points is stable if both are."""
     value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
     if "mark_after" not in group.variables:
         return Curve(value, quantity, stable[:-1] & stable[1:], ())
@@ -99,7 +99,9 @@ def curve_of(group: Group, name: str) -> Curve:
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step, solid where stable, with bifurcations; return the kinds of the bifurcations."""
+    """Plot a quantity of every step, solid where stable, with bifurcations, and return the kinds of the
+    bifurcations.
+    """
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
     bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]
@@ -188,7 +190,9 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """List (parameter value, steps) of gaits born in folds; of gaits whose labels would overlap, only the shortest."""
+    """List (parameter value, steps) of gaits that begin at folds. If labels would overlap, only the gait of fewest
+    steps is listed.
+    """
     others = [(branch.period, curve_of(branch.group, "step_period")) for branch in branches if branch.is_other]
     folds = [
         (period, float(curve.value[place])) for period, curve in others for place, kind in curve.marks if kind == "fold"
@@ -210,7 +214,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
-    """Return the parameter range around the bifurcations and any attractor; None if there are no bifurcations."""
+    """Return the parameter range around the bifurcations and any attractor, or None if there are no bifurcations."""
     summary = results[STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]
     if not found:

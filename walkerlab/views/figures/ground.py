@@ -83,7 +83,7 @@ def draw_forces(results: Results) -> Drawn:
 
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
-    """Return the energy (J) lost in each step by cause (label, colour); the rest is attributed to the knees."""
+    """Return the energy (J) lost in each step by cause (label, colour). The rest is attributed to the knees."""
     # take the last sample before each touchdown: an impact then counts entirely towards the step that it starts
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOST.items()}
@@ -94,7 +94,7 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
 
 
 def draw_losses(results: Results) -> Drawn:
-    """Plot a stacked bar per step; the caption gives the mean loss (J) by cause, leaving out the first step."""
+    """Plot a stacked bar per step. The caption gives the mean loss (J) by cause, leaving out the first step."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
     figure, axes = panels(2.9)
     steps = np.arange(1, 1 + min(STEPS, next(iter(found.values())).size))

@@ -53,7 +53,7 @@ class Length:
 
 @dataclass(frozen=True)
 class UprightLeg:
-    """Geometry of one leg, upright with its sole at the origin; lengths in m."""
+    """Geometry of one leg in m, upright with its sole at the origin."""
 
     joints: tuple[Point, ...]  # points of the leg's line from the hip down, without the sole
     centre: Point  # centre of the sole's arc
@@ -69,7 +69,7 @@ def entry(key: str, value: float) -> str:
 
 
 def mass_labels(walker: Any, prefix: str) -> tuple[str, ...]:
-    """Return the labels of a body's mass and, if it has one, of its inertia; `prefix` begins its config keys."""
+    """Return the labels of a body's mass and, if it has one, of its inertia. `prefix` begins its config keys."""
     inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
     mass = entry(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
     return (mass, entry(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
@@ -118,7 +118,7 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 
 def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
-    """Draw the walker's dimensions as a file of one kind (svg, pdf, png); equal walkers and names give equal bytes."""
+    """Draw the walker's dimensions as a file of one kind (svg, pdf, png). Equal walkers and names give equal bytes."""
     title = f"Dimensions of a walker of type {walker.type}"
     with styled():
         figure = draw_parts(walker) if isinstance(walker, PartsWalker) else draw_upright(walker)

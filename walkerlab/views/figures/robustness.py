@@ -49,7 +49,9 @@ BELOW, BESIDE = 1.7, 0.4
 
 
 def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:
-    """Return the illustration of a robustness sweep that varies one parameter or compares drives; otherwise None."""
+    """Return the illustration of a robustness sweep that varies one parameter or compares drives, or None
+    for others.
+    """
     if can_be_drawn(group, parameters):
         return paper_figure(17, (), partial(over_one_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
@@ -63,7 +65,7 @@ def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
 
 
 def over_one_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
-    """Plot figure 17; the caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
+    """Plot figure 17. The caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
     x, said, unit = group[parameter].astype(float), axis_label(parameter), group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
@@ -83,7 +85,7 @@ def over_one_parameter(group: Group, parameter: str, _results: Results) -> Drawn
 
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
-    """Return, for each drive, the points at which it acts alone; None if the sweep does not compare drives."""
+    """Return, for each drive, the points at which it acts alone, or None if the sweep does not compare drives."""
     if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or ACTUATION_PANELS[0][1] not in group.variables:
         return None
     if any(group.variables[name].dims != group.variables["outcome"].dims for name in parameters):
@@ -113,7 +115,7 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
 
 
 def on_rough_ground(results: Results) -> Drawn:
-    """Plot figure 18; the caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
+    """Plot figure 18. The caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
     result = results[STAGE]
     sticks, steps = sticks_of(result, "rough_walk/"), result["rough_steps"]
     across = sticks.in_plane(sticks.landings)[:, 0]

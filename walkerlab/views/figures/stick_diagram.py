@@ -61,7 +61,7 @@ NO_STEPS = Group(
 
 @dataclass(frozen=True, eq=False)
 class Sticks:
-    """Joint positions of a walker; lengths in m along the slope (downhill) and normal to it."""
+    """Joint positions of a walker in m, along the slope (downhill) and normal to it."""
 
     time: Array  # (samples,) s
     hip: Array  # (samples, 2)
@@ -77,7 +77,7 @@ class Sticks:
     ending: str = ""  # outcome of a walk that failed, such as fell; otherwise empty
 
     def pushing(self, time: float) -> int | None:
-        """Return the leg whose push-off is shown at a time (s); None if no push-off is shown."""
+        """Return the leg whose push-off is shown at a time (s), or None if no push-off is shown."""
         step = int(np.searchsorted(self.strikes, time, side="right")) - 1
         late = step < 0 or time - self.strikes[step] > SEEN_S
         return None if late or not self.pushes else 1 - step % 2
@@ -130,7 +130,7 @@ class Sticks:
 
 
 def sticks_of(result: Identified, under: str = "") -> Sticks:
-    """Read the joint positions of a stored walk; `under` is the prefix of its groups."""
+    """Read the joint positions of a stored walk. `under` is the prefix of its groups."""
     asked = result.identity.config_slice
     trajectory, walker = result[f"{under}trajectory"], asked["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
@@ -193,7 +193,7 @@ def surrounding(points: Array, length: float) -> tuple[float, float, float, floa
 
 
 def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
-    """Draw legs, soles and torso at the given samples; the legs differ in colour, line style and foot marker."""
+    """Draw legs, soles and torso at the given samples. The legs differ in colour, line style and foot marker."""
     hip = sticks.in_plane(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
         lines, order = sticks.in_plane(sticks.leg(leg)[rows]), look.order + width
@@ -258,7 +258,7 @@ PADS: Final[tuple[dict[str, Any], ...]] = tuple(
 
 
 def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
-    """Draw the visible pads of both lanes; return their legend entries."""
+    """Draw the visible pads of both lanes, and return their legend entries."""
     bottom = -PAD_HEIGHT * sticks.leg_length
     left, right = axes.get_xlim()
     for begin, end, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
@@ -269,7 +269,7 @@ def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
 
 
 def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
-    """Draw the pads or, without pads, the ground; return the legend entries."""
+    """Draw the pads or, without pads, the ground, and return the legend entries."""
     if pads is not None:
         return draw_pads(axes, sticks, pads)
     draw_slope(axes, sticks)

@@ -68,7 +68,7 @@ def illustration(
 
 
 def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against: str, _results: Results) -> Drawn:
-    """Plot a sweep; the caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
+    """Plot a sweep. The caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
     dimensions = group["outcome"].ndim
     # with few values of one parameter, a line is drawn for each
     a_map = dimensions == 2 and not against and min(group["outcome"].shape) > MAX_LINES
@@ -86,7 +86,9 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
 
 
 def one_over_another(group: Group, names: Sequence[str], against: str) -> Figure:
-    """Plot each quantity over the quantity `against`, a row each; join the points in order if one parameter varies."""
+    """Plot each quantity over the quantity `against`, a row each, and join the points in order if one
+    parameter varies.
+    """
     x, few = spread(group, against)
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=True):
@@ -111,7 +113,7 @@ def label(group: Group, name: str) -> str:
 
 
 def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot a row per quantity and a column per parameter; join the points if one parameter varies monotonically."""
+    """Plot a row per quantity and a column per parameter, and join the points if one parameter varies monotonically."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
     figure, axes = panels(0.5 + SWEEP_PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -162,7 +164,7 @@ def marked(group: Group, names: Sequence[str]) -> list[Artist]:
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot each quantity over the parameter with more values; each value of the other parameter gets a line."""
+    """Plot each quantity over the parameter with more values. Each value of the other parameter gets a line."""
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
     x, values = numbers(group, across), group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
@@ -195,7 +197,7 @@ def set_scale(axes: Axes, group: Group, parameter: str, which: str) -> None:
 
 
 def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot a map for each quantity, two per row; the second parameter runs upward."""
+    """Plot a map for each quantity, two per row. The second parameter runs upward."""
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
     figure, axes = panels(0.4 + MAP_HEIGHT * rows, rows, columns, squeeze=False)

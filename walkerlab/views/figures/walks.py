@@ -1,4 +1,4 @@
-"""Figures of both models' walks: 5, 7 and 10 (over time), 9 (limit cycles); and two runs overlaid."""
+"""Figures of both models' walks: 5, 7 and 10 (over time), 9 (limit cycles), and two runs overlaid."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ STRIKE_WIDTH = 0.6
 
 
 def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
-    """Return the values claimed by a study for this scene; empty for other scenes."""
+    """Return the values claimed by a study for this scene, or nothing for other scenes."""
     return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnWalk:
-    """A walk to plot over time; `time`: (samples,) s."""
+    """A walk to plot over time. `time` is (samples,) in s."""
 
     look: Look  # style of its model
     outcome: str  # how the walk ended
@@ -88,7 +88,7 @@ def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
 
 
 def walk_of(result: Content, look: Look) -> DrawnWalk:
-    """Return a stored walk in the style of its model; a recorded walk is labelled with its own name."""
+    """Return a stored walk in the style of its model. A recorded walk is labelled with its own name."""
     times = touch_times(result.groups.get(STEPS, Group({})))
     recorded = look is RECORDED
     look = replace(RECORDED, label=str(result.summary["name"])) if recorded else look
@@ -96,7 +96,7 @@ def walk_of(result: Content, look: Look) -> DrawnWalk:
 
 
 def touch_times(steps: Group) -> Array:
-    """Return the times of the heel strikes (s); empty if no step was completed."""
+    """Return the times of the heel strikes (s), or nothing if no step was completed."""
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
@@ -207,7 +207,7 @@ ARROW_LENGTH = 0.06
 
 
 def draw_cycles(results: Results) -> Drawn:
-    """Plot a phase plane for each leg on equal scales; the caption gives the strides shown and how the walks ended."""
+    """Plot a phase plane for each leg on equal scales. The caption gives the strides shown and how the walks ended."""
     walks, extent = first_strides(walks_with(results, STATES), CYCLES)
     figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
     for leg, panel in enumerate(axes):
@@ -304,7 +304,7 @@ RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
 def draw_runs(
     first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]
 ) -> list[bytes] | None:
-    """Draw two runs' walks overlaid, as SVG and PNG; None if they share no sampled walk."""
+    """Draw two runs' walks overlaid, as SVG and PNG, or return None if they share no sampled walk."""
     both = [
         (stage, [run[stage].groups["trajectory"] for run in (first, second)])
         for stage in (RIGID_STAGE, CONTACT_STAGE)

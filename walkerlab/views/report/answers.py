@@ -33,14 +33,14 @@ MAX_CYCLE = 12
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """Return lines that summarise a stage's result; for a stage that is not in `ANSWERS`, list the summary's keys."""
+    """Return lines that summarise a stage's result. For a stage that is not in `ANSWERS`, list the summary's keys."""
     if not summary:
         return []
     return lay_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(describe_summary(summary, short=True))
 
 
 def answer_html(stage: str, summary: Summary) -> str:
-    """Return the answer as HTML; for a stage that is not in `ANSWERS`, its lines as they are."""
+    """Return the answer as HTML. For a stage that is not in `ANSWERS`, the lines are kept as they are."""
     # Imported here: terminals need no templates.
     from walkerlab.views.report.page import environment, to_markup
 
@@ -57,7 +57,7 @@ def answer_html(stage: str, summary: Summary) -> str:
 
 
 def further_tables(stage: str, summary: Summary) -> list[str]:
-    """Return lines that complete an answer, as `--verbose` shows them; empty if the answer is complete."""
+    """Return lines that complete an answer, as `--verbose` shows them, or none if the answer is complete."""
     if stage != "robustness" or not summary:
         return []
     from walkerlab.views.report.sections import robustness
@@ -106,7 +106,7 @@ def walk_row(title: str, key: str, digits: int = 4) -> Column:
 
 
 def energy_lost(dissipated: Mapping[str, float]) -> str:
-    """List a walk's energy losses by cause; empty if nothing was lost."""
+    """List the energy losses of a walk by cause, or return '' if nothing was lost."""
     losses = {name: quantity(lost, "J", 3) for name, lost in dissipated.items() if lost}
     return join_words(f"{lost} {CHANNELS.get(name, name)}" for name, lost in losses.items())
 
@@ -148,7 +148,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
-    """Format the quantities of the steps shown, by step number; '…' stands for the middle of a long walk."""
+    """Format the quantities of the steps shown, by step number. '…' stands for the middle of a long walk."""
     from walkerlab.views.report.sections.walks import format_step
 
     every = {key: values for key in STEP_HEADS if (values := summary.get(key))}
@@ -225,7 +225,7 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 
 def continuation(summary: Summary) -> list[str | Table]:
-    """Summarise the families and list every bifurcation; `walkerlab show` lists branches and exponents."""
+    """Summarise the families and list every bifurcation. `walkerlab show` lists branches and exponents."""
     from walkerlab.views.report.sections import families
 
     branches = count(len(summary["branches"]), "branch", "branches")
@@ -276,7 +276,7 @@ def measurements_to_make(summary: Summary) -> list[str | Table]:
 
 
 def engines(summary: Summary) -> list[str | Table]:
-    """Report the conclusions for each scene; `walkerlab show` lists every run."""
+    """Report the conclusions for each scene. `walkerlab show` lists every run."""
     conclusions = [
         f"{scene}, {experiment}: {text}"
         for scene, concluded in summary["conclusions"].items()

@@ -59,7 +59,7 @@ WORK_ROUNDING = 1e-12
 
 
 def works(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield a column for each source of work; values at rounding level are omitted."""
+    """Yield a column for each source of work. Values at rounding level are omitted."""
     for name, source in WORK_SOURCES.items():
 
         def source_work(record: Mapping[str, Any], name: str = name) -> float | None:
@@ -95,7 +95,7 @@ def symbol(name: str) -> str:
 
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
-    """Format one multiplier of a gait; a dash if the gait has fewer multipliers."""
+    """Format one multiplier of a gait, or a dash if the gait has fewer multipliers."""
     multipliers = gait["multipliers"]
     return complex_number(*multipliers[place]) if place < len(multipliers) else NONE
 

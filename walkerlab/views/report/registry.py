@@ -66,7 +66,7 @@ SECTIONS: tuple[SectionMaker, ...] = (
 
 
 def pages_of(results: Results, run: str) -> tuple[Page, ...]:
-    """Build the report and the further pages that have content; `run`: name of the run's folder."""
+    """Build the report and the further pages that have content. `run` is the name of the run's folder."""
     sections = sections_of(results)
     main = [section for section in sections if section.page == MAIN]
     further = {file: tuple(section for section in sections if section.page == file) for file in closing.TITLES}

@@ -53,7 +53,7 @@ TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\t
 
 
 def as_tex(content: Table, columns: int = 1) -> bytes:
-    """Format a table for booktabs and siunitx, as a float if it has a caption; columns of sentences are left out.
+    """Format a table for booktabs and siunitx, as a float if it has a caption. Columns of sentences are left out.
 
     columns  journal columns that the table spans; its type is as small as they require
     """
@@ -98,7 +98,7 @@ def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Seq
 
 
 def in_column(data: Sequence[Any]) -> tuple[str, list[str]]:
-    """Return layout and cells of a column; a numeric column is a siunitx column, aligned at the decimal point."""
+    """Return layout and cells of a column. A numeric column is a siunitx column, aligned at the decimal point."""
     numbers = [value for value in data if is_number(value)]
     written = column_format(numbers)
     cells = [written(value) if is_number(value) else in_tex(value) for value in data]
@@ -140,7 +140,7 @@ def room_for(cells: Sequence[str]) -> str:
 
 
 def in_tex(value: Any) -> str:
-    """Convert a text to LaTeX: symbols and powers in maths, special characters escaped; a dash for None."""
+    """Convert a text to LaTeX: symbols and powers in maths, special characters escaped, and a dash for None."""
     if value is None:
         return EMPTY_CELL
     text = SIGNS.sub(lambda match: IN_MATHS[match[0]], ESCAPED_POWER.sub(r"$^{\1}$", str(value).translate(TEX)))

@@ -14,7 +14,7 @@ LONGEST_ROW, ENDS = 12, 4
 
 
 def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:
-    """Yield a line per key, nested values below it, and a table for a list of objects; `short` shortens long rows."""
+    """Yield a line per key, nested values below it, and a table for a list of objects. `short` shortens long rows."""
     widest = max((len(key) for key in summary), default=0)
     for key, value in summary.items():
         if isinstance(value, Mapping) and value:
@@ -28,7 +28,7 @@ def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bo
 
 
 def cut(value: Any) -> Any:
-    """Leave out the middle of a long row; return other values unchanged."""
+    """Leave out the middle of a long row, and return other values unchanged."""
     if not isinstance(value, list) or len(value) <= LONGEST_ROW:
         return value
     ends = [in_words(item) for item in (*value[:ENDS], *value[-ENDS:])]

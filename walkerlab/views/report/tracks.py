@@ -71,7 +71,7 @@ class Track:
 
 
 def track_in(trajectory: Group | None) -> Track | None:
-    """Read the motion from a stored trajectory; None if it lacks joint positions."""
+    """Read the motion from a stored trajectory, or return None if it lacks joint positions."""
     if trajectory is None or "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
         return None
     names = trajectory.variables.keys()
@@ -89,7 +89,7 @@ def track_in(trajectory: Group | None) -> Track | None:
 
 
 def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:
-    """Integrate how far a foot has slipped since it last touched down (m); zero in the air."""
+    """Integrate how far a foot has slipped since it last touched down (m). It is zero in the air."""
     sliding = np.where(touching, velocity, 0.0)
     way = np.concatenate(([0.0], np.cumsum(0.5 * (sliding[1:] + sliding[:-1]) * np.diff(time))))
     begins = touching & ~np.concatenate(([False], touching[:-1]))

@@ -1,4 +1,4 @@
-"""MuJoCo: soft convex contact in constraint space, tuned by `exchange/mjcf.py`; fixed steps."""
+"""MuJoCo: soft convex contact in constraint space, tuned by `exchange/mjcf.py`, at fixed steps."""
 
 from typing import Any
 

@@ -12,7 +12,10 @@ from walkerlab.scene.parts import assembly_of
 
 
 def supported_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """Return a config's scene for engines; raises ConfigError for a walker that other engines do not support."""
+    """Return a config's scene for engines.
+
+    Raises ConfigError for a walker that other engines do not support.
+    """
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(

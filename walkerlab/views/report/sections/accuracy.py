@@ -83,7 +83,7 @@ def failure_text(run: Row) -> str:
 
 
 def nearest_library(summary: Row, scene: str) -> Row | None:
-    """Return the run of a library that ends closest to the reference; None if no library reached the end."""
+    """Return the run of a library that ends closest to the reference, or None if no library reached the end."""
     runs = [row for row in summary["rows"] if row["scene"] == scene and row["error"] is not None]
     library_runs = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
     return min(library_runs, key=lambda row: float(row["error"]), default=None)

@@ -34,7 +34,7 @@ ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit
 
 
 def limit(results: Results) -> Section | None:
-    """Show how the contact model converges to the rigid one; None if that was not computed."""
+    """Show how the contact model converges to the rigid one, or return None if that was not computed."""
     summary = results.summary("tune")
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
     pushes = results.config.push_off.impulse_N_s != 0.0
@@ -51,7 +51,9 @@ def limit(results: Results) -> Section | None:
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
-    """Tabulate the start before and after the adjustment; for the paper's scene, next to its Table 2."""
+    """Tabulate the start before and after the adjustment. For the scene of the paper, its Table 2 is shown next to
+    them.
+    """
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     caption, note, head = "The start before and after the adjustment", "", "coordinate"
     if results.claims:
@@ -75,7 +77,7 @@ LOSS_HEADS = {
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
-    """Return the energy (J) that a gait loses in a channel; None for a knee channel without losses."""
+    """Return the energy (J) that a gait loses in a channel, or None for a knee channel without losses."""
     energy = gait["lost_J"].get(channel)
     return energy if energy or channel in ("damping", "friction") else None
 

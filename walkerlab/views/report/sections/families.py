@@ -78,7 +78,9 @@ class DiagramAxis:
 
 
 def gait_diagram(results: Results) -> Diagram | None:
-    """Plot step periods over the parameter, with marks for gaits whose motion is stored; None if no motion is."""
+    """Plot step periods over the parameter, with marks for gaits whose motion is stored, or return None if no motion
+    is.
+    """
     summary = results.summary("continuation")
     branches: list[Group] = []
     while (branch := results.group("continuation", f"{DIAGRAM_MODEL}/branch_{len(branches)}")) is not None:

@@ -139,7 +139,7 @@ def steps(results: Results) -> Section | None:
 
 
 def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
-    """Format a quantity of step `place`, from 0, with the decimals that its numerical error allows; slips in mm."""
+    """Format a quantity of step `place`, from 0, with the decimals that its numerical error allows. Slips are in mm."""
     value, factor = summary[key][place], 1e3 if key == "slips_m" else 1.0
     errors, name = summary.get("numerical_error") or {}, ERROR_OF_EACH_STEP[key]
     error = errors["of_steps"][name][place] if name in errors.get("of_steps", ()) else errors.get(name)
