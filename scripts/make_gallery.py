@@ -48,7 +48,7 @@ def gait_of(point: Any, slope_deg: float, hip_kg: float) -> dict[str, Any]:
         "text": text,
         "slope_rad": walk.summary["slope_rad"],
         "meta": shown.meta,
-        "floats": shown.track.packed(),
+        "floats": shown.track.pack(),
         "track": track,
     }
 
@@ -58,7 +58,7 @@ def walker(name: str, track: Track, strikes: Sequence[float]) -> Walker:
     return Walker(
         name=name,
         style="rigid",
-        track=track.thinned(1.0 / SAMPLES_A_SECOND),
+        track=track.thin(1.0 / SAMPLES_A_SECOND),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, list(strikes)),
     )

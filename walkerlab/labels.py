@@ -58,7 +58,7 @@ def axis_label(key: str) -> str:
     return " ".join(part.removesuffix(f"_{unit_ending(part)}").replace("_", " ") for part in parts)
 
 
-def with_unit(words: str, unit: str) -> str:
+def add_unit(words: str, unit: str) -> str:
     return words if unit in ("", "1") else f"{words} ({unit})"
 
 

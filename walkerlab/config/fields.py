@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from walkerlab.config.numbers import short_number
-from walkerlab.labels import with_unit
+from walkerlab.labels import add_unit
 
 
 class Block(BaseModel):
@@ -183,4 +183,4 @@ def describe_allowed(field: FieldInfo) -> str:
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
         bounds = f"{what}, {bounds}" if bounds not in ("", what, f"any {what}") else what
-    return with_unit(bounds, unit)
+    return add_unit(bounds, unit)

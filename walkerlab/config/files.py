@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.problems import KEYS_ARE_LISTED, beyond_scope, nearest, printable, problem_error
+from walkerlab.config.problems import KEYS_ARE_LISTED, explain_missing_feature, nearest, printable, problem_error
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import BlockNode, ListNode, Position, Scalar
 
@@ -75,7 +75,8 @@ def read_layers(file: ConfigFile) -> list[BlockNode]:
     refers to another file.
     """
     layers = [
-        with_cases(root.without("extends"), layer_file.path.parent) for layer_file, root in files_and_blocks(file)
+        replace_cases_file(root.without("extends"), layer_file.path.parent)
+        for layer_file, root in files_and_blocks(file)
     ]
     return layers[::-1]
 
@@ -113,7 +114,7 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]
             return
         reference = extends.position
         if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
-            raise problem_error(reference, "extends: is not the name of a config", _what_there_is())
+            raise problem_error(reference, "extends: is not the name of a config", _describe_choices())
         is_builtin = extends.value in builtin_names()  # otherwise a path relative to the file's folder
         file = builtin_config(extends.value) if is_builtin else file_at(file.path.parent / extends.value)
 
@@ -138,7 +139,7 @@ def cases_file(layer: BlockNode, folder: Path) -> tuple[ConfigFile, Position] | 
     return file_at(folder / file_name.value), file_name.position
 
 
-def with_cases(layer: BlockNode, folder: Path) -> BlockNode:
+def replace_cases_file(layer: BlockNode, folder: Path) -> BlockNode:
     """Replace a file name under stability.cases (relative to `folder`) by the list of cases in that file.
 
     Raises ConfigError if the file cannot be read or holds no list.
@@ -156,7 +157,7 @@ def with_cases(layer: BlockNode, folder: Path) -> BlockNode:
     return result
 
 
-def _what_there_is() -> str:
+def _describe_choices() -> str:
     return f"a file, or one of {', '.join(builtin_names())}"
 
 
@@ -175,10 +176,10 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
         with file.path.open("rb") as stream:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
-        there_is = purpose or _what_there_is() if reference else f"a run, {_what_there_is()}"
-        beyond = "" if purpose or file.path.suffix else beyond_scope(file.path.name)
+        there_is = purpose or _describe_choices() if reference else f"a run, {_describe_choices()}"
+        beyond = "" if purpose or file.path.suffix else explain_missing_feature(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
-        raise problem_error(reference, text, there_is, "" if beyond else _near(file), advice) from None
+        raise problem_error(reference, text, there_is, "" if beyond else _suggest_name(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: null byte in the name; RuntimeError: link loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise problem_error(reference, f"{kind} {file.label} cannot be read: {reason.lower()}", advice=advice) from None
@@ -192,7 +193,7 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
         raise problem_error(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?") from None
 
 
-def _near(file: ConfigFile) -> str:
+def _suggest_name(file: ConfigFile) -> str:
     """Suggest an existing file or built-in config for a missing one."""
     neighbours: list[str] = []
     with contextlib.suppress(OSError, ValueError):

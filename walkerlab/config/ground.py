@@ -29,7 +29,7 @@ class Footholds(Block):
 
     @field_validator("heights_m")
     @classmethod
-    def _near_the_slope(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+    def _check_heights(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if any(abs(height) > 1e3 for height in value):
             raise meaning_error("must be numbers from -1e3 to 1e3")
         return value

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from walkerlab.config.canonical import flatten
 from walkerlab.config.fields import block_of
-from walkerlab.config.files import DEFAULT, ConfigFile, builtin_config, find_config, read_layers, with_cases
+from walkerlab.config.files import DEFAULT, ConfigFile, builtin_config, find_config, read_layers, replace_cases_file
 from walkerlab.config.layers import ConfigSetting, apply_settings, merge_layers, option_setting, parse_setting
 from walkerlab.config.numbers import short_number
 from walkerlab.config.overlay import check_cases
@@ -93,7 +93,7 @@ def load(
     settings = [parse_setting(text) for text in sets]
     options = {"strides": strides, "name": name}
     settings += [option_setting(key, value) for key, value in options.items() if value is not None]
-    changed_tree = with_cases(apply_settings(tree, settings), Path())
+    changed_tree = replace_cases_file(apply_settings(tree, settings), Path())
     changed = validate_tree(changed_tree)
     base = validate_tree(tree) if settings else changed
     check_cases(changed, changed_tree)

@@ -5,7 +5,7 @@ import re
 from decimal import Decimal
 from typing import Any, Final
 
-SAME: Final = 1e-9
+RELATIVE_ROUNDING: Final = 1e-9
 """Maximum relative difference between numbers that count as equal; unit conversion rounds numbers by less."""
 
 DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
@@ -24,8 +24,8 @@ def short_number(number: float) -> str:
     return min(plain, f"{digits}e{int(exponent)}", key=len)
 
 
-def same(first: Any, second: Any) -> bool:
+def are_equal(first: Any, second: Any) -> bool:
     """Whether two values are equal, numbers up to rounding."""
     if isinstance(first, float | int) and isinstance(second, float | int):
-        return math.isclose(first, second, rel_tol=SAME)
+        return math.isclose(first, second, rel_tol=RELATIVE_ROUNDING)
     return bool(first == second)

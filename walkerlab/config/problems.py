@@ -52,7 +52,7 @@ def problem_error(
     return problems_error([Problem(position, text, allowed, near)], advice)
 
 
-def beyond_scope(word: str) -> str:
+def explain_missing_feature(word: str) -> str:
     """Explain in a sentence why walkerlab lacks the feature that `word` names, or return '' if no pattern matches."""
     return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 

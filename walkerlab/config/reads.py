@@ -249,6 +249,6 @@ if TYPE_CHECKING:
         ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, IdentifyConfig, PlanConfig, NamedConfig,
     ]  # fmt: skip
 
-    def for_each_type(config: schema.Config) -> OfEachType:
+    def check_every_type(config: schema.Config) -> OfEachType:
         """Let mypy check that a config satisfies every type."""
         return config, config, config, config, config, config, config, config, config, config, config, config, config

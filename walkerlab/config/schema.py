@@ -92,7 +92,7 @@ def state_of(start: Any) -> tuple[float, ...]:
     return start.state if isinstance(start, MidStep) else tuple(start)
 
 
-def with_state(start: Any, state: tuple[float, ...]) -> Any:
+def replace_state(start: Any, state: tuple[float, ...]) -> Any:
     """Return a start at the same instant with another state."""
     return MidStep(instant=MID_STEP, state=state) if isinstance(start, MidStep) else state
 

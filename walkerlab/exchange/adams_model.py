@@ -327,7 +327,7 @@ class FootTerms:
     def height(self) -> str:
         return f"DY({self.place()})-{finite(self.radius)}" if self.radius else f"DY({self.place()})"
 
-    def where_carried(self, expression: str, elsewhere: str = "0") -> str:
+    def restrict_to_pads(self, expression: str, elsewhere: str = "0") -> str:
         """Restrict an expression to the pads of the foot's lane; over the gaps between them it is `elsewhere`."""
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
@@ -401,7 +401,7 @@ def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
         place, length = (foot.place(), foot.radius) if foot.radius else (foot.place(BELOW), FREE_LENGTH_MM)
         numbers = ",".join(finite(value) for value in (length, *normal))
         model.variables[f"{leg}_slip"] = foot.slip
-        model.variables[f"{leg}_normal"] = foot.where_carried(f"IMPACT(DY({place}),VY({foot.motion}),{numbers})")
+        model.variables[f"{leg}_normal"] = foot.restrict_to_pads(f"IMPACT(DY({place}),VY({foot.motion}),{numbers})")
         model.variables[f"{leg}_friction"] = "0" if friction is None else friction_function(leg, friction)
 
 
@@ -489,7 +489,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         model.torques[f"stop_{number + 1}"] = Torque(i, j, f"-IMPACT(1-{angle},-{rate},{stop})")
         model.motions[f"lock_{number + 1}"] = f"hinge_of_{shank}"
         place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
-        down = foot.where_carried(f"-({foot.height})", elsewhere="-1")
+        down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
         sinking = f"VY({foot.motion})"
         if f"{other}_pulses" in model.variables:
             # the trailing knee stays locked during the push-off
@@ -540,7 +540,7 @@ def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
             "foot_height": terms.height,
             "normal_force": normal,
             "friction_force": friction,
-            "penetration": terms.where_carried(f"MAX(0,-({terms.height}))"),
+            "penetration": terms.restrict_to_pads(f"MAX(0,-({terms.height}))"),
             "slip_velocity": terms.slip,
         }
     hip = f"{{{export.names[0]}.hinge}}"

@@ -56,7 +56,7 @@ class EngineScene:
         bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
-    def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
+    def lock_knees(self, doing: NDArray[np.int8]) -> EngineScene:
         """Scene in which the knees in state LOCKED are locked."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
@@ -89,7 +89,7 @@ class EngineScene:
         forward, upward = c * d[:, 0] - s * d[:, 1], s * d[:, 0] + c * d[:, 1]
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
-    def started(self, factor: float) -> EngineScene:
+    def scale_start(self, factor: float) -> EngineScene:
         """Scene with the start's velocities multiplied by `factor`; the stance foot still does not slip."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))

@@ -45,7 +45,7 @@ STEP_S, DAMPED_STEP, PAD_M = 2.5e-5, 0.33, 0.05
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
 """Settings that make couplings and locks as stiff as MuJoCo's constraints can be with time steps of STEP_S."""
-CLOSE = 'iterations="100" tolerance="1e-12"'
+TIGHT_SOLVER = 'iterations="100" tolerance="1e-12"'
 
 
 Slope = Literal["gravity", "geometry"]
@@ -146,7 +146,7 @@ def rates_at(point: Position, start: Position, rates: Floats) -> Floats:
 def option_text(model: PlanarModel, contact: Mapping[str, float] | None, more: str = "") -> str:
     """Write the element `option`: tilted gravity and, with contact, the friction cone."""
     cone = "" if contact is None else f'cone="elliptic" impratio="{contact["impratio"]!r}" '
-    return f'<option {more}gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {cone}{CLOSE}/>'
+    return f'<option {more}gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {cone}{TIGHT_SOLVER}/>'
 
 
 def body_text(
@@ -242,7 +242,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
     scene = "".join(
         (
             *(pad_text(export, number, pad) for number, pad in enumerate(export.pads)),
-            body_text(model, 0, contact, feet, named_hinges(export)),
+            body_text(model, 0, contact, feet, hinge_names(export)),
         )
     )
     if slope == "geometry":
@@ -283,7 +283,7 @@ def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
     return min(STEP_S, float(f"{DAMPED_STEP / max(rates):.0e}"))
 
 
-def named_hinges(export: Exported) -> dict[int, Hinge]:
+def hinge_names(export: Exported) -> dict[int, Hinge]:
     """Name the hip and the knees, with the hip's spring and damper and the stops of compliant knees."""
     hip, weights, stop = export.hip, inverse_weights(export.model).joints, export.scene.ours.stop
     acts = f'stiffness="{hip.spring_N_m_per_rad!r}" damping="{hip.damping_N_m_s_per_rad!r}"'

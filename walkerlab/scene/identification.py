@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.config.fields import value_at
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.labels import unit_by_name, with_unit
+from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
@@ -167,13 +167,13 @@ def identify_with(
     if not walked:
         return str(fits[0])
     best = max(walked, key=lambda result: (not result.why, result.evaluation.likelihood))
-    timed = in_time(best, begin)
+    timed = refit_in_time(best, begin)
     if timed is None:
         return describe(subject, question, best, best)
     return describe(subject, question, evaluate_at(timed.u[: best.u.size], best) or best, timed)
 
 
-def in_time(first: Fitted, begin: Begin) -> Fitted | None:
+def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
     """Refit angles at their sample times, from the fit at equal phase, or return None for measured steps or a failed
     fit.
     """
@@ -319,7 +319,7 @@ def better_with(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Ite
         if gain * left > DECISIVE_GAIN:
             start = NUISANCES.get(other.name, (other.value, 0.0))[0]
             option = "--nuisance" if other.name in NUISANCES else "--fit"
-            value = with_unit(f"{start + free.move[-1] * other.scale:.4g}", other.unit)
+            value = add_unit(f"{start + free.move[-1] * other.scale:.4g}", other.unit)
             yield (
                 f"{other.name} of {value} instead of {start:.4g} would raise the log-likelihood by about {gain:.3g}: "
                 f"estimate it, too ({option} {other.name})"

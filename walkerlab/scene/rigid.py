@@ -17,7 +17,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import PARTS_DOCS, assembly_of, drive_parameters, knee_locked_at_strike
-from walkerlab.scene.studies import with_equations
+from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
@@ -62,7 +62,7 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
     """Return the rigid walker of a config. `equations` overrides the config's set of equations."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
-    return with_equations(passive.changed(**drive_parameters(config)), equations or config.equations)
+    return replace_equations(passive.changed(**drive_parameters(config)), equations or config.equations)
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)

@@ -30,7 +30,7 @@ def starts_of(
     return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
 
 
-def for_a_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
+def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """Return the same starts with the solver settings of a map.
 
     evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them

@@ -370,7 +370,10 @@ def test_phone_shows_walk_play_button_and_a_slider_together(browser, served):
         middle = f"document.querySelector('{slider}').closest('.turn').getBoundingClientRect()"
         assert page.evaluate(f"document.querySelector('.walk').getBoundingClientRect().bottom <= {middle}.top")
         assert page.evaluate(f"{middle}.bottom <= document.querySelector('.controls').getBoundingClientRect().top")
-    scrolling = "[...document.querySelectorAll('#walk-section, #walk-section *')].filter(one => one.scrollHeight > one.clientHeight + 1"
+    scrolling = (
+        "[...document.querySelectorAll('#walk-section, #walk-section *')]"
+        ".filter(one => one.scrollHeight > one.clientHeight + 1"
+    )
     assert page.evaluate(f"{scrolling} && getComputedStyle(one).overflowY === 'auto').length") == 0
     page.evaluate("document.querySelector('.play').click()")
     page.until(f"{TIME} > 0")

@@ -37,7 +37,7 @@ class MethodRun:
     result: TrialRun
     walls_s: tuple[float, ...]
 
-    def packed(self) -> Numbers:
+    def pack(self) -> Numbers:
         """Return the numbers that `unpack` takes, for a checkpoint."""
         run = self.result
         counts = run.rhs_evaluations, run.accepted, run.rejected
@@ -100,7 +100,7 @@ def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
     for tolerance in ladder:
         unit = unit_name(trial.name, method, tolerance)
         if unit not in checkpoint.kept:
-            checkpoint.keep(unit, measure(trial, method, tolerance, budget).packed())
+            checkpoint.keep(unit, measure(trial, method, tolerance, budget).pack())
         runs.append(MethodRun.unpack(checkpoint.kept[unit]))
         if runs[-1].result.rhs_evaluations >= last:
             break
@@ -125,7 +125,7 @@ def time_walk(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
 
 
 def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
-    end, result = reference.for_method(ascent.method), run.result
+    end, result = reference.reference_for(ascent.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
     below_agreement = error is not None and error <= reference.agreement
     return MethodRow(

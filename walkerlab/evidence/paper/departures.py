@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from walkerlab.config.contact import BOUNDS_SI, Contact
 from walkerlab.config.drives import acting_on
-from walkerlab.config.numbers import same
+from walkerlab.config.numbers import are_equal
 from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import CompassWalker
@@ -52,7 +52,7 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
 
 def describe_differences(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
     for name in names:
-        if not same(getattr(used, name), getattr(paper, name)):
+        if not are_equal(getattr(used, name), getattr(paper, name)):
             yield describe(called.format(name), getattr(used, name), getattr(paper, name))
 
 

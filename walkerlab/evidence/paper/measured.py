@@ -55,7 +55,7 @@ class EnergyRecord:
     most: float
 
 
-def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
+def mean_over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
     """Average a sampled energy (J) over the last five completed steps (all if fewer), or return None if no step was
     completed.
     """

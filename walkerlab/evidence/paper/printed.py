@@ -172,14 +172,14 @@ def walker_of_the_paper(c21_sign: float) -> RigidWalker:
     return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
 
 
-def printed_speed(cycle: float) -> float:
+def speed_as_printed(cycle: float) -> float:
     """Speed (m/s) as section 5 computes it: the printed step length divided by the time (s) of a cycle."""
     return STEP_LENGTH.value / cycle
 
 
 def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
     """Relative difference (%) of the speeds implied by two cycle times (s)."""
-    matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
+    matlab, adams = speed_as_printed(matlab_cycle), speed_as_printed(adams_cycle)
     return 100.0 * abs(adams - matlab) / matlab
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.evidence.paper.differences import Comparison, compare_motion, motion_of, stored_variable, times_of_steps
-from walkerlab.evidence.paper.measured import Characteristics, EnergyRecord, characteristics, over_last_steps
+from walkerlab.evidence.paper.measured import Characteristics, EnergyRecord, characteristics, mean_over_last_steps
 from walkerlab.pipeline.stages.walk import last_step
 from walkerlab.pipeline.store.content import Content, Group
 
@@ -51,4 +51,4 @@ def stored_energy(walk: Content) -> EnergyRecord | None:
     joules = stored_variable(walk, "trajectory", "mechanical_J")
     if joules is None:
         return None
-    return over_last_steps(walk["trajectory"]["time"], joules, times_of_steps(walk, "touch_time_s"))
+    return mean_over_last_steps(walk["trajectory"]["time"], joules, times_of_steps(walk, "touch_time_s"))

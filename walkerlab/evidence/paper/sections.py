@@ -5,13 +5,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.labels import with_unit
+from walkerlab.labels import add_unit
 from walkerlab.views.report.answers import last_steps
 from walkerlab.views.report.blocks import PAPER_PAGE, PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.views.report.numbers import count, number
 from walkerlab.views.report.outcomes import describe_error
 from walkerlab.views.report.results import Results
-from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.symbols import typeset
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
 from walkerlab.views.report.words import words
 
@@ -50,10 +50,10 @@ def numbers_table(rows: Sequence[Row]) -> Table:
     models = [key for key in MODEL_COLUMNS if any(row.get(key) is not None for row in rows)]
     columns = (
         Column("quantity", lambda row: name_with_unit(row["quantity"], row.get("unit"))),
-        Column("printed", "printed", in_signs, numeric=True),
+        Column("printed", "printed", typeset, numeric=True),
         *(Column(MODEL_COLUMNS[key], key, number, numeric=True) for key in models),
         Column("verdict", "verdict", lambda verdict: Cell(spell_verdict(verdict), TONES.get(verdict, "plain"))),
-        Column("evidence", "evidence", in_signs, wide=True),
+        Column("evidence", "evidence", typeset, wide=True),
     )
     caption = "What the paper prints, and what its equations give"
     return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
@@ -70,7 +70,7 @@ def spell_verdict(verdict: str) -> str:
 
 
 def name_with_unit(name: str, unit: str | None) -> str:
-    return in_signs(with_unit(name, "unit not given" if unit == "not given" else unit or ""))
+    return typeset(add_unit(name, "unit not given" if unit == "not given" else unit or ""))
 
 
 def compared(results: Results, key: str) -> Sequence[Row]:
@@ -102,7 +102,7 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
             continue
         texts = any(isinstance(row.get(key), str) for row in rows.values())
         as_text = texts or any(f"{key}{TEXT_SUFFIX}" in row for row in rows.values())
-        written = in_signs if as_text else partial(number, digits=3 if "percent" in key else 6)
+        written = typeset if as_text else partial(number, digits=3 if "percent" in key else 6)
         source = key if texts or not as_text else f"{key}{TEXT_SUFFIX}"
         columns.append(Column(heads.get(key, key.replace("_", " ")), source, written, numeric=not texts))
     names = {symbol: f"{name}, {symbol}" for symbol, name in words.terms("paper.quantities").items()}
@@ -115,9 +115,9 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
 
 
 ERRATUM_COLUMNS = (
-    Column("where", "where", in_signs),
-    *(Column(name, name, in_signs, wide=True) for name in ("printed", "right", "evidence")),
-    Column("measured here", "measured", in_signs, wide=True),
+    Column("where", "where", typeset),
+    *(Column(name, name, typeset, wide=True) for name in ("printed", "right", "evidence")),
+    Column("measured here", "measured", typeset, wide=True),
 )
 
 
@@ -158,7 +158,7 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
     if gravest:
         yield Paragraph(words("verdict.reasons"))
         statements = (
-            Statement(in_signs(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
+            Statement(typeset(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
             for headline, erratum in gravest
         )
         yield Statements(tuple(statements), "columns")

@@ -54,11 +54,11 @@ from walkerlab.scene.contact import (
     tolerances_of,
 )
 from walkerlab.scene.rigid import rigid_walker, state_names
-from walkerlab.scene.scaled import for_a_map, starts_of
+from walkerlab.scene.scaled import scale_for_map, starts_of
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
-AS_IT_STANDS = (1.0, 1.0)  # factors that leave the velocities of the rigid start unchanged
+UNCHANGED_START = (1.0, 1.0)  # factors that leave the velocities of the rigid start unchanged
 # walks with knees or rolling feet take several times longer to compute, so their map and margins are coarser
 COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
 SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
@@ -121,8 +121,8 @@ class TuneRun:
         if self.pins_foot:
             self.take("hinged", self.rigid_state)
         self.take("released", self.rigid_state)
-        self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
-        quick = for_a_map(self.starts, self.as_it_stands.evaluations)
+        self.as_it_stands = self.starts.walk(*UNCHANGED_START)
+        quick = scale_for_map(self.starts, self.as_it_stands.evaluations)
         rows = in_order([partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs)
         cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
         self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
@@ -144,7 +144,7 @@ class TuneRun:
         """
         cells = self.contact_map
         if self.as_it_stands.walks:
-            return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)
+            return scaled_starts.Adjustment(*UNCHANGED_START, self.as_it_stands)
         if not cells.walking.size:
             return None
         swing, stance = (float(np.ptp(factors)) / (factors.size - 1) for factors in (cells.swing, cells.stance))
@@ -287,17 +287,17 @@ def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
     """Return descriptions and units of a gait's coordinates on its section."""
     walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
 
-    def of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
+    def coordinates_of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
         roles = ["stance" if body in walker.legs[STANCE_FOOT] else "swing" for body in bodies]
         bare = [names[body].rstrip(" 0123456789") for body in bodies]
         return [(f"{quantity} of the {role} {name}", unit) for role, name in zip(roles, bare, strict=True)]
 
     return [
         ("height of the centre of mass over the slope", "m"),
-        *of("angle", "rad", angled_bodies(walker, STANCE_FOOT)),
+        *coordinates_of("angle", "rad", angled_bodies(walker, STANCE_FOOT)),
         ("velocity of the centre of mass along the slope", "m/s"),
         ("velocity of the centre of mass normal to the slope", "m/s"),
-        *of("angular velocity", "rad/s", turning_bodies(walker, STANCE_FOOT)),
+        *coordinates_of("angular velocity", "rad/s", turning_bodies(walker, STANCE_FOOT)),
     ]
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 from walkerlab.config.fields import Block
 from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.reader import read
-from walkerlab.config.schema import Config, state_of, with_state
+from walkerlab.config.schema import Config, replace_state, state_of
 from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.tree import plain
 from walkerlab.config.walkers import has_knees
@@ -116,13 +116,13 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
         state, rotation = state_of(config.start), config.slope_rad - slope
         n = len(state) // 2
         turned = (*(x + rotation for x in state[:n]), *(start * x for x in state[n:]))
-        values |= {"slope_rad": slope, "start": with_state(config.start, turned)}
+        values |= {"slope_rad": slope, "start": replace_state(config.start, turned)}
     for path, value in values.items():
-        config = with_key(config, path, value)
+        config = replace_key(config, path, value)
     return config
 
 
-def with_key(block: B, path: str, value: Any) -> B:
+def replace_key(block: B, path: str, value: Any) -> B:
     """Return a copy of a block with the value at a dotted path replaced."""
     name, _, tail = path.partition(".")
-    return block.model_copy(update={name: with_key(getattr(block, name), tail, value) if tail else value})
+    return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})

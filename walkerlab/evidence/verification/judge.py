@@ -13,7 +13,14 @@ from walkerlab.evidence.verification.catalogue import config_of
 from walkerlab.evidence.verification.ordinary import Choice, choices
 from walkerlab.evidence.verification.scaling import scaled, to_twin
 from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, Start, case_tolerances, prepare_start
-from walkerlab.evidence.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
+from walkerlab.evidence.verification.verdict import (
+    BUDGET_USED,
+    CaseResult,
+    Measure,
+    NotMeasured,
+    allowed_difference,
+    finite,
+)
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS, Method, method_named
 from walkerlab.pipeline.run.workers import in_order
@@ -73,7 +80,7 @@ def judge(case: Case, config: Config) -> CaseResult:
     remarks: list[str] = []
     second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
     if walk.outcome.answered:
-        short = start.again(case)
+        short = start.repeated_case(case)
         second = second_walk(
             methods.method,
             case.budget,
@@ -119,7 +126,7 @@ def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case
         return []
     else:
         difference = abs(first.end - second.end)
-    limit = promised(case, rtol, first.accepted + second.accepted)
+    limit = allowed_difference(case, rtol, first.accepted + second.accepted)
     return [Measure(f"difference in time from {what}, in pendulum times", finite(difference), limit)]
 
 

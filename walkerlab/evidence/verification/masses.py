@@ -62,7 +62,7 @@ class Moving:
         """Kinetic energy (J)."""
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
 
-    def about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
+    def momentum_about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
         """Return the angular momentum (kg m^2/s) about a point. `on_masses` and `on_bodies` are the weights of their
         terms.
         """
@@ -119,8 +119,8 @@ class RigidMasses:
         """
         share = self.shares[SWING if new else STANCE]
         foothold = np.zeros(2) if new else moving.contact
-        walker_momentum = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
-        return walker_momentum, moving.about(moving.hip, share[self.owner], share)
+        walker_momentum = moving.momentum_about(foothold, np.ones(len(self.owner)), np.ones(share.size))
+        return walker_momentum, moving.momentum_about(moving.hip, share[self.owner], share)
 
     def momentum_change(self, before: Sequence[Moving], after: Sequence[Moving], push_off: float = 0.0) -> float:
         """Return the largest relative change of the conserved momenta over heel strikes. `push_off` is in N s."""

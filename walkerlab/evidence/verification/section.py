@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.evidence.verification.verdict import BUDGET_USED
 from walkerlab.outcome import outcome_of
 from walkerlab.views.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section, Statement, Statements
-from walkerlab.views.report.numbers import number, whole
+from walkerlab.views.report.numbers import format_integer, number
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.views.report.words import words
@@ -27,7 +27,7 @@ def section(results: Results, summary: Row) -> Section | None:
     unmeasured = [
         {**row, "why": f"{measure['measure']}: {measure['why']}"} for row in cases for measure in row["not_measured"]
     ]
-    note = words("stability.cases", by_reason(unanswered), by_reason(unmeasured))
+    note = words("stability.cases", group_by_reason(unanswered), group_by_reason(unmeasured))
     planes = results.summary("stability-maps")
     blocks: tuple[PageBlock, ...] = (
         *(Paragraph(failure, "bad") for failure in failures(summary)),
@@ -72,16 +72,16 @@ def worst_measure(row: Row) -> float | None:
 CASE_COLUMNS = (
     Column("case", "name"),
     Column("ended as", ending),
-    Column("steps", "steps", whole, numeric=True),
+    Column("steps", "steps", format_integer, numeric=True),
     Column("other method", "second_method", lambda name: name or "none"),
     Column("worst measure / limit", worst_measure, partial(number, digits=2), numeric=True),
-    Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
+    Column("right-hand sides", "rhs_evaluations", format_integer, numeric=True),
     measured("time", "wall_s", partial(number, digits=3), prefix="m"),
     Column("why expected", "reason", wide=True),
 )
 
 
-def by_reason(cases: Rows) -> str:
+def group_by_reason(cases: Rows) -> str:
     return "; ".join(f"{why} ({', '.join(row['name'] for row in rows)})" for why, rows in grouped(cases, "why").items())
 
 

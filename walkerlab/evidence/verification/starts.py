@@ -59,7 +59,7 @@ class CaseStart:
     start: State
     energy: float  # J, m g L plus kinetic and stored energy at the start; the scale of residuals
 
-    def again(self, case: Case) -> Case:
+    def repeated_case(self, case: Case) -> Case:
         """Return the case for a repeated walk: with all its steps, because outcomes are compared, too."""
         return case
 
@@ -69,7 +69,7 @@ class RigidStart(CaseStart):
     residual_name: ClassVar[str] = "energy drift within a swing"
     walker: RigidModel
 
-    def again(self, case: Case) -> Case:
+    def repeated_case(self, case: Case) -> Case:
         """Return the case for a repeated walk, with only the steps whose times are compared."""
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 

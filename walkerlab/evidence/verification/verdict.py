@@ -74,7 +74,7 @@ def finite(value: float) -> float:
     return float(value) if math.isfinite(value) else 1e300
 
 
-def promised(case: Case, rtol: float, steps: int) -> float:
+def allowed_difference(case: Case, rtol: float, steps: int) -> float:
     """Return the largest expected difference between the times of two walks, in pendulum times.
 
     rtol   the larger relative tolerance of the two walks

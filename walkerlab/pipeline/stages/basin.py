@@ -150,7 +150,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
-    from walkerlab.scene.scaled import for_a_map, starts_of
+    from walkerlab.scene.scaled import scale_for_map, starts_of
 
     gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps
     step_length_m, state = float(gait["step_length_m"]), as_state(gait["state"])
@@ -158,7 +158,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     scene = replace(scene_on_pads(config, step_length_m, state, answer), pinned=False)
     starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
-    return ContactQuestion(scene, rigid, for_a_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
+    return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
 
 def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
@@ -168,16 +168,16 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
         for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
     }
 
-    def over(values: Any, text: str) -> Variable:
+    def grid_variable(values: Any, text: str) -> Variable:
         return Variable(np.ascontiguousarray(values).reshape(window.cells), dims, "1", text)
 
     settled = np.where(ends.attractor == UNREACHED, 0, ends.steps)
     variables |= {
-        "outcome": over(ends.outcome, "how the walk ended; codes in attribute outcomes"),
-        "attractor": over(ends.attractor, "index of the attractor that was reached; -1: none"),
-        "steps": over(ends.steps, "steps taken"),
-        "steps_to_settle": over(settled, "steps until the attractor was reached; 0: none was"),
-        "walking": over(walking, "fraction of the cell that walks; edge cells: from their subcells"),
+        "outcome": grid_variable(ends.outcome, "how the walk ended; codes in attribute outcomes"),
+        "attractor": grid_variable(ends.attractor, "index of the attractor that was reached; -1: none"),
+        "steps": grid_variable(ends.steps, "steps taken"),
+        "steps_to_settle": grid_variable(settled, "steps until the attractor was reached; 0: none was"),
+        "walking": grid_variable(walking, "fraction of the cell that walks; edge cells: from their subcells"),
     }
     held_values = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})

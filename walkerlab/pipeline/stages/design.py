@@ -107,7 +107,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
             {"quantity": name, "from": low, "to": high, "value": best.point.numbers[name]}
             for name, (low, high) in keep.items()
         ],
-        "on_bound": on_bound(design, best.x),
+        "on_bound": keys_on_bound(design, best.x),
         "gradient_norm": best.gradient_norm,
         "evaluations": int(gaits.counts[0]),
         "without_gait": int(gaits.counts[1]),
@@ -150,7 +150,7 @@ def refuse(config: DesignConfig) -> None:
                 raise parameter.refusal(config, bound, ("design", "over"))
 
 
-def on_bound(design: Design, x: Floats) -> list[str]:
+def keys_on_bound(design: Design, x: Floats) -> list[str]:
     """Return the keys whose optimum lies on a bound."""
     pairs = zip(design.over.items(), x.tolist(), strict=True)
     return [
@@ -198,12 +198,14 @@ class Gaits:
         """Find the gait of a config near the last gait, or by a search from scratch."""
         subject = ModelUnderTest(self.model, config, self.z, self.length)
         standpoint = subject.at()
-        match = self.near(standpoint, self.z)
+        match = self.gait_near(standpoint, self.z)
         # the parameters may be too far from those of the last gait for Newton's method, so search from scratch
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait
-            match = match if gait is None else self.near(standpoint, section_coordinates(walker, gait.state)) or match
+            match = (
+                match if gait is None else self.gait_near(standpoint, section_coordinates(walker, gait.state)) or match
+            )
         if match is None:
             return None
         standpoint, numbers = match
@@ -220,7 +222,7 @@ class Gaits:
         gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in (*self.wanted, *self.largest)}
         return Point(numbers, gradients, apart)
 
-    def near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
+    def gait_near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
         """Find the gait near z (d,) and its quantities; None if there is no gait or a quantity is undefined."""
         cycle = gait_near(standpoint_before.step_map, z, standpoint_before.p, SOLVED)
         if isinstance(cycle, NotConverged):
@@ -247,7 +249,7 @@ class Gaits:
         for off in (-gap, gap):
             changed = parameter.config_at(subject.config, parameter.value_in(subject.config) + off)
             beside = None if changed is None else replace(subject, config=changed)
-            match = None if beside is None else self.near(beside.at(), subject.z)
+            match = None if beside is None else self.gait_near(beside.at(), subject.z)
             if beside is not None and match is not None:
                 places[off] = self.largest_disturbances(replace(beside, z=match[0].z), self.largest)
         first, last = min(places), max(places)

@@ -19,7 +19,7 @@ from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.extensions import declared, load
-from walkerlab.labels import join_words, with_unit
+from walkerlab.labels import add_unit, join_words
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.planner import Planner
 from walkerlab.pipeline.plan.resolve import warn_of_edits
@@ -277,10 +277,10 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
     columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
         if variable.dims == ("time",):
-            columns[with_unit(name, variable.units)] = variable.values.tolist()
+            columns[add_unit(name, variable.units)] = variable.values.tolist()
         elif variable.dims[:1] == ("time",):
             for place, values in enumerate(variable.values.T.tolist()):
-                columns[with_unit(f"{name} {place + 1}", variable.units)] = values
+                columns[add_unit(f"{name} {place + 1}", variable.units)] = values
     return csv_text(list(columns), zip(*columns.values(), strict=True))
 
 

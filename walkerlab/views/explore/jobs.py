@@ -17,7 +17,7 @@ from walkerlab.pipeline.run.interrupts import PATIENCE_S
 from walkerlab.views.explore.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
-EARLY = re.compile(r"page: (.+) \(partial")
+EARLY_PAGE = re.compile(r"page: (.+) \(partial")
 """Progress line that announces a partial page."""
 JOB_PROGRAM = (
     "from walkerlab.pipeline.run.interrupts import end_with_parent; end_with_parent(); "
@@ -94,7 +94,7 @@ class Job:
                 for line in self._process.stderr:
                     lines.append(line.strip())
                     self._status = {**self._status, "progress": line.strip()}
-                    if (early := EARLY.search(line)) is not None:
+                    if (early := EARLY_PAGE.search(line)) is not None:
                         self._status = {**self._status, "url": self._url(Path(early[1]))}
                 status = self._process.wait()
             output.seek(0)

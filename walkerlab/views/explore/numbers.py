@@ -20,7 +20,7 @@ FIRST: Final = (
 """Keys shown before any search, in this order; a trailing dot means the whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
 """Blocks of which only non-zero keys are shown initially; keys of the knee's lock appear in searches only."""
-OF_OTHERS: Final = (
+HIDDEN_KEYS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
 )  # fmt: skip
@@ -44,7 +44,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
     """
     for path, field in leaves(Config, held=config):
         key = ".".join(path)
-        if path[0] in OF_OTHERS or key in ("walker.type", "contact.units"):
+        if path[0] in HIDDEN_KEYS or key in ("walker.type", "contact.units"):
             continue
         value, first = value_at(config, path), value_at(start, path)
         if path == ("slope_rad",):

@@ -151,7 +151,7 @@ class Server(ThreadingHTTPServer):
         if path == "/api/numbers":
             return walks.numbers(question)
         if path == "/api/along":
-            return self.background.ask(partial(walks.along, question))
+            return self.background.ask(partial(walks.follow_gaits, question))
         if path == "/api/save":
             return save(question, body.get("name"))
         if path == "/api/job":

@@ -132,7 +132,7 @@ def walk(question: ExploredConfig) -> Answered:
             walks[stage] = answers[stage]
     if (player := motion.player(Results(config, walks), MOST_STEPS_SHOWN)) is not None:
         found["scene"] = player.scene
-        tracks = [{"meta": walker.meta, "floats": walker.track.packed()} for walker in player.walkers]
+        tracks = [{"meta": walker.meta, "floats": walker.track.pack()} for walker in player.walkers]
         found["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
     return 200, found
 
@@ -145,7 +145,7 @@ def numbers(question: ExploredConfig) -> Answered:
         return question.refusal(error)
 
 
-def along(question: ExploredConfig) -> Answered:
+def follow_gaits(question: ExploredConfig) -> Answered:
     """Follow gaits over one key: values, quantities and stability along each model's branches.
 
     The request's changes contain the block `continuation`: key, ends and points. Status 409 if a newer request came.

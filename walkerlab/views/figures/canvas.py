@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from walkerlab.labels import with_unit
+from walkerlab.labels import add_unit
 from walkerlab.views.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
 
 FILLS = 0.95
@@ -38,7 +38,7 @@ LONGEST: Final = 1e4
 
 
 @contextlib.contextmanager
-def styled(width: float = WIDTH) -> Iterator[None]:
+def figure_style(width: float = WIDTH) -> Iterator[None]:
     """Apply the project's style, ignoring the user's matplotlib settings. Figures are `width` inches wide."""
     size = {"figure.figsize": (width, width)}
     with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
@@ -72,7 +72,7 @@ def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[
 
 
 def label_of(words: str, unit: str) -> str:
-    return with_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
+    return add_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
 
 
 def label_ticks(axis: Axis) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from walkerlab.pipeline.store.artifact import Identified
-from walkerlab.views.figures.canvas import Drawing, files_of, settle, styled
+from walkerlab.views.figures.canvas import Drawing, figure_style, files_of, settle
 from walkerlab.views.figures.style import POINT
 from walkerlab.views.prose import Prose, f, percent
 
@@ -94,21 +94,21 @@ class Illustration:
 
     def render(self, results: Results) -> Drawing:
         """Draw the figure and return its files and caption. Equal results give equal bytes."""
-        with styled():
+        with figure_style():
             figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)
         return Drawing(svg, png, self.say("caption", *caption_values))
 
     def figure(self, results: Results) -> Figure:
         """Draw the figure for a notebook or a script, laid out."""
-        with styled():
+        with figure_style():
             figure, _ = self.draw(results)
             settle(figure)
         return figure
 
     def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
         """Return the figure as a file of the given kind and width (pt). Raster parts use `dpi`."""
-        with styled(POINT * width):
+        with figure_style(POINT * width):
             return files_of(self.draw(results)[0], self.name, self.heading, [kind], dpi)[0]
 
 

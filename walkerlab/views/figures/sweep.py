@@ -51,10 +51,10 @@ def choose(group: Group, parameters: Sequence[str]) -> list[str]:
 
 def is_number(group: Group, name: str) -> bool:
     """Whether a variable has one number for each point of the sweep."""
-    return name in group.variables and by_point(group, name) and group[name].dtype.kind in "fib"
+    return name in group.variables and is_pointwise(group, name) and group[name].dtype.kind in "fib"
 
 
-def by_point(group: Group, name: str) -> bool:
+def is_pointwise(group: Group, name: str) -> bool:
     """Whether a variable has a value for each point of the sweep, as the outcome has."""
     return group.variables[name].dims == group.variables["outcome"].dims
 
@@ -75,7 +75,7 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
     if against:
         figure = one_over_another(group, names, against)
     elif dimensions != 2:
-        figure = scattered(group, parameters, names)
+        figure = plot_scatter(group, parameters, names)
     else:
         figure = (maps if a_map else lines)(group, parameters, names)
     outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
@@ -112,7 +112,7 @@ def label(group: Group, name: str) -> str:
     return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
 
 
-def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
+def plot_scatter(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
     """Plot a row per quantity and a column per parameter, and join the points if one parameter varies monotonically."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
@@ -132,7 +132,7 @@ def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> 
         axes[-1][column].set_xlabel(label(group, parameter))
     for panel, name in zip(axes[:, 0], names, strict=True):
         panel.set_ylabel(label(group, name))
-    if key := marked(group, names):
+    if key := legend_entries(group, names):
         add_legend(figure, key)
     return figure
 
@@ -140,7 +140,7 @@ def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> 
 def spread(group: Group, parameter: str) -> tuple[NDArray[Any], NDArray[np.int_]]:
     """Return a parameter's value at every point of the sweep, as a flat array, and the indices of those to plot."""
     values = numbers(group, parameter)
-    if not by_point(group, parameter):
+    if not is_pointwise(group, parameter):
         dims = group.variables["outcome"].dims
         along = [-1 if name == parameter else 1 for name in dims]
         values = np.broadcast_to(values.reshape(along), group["outcome"].shape)
@@ -156,7 +156,7 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
     set_scale(axes, group, parameter, "x")
 
 
-def marked(group: Group, names: Sequence[str]) -> list[Artist]:
+def legend_entries(group: Group, names: Sequence[str]) -> list[Artist]:
     """Return the legend entries of the stability bound and of the marks for points without an answer."""
     gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
     stability = [entry(STABILITY_BOUND, color=GREY, linewidth=0.8)] if RADIUS in names else []
@@ -183,7 +183,7 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     for value, look in zip(values, looks, strict=True):
         said = f"{value:.6g}" if isinstance(value, float) else str(value)
         key.append(entry(f"{axis_label(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
-    add_legend(figure, [*key, *marked(group, names)])
+    add_legend(figure, [*key, *legend_entries(group, names)])
     return figure
 
 

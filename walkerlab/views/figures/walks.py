@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from walkerlab.pipeline.headlines import claims
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.views.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
+from walkerlab.views.figures.canvas import add_legend, entry, figure_style, files_of, label_of, panels
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, RECORDED, RIGID, Look
 
@@ -72,7 +72,7 @@ class DrawnWalk:
     def label(self, words: str, name: str) -> str:
         return label_of(words, self.samples.variables[name].units)
 
-    def first(self, strides: int) -> DrawnWalk:
+    def first_strides(self, strides: int) -> DrawnWalk:
         strikes = self.strikes[: 2 * strides]
         if strikes.size == self.strikes.size:
             return self
@@ -102,7 +102,7 @@ def touch_times(steps: Group) -> Array:
 
 def first_strides(walks: list[DrawnWalk], strides: int = PAPER_STRIDES) -> tuple[list[DrawnWalk], str]:
     """Return the walks' first strides, and ' (the first 5 strides)' for the caption if any walk is longer."""
-    cut = [walk.first(strides) for walk in walks]
+    cut = [walk.first_strides(strides) for walk in walks]
     return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
 
 
@@ -122,7 +122,7 @@ def time_axes(rows: int, row_height: float, walks: list[DrawnWalk]) -> tuple[Fig
     return figure, axes
 
 
-def in_time(
+def plot_over_time(
     walks: list[DrawnWalk], row_height: float, rows: Sequence[tuple[str, str, int | None, str]]
 ) -> tuple[Figure, list[Axes]]:
     """Plot variables of walks over time, a row for each (variable, axis label, leg or None, title)."""
@@ -170,7 +170,7 @@ def draw_adjusted(results: Results) -> Drawn:
     walks, extent = first_strides(whole)
     links = ("link 1", "link 2") if named else ("the first swing leg", "the first stance leg")
     titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
-    figure, _ = in_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
+    figure, _ = plot_over_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
     legend(figure, walks)
     return figure, (result.summary["adjustment"], extent, named)
 
@@ -187,7 +187,7 @@ def draw_states(results: Results) -> Drawn:
     """Plot each leg's angle and angular velocity, a row each, shaded while the leg is in stance."""
     walks, extent = first_strides(walks_with(results, STATES))
     first = walks[0]
-    figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
+    figure, axes = plot_over_time(walks, 1.55, STATES_IN_TIME)
     for panel, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
         edges = np.diff((first["stance_leg"] == leg + 1).astype(int), prepend=0, append=0)
         for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
@@ -265,15 +265,15 @@ ENERGIES_IN_TIME = (
 SMALLEST_SPAN = 0.005
 """Minimum span of the mechanical-energy axis relative to the energy: a constant must look constant."""
 MARGIN = 0.08
-FEW = 0.005
+TRIMMED_SHARE = 0.005
 """Fraction of the samples at each end of the range that do not set the scale, because they lie inside impacts."""
 
 
 def draw_energies(results: Results) -> Drawn:
     """Plot kinetic, potential and mechanical energy over time, a row each."""
     walks, extent = first_strides(walks_with(results, ENERGIES))
-    figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
-    ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
+    figure, axes = plot_over_time(walks, 1.75, ENERGIES_IN_TIME)
+    ends = np.array([np.quantile(walk["mechanical_J"], (TRIMMED_SHARE, 1.0 - TRIMMED_SHARE)) for walk in walks])
     bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
     lacking = max(0.0, SMALLEST_SPAN * max(abs(bottom), abs(top)) - (top - bottom))
     room = 0.5 * lacking + MARGIN * (top - bottom)
@@ -312,7 +312,7 @@ def draw_runs(
     ]
     if not both:
         return None
-    with styled():
+    with figure_style():
         return files_of(draw_overlay(both, names), "diff", f"{names[0]} and {names[1]}")
 
 

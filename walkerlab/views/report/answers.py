@@ -18,7 +18,7 @@ from walkerlab.views.report import gaits
 from walkerlab.views.report.numbers import count, decimals_left, fixed, length, number, quantity
 from walkerlab.views.report.outcomes import MODEL_NAMES, WALKED_LABEL, describe_error
 from walkerlab.views.report.outcomes import walks as walk_text
-from walkerlab.views.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
+from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table, table_lines
 from walkerlab.views.report.text import describe_summary, paragraph
 from walkerlab.views.report.words import words
 
@@ -70,7 +70,7 @@ def lay_out(blocks: Iterable[str | Table]) -> list[str]:
     after_table = False
     for block in blocks:
         is_table = isinstance(block, Table)
-        block_lines = in_lines(block) if isinstance(block, Table) else paragraph(block)
+        block_lines = table_lines(block) if isinstance(block, Table) else paragraph(block)
         if block_lines:
             lines += [""] if lines and (is_table or after_table) else []
             lines += block_lines

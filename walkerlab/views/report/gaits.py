@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.views.report.numbers import MINUS, NONE, drop_rounding, fixed, number, power_of_ten
-from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, in_signs
+from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, typeset
 from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
@@ -22,7 +22,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
     """Tabulate fixed points (coordinates `names`) and multipliers, with a column for each set of equations."""
     six = partial(fixed, decimals=6)
     multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
-    titles = [in_signs(f"{'' if place else 'multipliers '}lambda_{place + 1}") for place in multipliers]
+    titles = [typeset(f"{'' if place else 'multipliers '}lambda_{place + 1}") for place in multipliers]
     lines = [
         *(Column(coordinate(name), partial(state_at, place), six) for place, name in enumerate(names)),
         measured("step period T", "period_s", six),

@@ -74,7 +74,7 @@ def length(value_m: float | None, digits: int = 4) -> str:
     return quantity(1e6 * value_m, "µm", digits)
 
 
-def whole(value: int | None) -> str:
+def format_integer(value: int | None) -> str:
     """Format an integer with thousands separators, as in 27,087, or a dash for None."""
     return NONE if value is None else f"{value:,}"
 

@@ -135,7 +135,7 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
         local = "href" if key in (f"{XLINK}href", "href") else key
         wanted = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
         if wanted and (local != "id" or value in used) and not EXTERNAL_REFERENCE.search(value):
-            attributes += Markup(' {}="{}"').format(Markup(local), short(local, value))
+            attributes += Markup(' {}="{}"').format(Markup(local), shorten_attribute(local, value))
     return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes, inside)
 
 
@@ -144,7 +144,7 @@ def text_content(text: str | None, name: str) -> Markup:
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 
-def short(name: str, value: str) -> str:
+def shorten_attribute(name: str, value: str) -> str:
     """Shorten an attribute: coordinates to a hundredth of a point, colours to CSS variables."""
     if name in ("id", "href", "clip-path"):
         return value.strip()

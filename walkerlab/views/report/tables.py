@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Final, Literal
 
-from walkerlab.labels import labels_of, unit_by_name, with_unit
+from walkerlab.labels import add_unit, labels_of, unit_by_name
 from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.views.report.numbers import NONE, number
 
@@ -81,7 +81,7 @@ def measured(
         value = record.get(key)
         return None if value is None else factor * value
 
-    return Column(with_unit(words, f"{prefix}{unit}"), scaled if prefix else key, written, numeric=True)
+    return Column(add_unit(words, f"{prefix}{unit}"), scaled if prefix else key, written, numeric=True)
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
     return table("", columns, cells)
 
 
-def flat(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
+def flatten(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
     """Return header and rows, with group titles, if any, in a first column. `wide` includes columns of sentences."""
     places = [place for place, column in enumerate(content.columns) if wide or not column.wide]
     titled = any(content.groups)
@@ -175,8 +175,8 @@ def flat(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]
     return heads, rows
 
 
-def in_lines(content: Table) -> list[str]:
-    heads, rows = flat(content)
+def table_lines(content: Table) -> list[str]:
+    heads, rows = flatten(content)
     texts = [[cell.text for cell in row] for row in rows]
     return aligned([heads, *texts] if texts and any(heads) else texts)
 
@@ -195,5 +195,5 @@ def width(text: str) -> int:
 
 
 def as_csv(content: Table) -> bytes:
-    heads, rows = flat(content, wide=True)
+    heads, rows = flatten(content, wide=True)
     return csv_text(heads, ([cell.datum for cell in row] for row in rows))

@@ -46,12 +46,12 @@ class Track:
     def end(self) -> float:
         return float(self["t"][-1])
 
-    def until(self, time: float) -> Track:
+    def cut(self, time: float) -> Track:
         """Return the part up to a time (s)."""
         inside = self["t"] <= time + 1e-9
         return Track({name: values[inside] for name, values in self.channels.items()})
 
-    def thinned(self, gap: float) -> Track:
+    def thin(self, gap: float) -> Track:
         """Keep the first and the most loaded sample of each interval of `gap` s, and both sides of every jump."""
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)
@@ -65,7 +65,7 @@ class Track:
         chosen = sorted(samples)
         return Track({name: values[chosen] for name, values in self.channels.items()})
 
-    def packed(self) -> str:
+    def pack(self) -> str:
         """Encode all channels, in order, as little-endian float32 in base64."""
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 

@@ -84,5 +84,5 @@ class Adapter(Protocol):
     CONTACTS: Mapping[str, str]  # name of the integrator for each contact model
     CANNOT_EXPRESS: tuple[str, ...]  # limitations, for the report
 
-    def tuned(self, model: str, target: EngineContact) -> OwnContact:
+    def tune(self, model: str, target: EngineContact) -> OwnContact:
         """Return the settings with which a contact model comes closest to the target."""

@@ -37,7 +37,7 @@ CANNOT_EXPRESS = (
 )
 
 
-def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
+def tune(model: str, target: EngineContact) -> adapter.OwnContact:
     """Compute the settings that meet the target, from the closed forms at the top of this module."""
     from scipy.optimize import brentq
 

@@ -156,7 +156,7 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
         yield same_law.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answer)
     own_law = EngineExperiment(scene, OURS, version, OWN_LAW)
     for factor in (1.0, *START_FACTORS):
-        answer = our_walk(scene.started(factor), ADAMS_RTOL, OWN_TOUCHES)
+        answer = our_walk(scene.scale_start(factor), ADAMS_RTOL, OWN_TOUCHES)
         yield own_law.row("impact", Stepping(OUR_METHOD, 0.0, ADAMS_RTOL), answer, factor)
 
 
@@ -181,7 +181,7 @@ class EngineOnScene:
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
         """Walk under our law or, if `own` is not None, on the engine's own contact, for at most `most` engine steps."""
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
-        scene = self.scene.started(start)
+        scene = self.scene.scale_start(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
         answer = self.process.do(task.run, RUN_TIMEOUT_S)
         experiment = EngineExperiment(self.scene, self.engine.name, self.engine.version, law, self.truth)
@@ -201,7 +201,7 @@ class EngineOnScene:
                 if late or (row.error is not None and row.error < ERROR_GOAL):
                     break
 
-    def tuned(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
+    def tune(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
         """Tune a contact model to the scene's contact and measure how close it comes."""
         name, sliding = self.engine.name, 1.5 * self.scene.ours.friction.sliding_from
         answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, RUN_TIMEOUT_S)

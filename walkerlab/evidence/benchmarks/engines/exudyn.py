@@ -38,7 +38,7 @@ NO_ITERATION = 1e12
 EXPLICIT_METHODS = ("ExplicitEuler", "RK44")
 
 
-def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
+def tune(model: str, target: EngineContact) -> adapter.OwnContact:
     """Compute the settings that meet the target, including the slip velocity at which friction is fully developed."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {

@@ -193,7 +193,7 @@ class RuleFollower:
         elif self.turn is not None:
             contact_transitions.release(walk_state, 1 - int(walk_state.progress.stance))
         self.turn = None
-        scene = self.scene.with_knees_locked(walk_state.knee)
+        scene = self.scene.lock_knees(walk_state.knee)
         q, v = scene.from_base(tuple(y.tolist()))
         self._see(scene, q, v)
         return q, v

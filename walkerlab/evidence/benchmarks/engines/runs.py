@@ -210,7 +210,7 @@ class TuningTask:
 
     @cached_property
     def own(self) -> OwnContact:
-        return PHYSICS_ENGINES[self.engine].adapter().tuned(self.contact, self.target)
+        return PHYSICS_ENGINES[self.engine].adapter().tune(self.contact, self.target)
 
     @property
     def omega(self) -> float:
@@ -225,11 +225,13 @@ class TuningTask:
         return 8.0 / slow
 
     def run(self) -> TuningAnswer:
-        depth = self.at_rest()
+        depth = self.penetration_at_rest()
         ratio = self.damping_ratio(depth)
         return TuningAnswer(self.own, depth, ratio, self.friction(depth), self.creep(depth))
 
-    def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
+    def simulate_contact(
+        self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]
+    ) -> EngineMotion:
         """Simulate the ball from `depth` (m) inside the ground. `along` times its weight pulls it along the ground.
 
         h  step size (s)
@@ -244,16 +246,18 @@ class TuningTask:
         simulation.carry(0, True)
         return record_motion(simulation, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
 
-    def at_rest(self) -> float:
+    def penetration_at_rest(self) -> float:
         """Return the penetration (m) at rest of a ball dropped from the surface."""
-        return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
+        return -float(
+            self.simulate_contact(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1]
+        )
 
     def damping_ratio(self, depth: float) -> float:
         """Fit an oscillator to the ball's accelerations and return its damping ratio. `depth` is the penetration at
         rest (m).
         """
         omega = self.omega
-        motion = self.after(self.settling_s / 4.0, self.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
+        motion = self.simulate_contact(self.settling_s / 4.0, self.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
         # the mean of a step's two ends stands for its middle, whatever the engine's integration rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
@@ -265,7 +269,7 @@ class TuningTask:
         """Return the deceleration of a sliding block, divided by gravity. `depth` is the penetration at rest (m)."""
         target, settled = self.target, self.settling_s
         start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
-        motion = self.after(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
+        motion = self.simulate_contact(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
         watched = -1 - len(motion.v) // 5
         fall = motion.v[watched, 0] - motion.v[-1, 0]
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
@@ -273,4 +277,6 @@ class TuningTask:
     def creep(self, depth: float) -> float:
         """Return the creep velocity (m/s) of a block standing on an incline. `depth` is the penetration at rest (m)."""
         target, h = self.target, STEADY_STEP_FACTOR * self.step_s
-        return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])
+        return float(
+            self.simulate_contact(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0]
+        )

@@ -104,7 +104,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
             findings.left_out.append({"what": f"own contact of {name}", "why": "the ground has no friction"})
             return findings
         for contact in pair.engine.adapter().CONTACTS:
-            tuned = pair.tuned(contact, target)
+            tuned = pair.tune(contact, target)
             if isinstance(tuned, TaskLost):
                 findings.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.why})
                 continue

@@ -10,7 +10,7 @@ from walkerlab.views.report.gaits import symbol, works
 from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity
 from walkerlab.views.report.outcomes import tone
 from walkerlab.views.report.results import Results, stage_section
-from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.symbols import typeset
 from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.views.report.words import words
 
@@ -59,7 +59,7 @@ def starts_table(results: Results, summary: Summary) -> Table:
     if results.claims:
         caption, head = "Table 2 again: the start before and after the adjustment", "row"
         note = "The paper's percentages are relative to the ADAMS value, which it does not state."
-    named = in_signs if results.claims else symbol
+    named = typeset if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
     titles = words.terms("adjustment.starts", results.claims).items()
     digits = {key: 3 if "percent" in key else 6 for key, _ in titles}
@@ -113,7 +113,7 @@ def gait_table(summary: Summary, rigid: Summary) -> Table:
 
 
 MARGIN_COLUMNS = (
-    Column("scaled velocity", "name", in_signs),
+    Column("scaled velocity", "name", typeset),
     Column("last factor at which the start walks", "factor", number, numeric=True),
     Column("outcome beyond", "beyond", lambda outcome: outcome or "no failure in the search range"),
     Column("steps beyond", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),

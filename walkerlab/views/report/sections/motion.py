@@ -31,7 +31,7 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
     # end when the slower model has taken `most` steps
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
     by_stage = {stage: track_in(results.group(stage, "trajectory")) for stage in MODEL_NAMES}
-    tracks = {stage: track.until(end) for stage, track in by_stage.items() if track is not None}
+    tracks = {stage: track.cut(end) for stage, track in by_stage.items() if track is not None}
     if not tracks:
         return None
     config, torso = results.config, results.config.walker.torso
@@ -86,7 +86,7 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
     return Walker(
         name=MODEL_NAMES[stage],
         style=WALKER_STYLES[stage],
-        track=track.thinned(sampling_gap(results.config)),
+        track=track.thin(sampling_gap(results.config)),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, strikes),
         ends="" if summary["outcome"] == WALKED_LABEL else ends(summary["outcome"]),
