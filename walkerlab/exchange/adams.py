@@ -15,7 +15,7 @@ def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
 
 
 def statements(model: AdamsModel) -> Iterator[str]:
-    """Yield the lines of all statements; objects of each kind are numbered from 1, and part 1 is the ground."""
+    """Yield the lines of all statements. Objects of each kind are numbered from 1, and part 1 is the ground."""
     ids = model.numbers
 
     def expression(text: str) -> str:

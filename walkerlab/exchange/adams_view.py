@@ -112,7 +112,7 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
 
 
 def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
-    """Yield commands for parts, markers, masses, velocities and shapes; angular velocities include their unit."""
+    """Yield commands for parts, markers, masses, velocities and shapes. Angular velocities include their unit."""
     for number, (name, part) in enumerate([(GROUND, None), *model.parts.items()], start=1):
         if part is not None:
             yield command(

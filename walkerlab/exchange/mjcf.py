@@ -139,7 +139,7 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
 
 
 def rates_at(point: Position, start: Position, rates: Floats) -> Floats:
-    """Return a link's rates at `point`, from its rates at `start`; both points in the upright link's frame."""
+    """Return the rates of a link at `point` from those at `start`. Both points are in the frame of the upright link."""
     return rates + np.outer((start[1] - point[1], point[0] - start[0], 0.0), rates[2])
 
 
@@ -189,7 +189,7 @@ def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> It
 
 
 def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
-    """Write a foot, tuned for ground that is added to the file; `pair_text` tunes the contacts with its own ground."""
+    """Write a foot, tuned for ground that is added to the file. `pair_text` tunes the contacts with its own ground."""
     (x, z), mu = ball.centre_m, contact["friction"]
     return (
         f'<geom name="{foot.name}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} {foot.across_m!r} {z!r}" '
@@ -308,7 +308,7 @@ def limbs(export: Exported, foot: int) -> dict[int, Position]:
 
 
 def limb_text(hinge: Position, end: Position, foot: Foot, ball: Ball) -> str:
-    """Draw a part of a leg as a capsule from its hinge to its lower end; it collides with nothing.
+    """Draw a part of a leg as a capsule from its hinge to its lower end. It collides with nothing.
 
     Above the foot it ends early, so that it does not reach below the ball in programs that let it collide.
     """
@@ -343,7 +343,7 @@ def custom_texts(export: Exported) -> Iterator[str]:
 
 
 def lock_texts(export: Exported) -> Iterator[str]:
-    """Yield the locks of the knees; at the start only that of the stance leg is active."""
+    """Yield the locks of the knees. At the start, only that of the stance leg is active."""
     for leg in range(len(export.knee_links)):
         active = "true" if leg == STANCE_FOOT else "false"
         knee = f'joint1="knee_{leg + 1}" polycoef="0 0 0 0 0"'
@@ -351,7 +351,10 @@ def lock_texts(export: Exported) -> Iterator[str]:
 
 
 def coupling_texts(export: Exported) -> Iterator[str]:
-    """Yield the constraints of coupled hinges; raises ConfigError for a coupling of more than two hinges."""
+    """Yield the constraints of coupled hinges.
+
+    Raises ConfigError for a coupling of more than two hinges.
+    """
     for coupling in export.couplings:
         if len(coupling) > 2:
             raise ConfigError(

@@ -46,14 +46,14 @@ def original(tmp_path_factory):
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
     # without, all results are read to know the config
-    RunFolder.at(folder).write_record(Record("paper", "", to_yaml(load().config)))
+    RunFolder.open_folder(folder).write_record(Record("paper", "", to_yaml(load().config)))
     return folder
 
 
 @pytest.fixture
 def run(original, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return RunFolder.at(shutil.copytree(original, tmp_path / "runs" / "paper"))
+    return RunFolder.open_folder(shutil.copytree(original, tmp_path / "runs" / "paper"))
 
 
 @pytest.mark.parametrize(

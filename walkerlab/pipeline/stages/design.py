@@ -52,9 +52,11 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 
 
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
-    """Search for the optimum; raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
+    """Search for the optimum.
 
     checkpoint  results of the searches of an earlier run; new ones are added
+
+    Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """
     refuse(config)
     design = config.design or Design()
@@ -159,7 +161,7 @@ def keys_on_bound(design: Design, x: Floats) -> list[str]:
 
 
 class Gaits:
-    """Gait and gradients as functions of the parameters; each search for a gait starts at the last one found."""
+    """Gait and gradients as functions of the parameters. Each search for a gait starts at the last one found."""
 
     def __init__(
         self,
@@ -183,7 +185,7 @@ class Gaits:
         self.z = find_model_gait(design.model, config, gait, progress.note).z
 
     def gait_at(self, x: Floats) -> Point | None:
-        """Return the gait at parameter values (parameters,); None if no gait is found or the config rejects them."""
+        """Return the gait at parameter values (parameters,), or None if no gait is found or the config rejects them."""
         self.counts[0] += 1
         self.progress.advance()
         changed = config_with(self.config, self.parameters, x.tolist())
@@ -223,7 +225,9 @@ class Gaits:
         return Point(numbers, gradients, apart)
 
     def gait_near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
-        """Find the gait near z (d,) and its quantities; None if there is no gait or a quantity is undefined."""
+        """Find the gait near z (d,) and its quantities, or return None if there is no gait or a quantity is
+        undefined.
+        """
         cycle = gait_near(standpoint_before.step_map, z, standpoint_before.p, SOLVED)
         if isinstance(cycle, NotConverged):
             return None
@@ -259,7 +263,7 @@ class Gaits:
         }
 
     def robustness_at(self, x: Floats) -> dict[str, float]:
-        """Return the quantities of `ROBUSTNESS` at parameter values with a gait; empty if the gait is unstable."""
+        """Return the quantities of `ROBUSTNESS` at parameter values with a gait, or nothing if the gait is unstable."""
         config = config_with(self.config, self.parameters, x.tolist())
         assert config is not None, "a walker with a gait is valid"
         subject = ModelUnderTest(self.model, config, self.sections[x.tobytes()], self.length)

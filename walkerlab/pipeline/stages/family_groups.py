@@ -183,7 +183,7 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
 
 
 def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
-    """Walk a gait and yield its group as `simulate` stores it; yield nothing if the config rejects the value."""
+    """Simulate a gait and yield its samples in the layout of `simulate`, or nothing if the config rejects the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return

@@ -103,12 +103,14 @@ def run(
     checkpoint: Checkpoint,
     jobs: int = 1,
 ) -> Content:
-    """Study each model; raises NoAnswer with partial results for an unstable gait, which has no sensitivity norm.
+    """Study each model.
 
     checkpoint  disturbances and walks that an earlier run computed
     jobs        maximum number of processes
 
     Raises ConfigError for an invalid request.
+
+    Raises NoAnswer with partial results for an unstable gait, which has no sensitivity norm.
     """
     refuse(config)
     answer: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
@@ -208,7 +210,9 @@ def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUn
 
 
 def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """Return the largest survived disturbance of one sign; for the rigid model's hip push also ground reactions."""
+    """Return the largest survived disturbance of one sign. For a hip push in the rigid model, also return ground
+    reactions.
+    """
     size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
     if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
         return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
@@ -277,7 +281,7 @@ def sensitivities(
     progress: Progress,
     jobs: int,
 ) -> Rows:
-    """Return rows of derivatives in order of decreasing relative effect; parameters of value 0 come last."""
+    """Return rows of derivatives in order of decreasing relative effect. Parameters of value 0 come last."""
     keys = numbers_read(subject, requested)
     label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
     results = in_order([partial(gradients_of, subject, key) for key in keys], jobs)

@@ -35,7 +35,7 @@ def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
     """Return the run that a result, drawing or record belongs to, or None for the user's own files."""
     resolved = path.resolve()
     for place in (resolved.parent, resolved.parent.parent):
-        folder = RunFolder.at(place)
+        folder = RunFolder.open_folder(place)
         if folder.record() is None and not any(place.glob("*.h5")):
             continue
         is_state = resolved.parent == place and (resolved.suffix in STATE_ENDINGS or resolved.name in STATE_FILES)

@@ -155,7 +155,7 @@ class Digest:
 
     def __init__(self, summary: Mapping[str, Any], timed: tuple[str, ...]) -> None:
         self._sha256 = hashlib.sha256()
-        self._take(canonical_json([untimed(summary, timed), timed]).encode())
+        self._take(canonical_json([remove_timings(summary, timed), timed]).encode())
 
     def enter(self, path: str, attrs: Mapping[str, Attribute]) -> None:
         self._take(canonical_json([path, dict(attrs)]).encode())
@@ -237,12 +237,12 @@ def plain(value: Any) -> Any:
     raise TypeError(f"not a JSON value: {value!r}")
 
 
-def untimed(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
+def remove_timings(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the summary without timings at any depth."""
 
     def inner(value: Any) -> Any:
         if isinstance(value, Mapping):
-            return untimed(value)
+            return remove_timings(value)
         return [inner(item) for item in value] if isinstance(value, list) else value
 
     return {key: inner(value) for key, value in summary.items() if not (key in timed or TIMING.fullmatch(key))}

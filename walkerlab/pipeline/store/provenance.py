@@ -45,7 +45,7 @@ class Provenance:
         start, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
         return (ended - start).total_seconds()
 
-    def until_now(self) -> Provenance:
+    def finish(self) -> Provenance:
         return replace(self, ended_utc=utc_now())
 
 

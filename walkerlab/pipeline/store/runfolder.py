@@ -52,7 +52,7 @@ class RunFolder:
     changes: tuple[str, ...] = ()  # KEY=VALUE of each key in which the config differs from its source
 
     @classmethod
-    def at(cls, path: Path) -> RunFolder:
+    def open_folder(cls, path: Path) -> RunFolder:
         """Return the run in a folder, with its recorded source and changes."""
         folder = path if path.name not in ("", "..") else path.resolve()
         record = cls(folder.parent, folder.name).record()

@@ -166,7 +166,7 @@ def slurm(order: Order) -> Iterator[JobExecutor]:
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
     queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
-    submit = functools.partial(job_runner.submit, until_told)
+    submit = functools.partial(job_runner.submit, run_until_signalled)
     executor = JobExecutor(submit, order.workers or 16, None if queue is None else queue.wait)
     with environment_of_workers():
         try:
@@ -178,7 +178,7 @@ def slurm(order: Order) -> Iterator[JobExecutor]:
                         job.cancel(check=False)
 
 
-def until_told(fn: Callable[..., Any], *args: Any) -> Any:
+def run_until_signalled(fn: Callable[..., Any], *args: Any) -> Any:
     """Run a function in a job. A signal that announces the end of the job raises JobEndsError in it."""
     announcement = os.environ.get("SUBMITIT_PREEMPT_SIGNAL", "USR2")
     numbers = (signal.Signals[f"SIG{announcement}"], signal.SIGTERM)

@@ -127,7 +127,7 @@ def build_sweep(
         return SweptStage(stage, sampled(axes, sample, seed), "list")
     for parameter in axes:
         if not parameter.values:
-            raise bad(parameter.source, f"{parameter.key}: the number of values is missing", FORMS)
+            raise parameter_error(parameter.source, f"{parameter.key}: the number of values is missing", FORMS)
     if zipped and len({len(parameter.values) for parameter in axes}) > 1:
         lengths = ", ".join(f"{parameter.key} {len(parameter.values)}" for parameter in axes)
         raise problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
@@ -149,7 +149,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     source = f"--over {text}"
     key = key.strip()
     if not equals or not all(key.split(".")):
-        raise bad(source, "is not of the form KEY=VALUES", FORMS)
+        raise parameter_error(source, "is not of the form KEY=VALUES", FORMS)
     if values.lstrip().startswith("["):
         node = read(values, source, len(key) + 2)
         assert isinstance(node, ListNode)
@@ -157,7 +157,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     return key, values.strip(), source
 
 
-def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
+def parameter_error(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
     """Build the error for an invalid parameter, option or key. Its message gives `source`, not a file position."""
     return problem_error(Position(source, 0, 0), text, allowed, near)
 
@@ -176,13 +176,13 @@ def axis(key: str, values: Any, source: str) -> Axis:
     fields = key_fields()
     if key not in fields and not any(key.startswith(f"{known_key}.") for known_key in fields):
         if any(known_key.startswith(f"{key}.") for known_key in fields):
-            raise bad(source, f"{key}: is a block of keys, not a value")
+            raise parameter_error(source, f"{key}: is a block of keys, not a value")
         if not key.startswith("walker."):  # walkers of other types have other keys, which are checked at each point
-            raise bad(source, f"{key}: unknown key", near=nearest(key, fields))
+            raise parameter_error(source, f"{key}: unknown key", near=nearest(key, fields))
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
         if odd is not None or not values:
-            raise bad(source, f"{key}: {odd if values else 'an empty list'}", FORMS)
+            raise parameter_error(source, f"{key}: {odd if values else 'an empty list'}", FORMS)
         refuse_too_many(key, len(values))
         return Axis(key, tuple(values), source)
     parts = str(values).split(":")
@@ -194,10 +194,10 @@ def axis(key: str, values: Any, source: str) -> Axis:
     refuse_too_many(f"{key}={values}", count)
     logarithmic = parts[3:] == ["log"]
     if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
-        raise bad(source, f"{key}: {values} is not a range of values", FORMS)
+        raise parameter_error(source, f"{key}: {values} is not a range of values", FORMS)
     if logarithmic and min(low, high) <= 0.0:
-        raise bad(source, f"{key}: {values}", "both ends above 0 for a logarithmic range")
-    return Axis(key, as_the_key_has_it(key, spaced(low, high, count, logarithmic)), source, (low, high))
+        raise parameter_error(source, f"{key}: {values}", "both ends above 0 for a logarithmic range")
+    return Axis(key, as_the_key_has_it(key, evenly_spaced(low, high, count, logarithmic)), source, (low, high))
 
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
@@ -208,7 +208,7 @@ def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
     return tuple(int(value) if value.is_integer() else value for value in values)
 
 
-def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
+def evenly_spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
     """Return `count` values from `low` to `high`, both included. A single value is `low`."""
     import numpy as np
 

@@ -24,7 +24,7 @@ from walkerlab.scene.walk_outcomes import Pads, describe_endings
 CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
 
 
-OWN: Final = {
+STATUS_TEXTS: Final = {
     "outcome": "the stage's own outcome, or else whether it has an answer",
     "status": "answered, no-answer, or failed: not computed",
     "reason": "why there is no answer",
@@ -125,7 +125,7 @@ class Merge:
         """Names of the quantities that have a single number per result."""
         return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
 
-    def of(self, name: str) -> NDArray[Any] | None:
+    def values_of(self, name: str) -> NDArray[Any] | None:
         """Return a quantity's values at the points, with NaN or '' for gaps, or None if no point has the quantity."""
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
@@ -160,8 +160,8 @@ class Merge:
         """
         question, config = self.question, self.config
         outcomes = self.columns["outcome"].values[self.inverse]
-        pads, pitch = None, self.of("pitch_m")
-        off, lengths = outcomes == "off-pad", self.of("step_lengths_m")
+        pads, pitch = None, self.values_of("pitch_m")
+        off, lengths = outcomes == "off-pad", self.values_of("step_lengths_m")
         if pitch is not None and off.any():
             last = np.zeros(0) if lengths is None else last_of_each(lengths[off])
             steps = last[np.isfinite(last)]
@@ -172,8 +172,8 @@ class Merge:
 
     def numerical_error(self) -> dict[str, Any]:
         """Return the largest errors of the repeated walks. `ended_otherwise` counts those that ended differently."""
-        errors = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
-        reasons, ends = self.of("numerical_error.reason"), errors["end_time_s"]
+        errors = {key: self.values_of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
+        reasons, ends = self.values_of("numerical_error.reason"), errors["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
         measured = 0 if ends is None else int(np.sum(np.isfinite(ends)))
         if otherwise + measured == 0:
@@ -190,7 +190,7 @@ class Merge:
         own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
         last = name.rpartition(".")[2]
         if column.text:
-            unit, text = "", OWN.get(name, name)
+            unit, text = "", STATUS_TEXTS.get(name, name)
         elif last in STATES:
             unit, text = "rad, rad/s", last.replace("_", " ")
         elif last in self.labels:

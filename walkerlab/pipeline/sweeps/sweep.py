@@ -197,7 +197,7 @@ class SweepRun:
             content = merge.content()
             identity = Identity("sweep", self.slice, {}, self.code_digest)
             complete = content.summary["failed"] == 0
-            artifact.write_in_turn(self.path, content, identity, origin.until_now(), complete)
+            artifact.write_in_turn(self.path, content, identity, origin.finish(), complete)
         return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started, bugs)
 
     @property

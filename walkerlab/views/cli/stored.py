@@ -47,7 +47,7 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
         }
         for step in steps
     ]
-    folders = [folder] if listed is None else [RunFolder.at(path) for path in sorted(request.runs.glob("*/"))]
+    folders = [folder] if listed is None else [RunFolder.open_folder(path) for path in sorted(request.runs.glob("*/"))]
     working = {place.path: worker for place in folders if (worker := place.worker()) is not None}
     status: dict[str, Any] = {
         "run_dir": str(folder.path),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.pipeline.store.footholds import FAR, ground_levels
+from walkerlab.pipeline.store.footholds import FAR_EDGE_M, ground_levels
 from walkerlab.views.figures.canvas import add_legend, blank, entry, figure_style
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
@@ -154,7 +154,7 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
     heights, outline = np.zeros(landings.size), None
     if levels is not None:
         begins, heights = levels
-        outline = np.column_stack((np.append(begins, begins[-1] + FAR).repeat(2)[1:-1], heights.repeat(2)))
+        outline = np.column_stack((np.append(begins, begins[-1] + FAR_EDGE_M).repeat(2)[1:-1], heights.repeat(2)))
     landings = np.column_stack((landings, heights))
     return Sticks(
         trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radius, head, outline,
