@@ -14,7 +14,7 @@ from matplotlib.patches import Arc
 
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.views.figures.canvas import blank, files_of, styled
+from walkerlab.views.figures.canvas import blank, figure_style, files_of
 from walkerlab.views.figures.measures import draw_measures
 from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, PALE, VERMILLION
 
@@ -47,7 +47,7 @@ def pictures() -> dict[str, bytes]:
 def draw_angles(swing: float = -0.42, stance: float = 0.22) -> bytes:
     """Draw a compass walker just after a heel strike, with both leg angles (rad) from the vertical."""
     slope = -0.5 * (swing + stance)
-    with styled():
+    with figure_style():
         figure = blank(2.6)
         axes = figure.add_subplot()
         axes.set_axis_off()

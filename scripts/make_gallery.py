@@ -30,11 +30,11 @@ SAMPLES_A_SECOND = 50.0
 
 
 def gait_of(point: Any, slope_deg: float, hip_kg: float) -> dict[str, Any]:
-    """What the page needs of one point of the sweep: words, and one stride from its state."""
+    """Return what the page shows of one point of the sweep: a sentence, and one stride from its state."""
     if str(point.status.item()) != "answered":
-        return {"said": str(point.reason.item())}
+        return {"text": str(point.reason.item())}
     stable = "stable" if float(point.spectral_radius) < 1.0 else "unstable"
-    said = (
+    text = (
         f"Steps of {float(point.step_length_m):.4f} m in {float(point.period_s):.4f} s; the largest multiplier is "
         f"{float(point.spectral_radius):.3f}, so the gait is {stable}."
     )
@@ -42,23 +42,23 @@ def gait_of(point: Any, slope_deg: float, hip_kg: float) -> dict[str, Any]:
     walk = walkerlab.simulate(walkerlab.compass(hip_mass_kg=hip_kg), slope_deg, strides=1, start=start)
     track = track_in(walk.content["trajectory"])
     if track is None:
-        return {"said": said}
+        return {"text": text}
     shown = walker(f"Gait at {slope_deg:g} deg with a hip of {hip_kg:g} kg", track, walk.summary["touch_times_s"])
     return {
-        "said": said,
+        "text": text,
         "slope_rad": walk.summary["slope_rad"],
         "meta": shown.meta,
-        "floats": shown.track.packed(),
+        "floats": shown.track.pack(),
         "track": track,
     }
 
 
 def walker(name: str, track: Track, strikes: Sequence[float]) -> Walker:
-    """A gait as the player moves it."""
+    """Return a gait in the form that the player animates."""
     return Walker(
         name=name,
         style="rigid",
-        track=track.thinned(1.0 / SAMPLES_A_SECOND),
+        track=track.thin(1.0 / SAMPLES_A_SECOND),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, list(strikes)),
     )

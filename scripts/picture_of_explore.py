@@ -36,9 +36,9 @@ def main(picture=PICTURE):
         browser.open(Address(page.url), 1360, 1120)
         browser.until("document.body.dataset.state === 'shown'")
         for slope in (1.5, 2.0, 2.5):
-            browser.evaluate(f"turn('slope_deg', {slope}, true)")
-            browser.until(f"shown.asked.set.slope_deg === {slope}")
-        browser.until("along.found?.some(({ model }) => model === 'contact')")
+            browser.evaluate(f"setParameter('slope_deg', {slope}, true)")
+            browser.until(f"shown.request.set.slope_deg === {slope}")
+        browser.until("along.gaits?.some(({ model }) => model === 'contact')")
         time.sleep(2.5)
         # a palette is a third of the size
         Image.open(io.BytesIO(browser.screenshot())).quantize(128).save(picture, optimize=True)

@@ -15,6 +15,7 @@ from typing import Protocol
 
 import numpy as np
 import pytest
+from browser import Browser, executable
 from forks import forks
 from typer.main import get_command
 from typer.testing import CliRunner
@@ -324,12 +325,19 @@ def test_gallery_page_contains_animated_gaits(tmp_path):
     make.__globals__.update(SLOPES="3:20:2", HIPS=[10])
     page = make(tmp_path)
     gait, none = (row[0] for row in json.loads(re.search(r'id="gaits">(.*?)</script>', page)[1]))
-    assert gait["said"].startswith("Steps of 0.5354 m in 0.7343 s")
+    assert gait["text"].startswith("Steps of 0.5354 m in 0.7343 s")
     floats = np.frombuffer(base64.b64decode(gait["floats"]), "<f4").reshape(len(gait["meta"]["channels"]), -1)
     time = floats[gait["meta"]["channels"].index("t")]
     assert time[-1] == pytest.approx(2 * 0.7343, abs=1e-3)
     assert "meta" not in none
-    assert "no gait" in none["said"]
+    assert "no gait" in none["text"]
+    (tmp_path / "page.html").write_text(page)
+    if (chromium := executable()) is not None:
+        browser = Browser(chromium)
+        browser.open(tmp_path / "page.html")
+        browser.until("Number(document.querySelector('[data-player]').dataset.time) > 0.1")
+        assert browser.complaints() == []
+        browser.close()
 
 
 def test_paper_draft_cites_every_reference_and_marks_its_blanks():

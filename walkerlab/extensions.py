@@ -25,7 +25,7 @@ from walkerlab.code_digest import Sources
 from walkerlab.errors import ConfigError
 from walkerlab.private_files import may_be_foreign
 
-OWN: Final = walkerlab.__name__
+BUILT_IN: Final = walkerlab.__name__
 GROUP: Final = "walkerlab.extensions"
 INTERFACE: Final = 1
 """Version of the interface, that is, of the fields of `Extension` and `Study`."""
@@ -90,7 +90,7 @@ class Found:
 
     @property
     def origin(self) -> str:
-        return self.source or f"{OWN} {walkerlab.__version__}"
+        return self.source or f"{BUILT_IN} {walkerlab.__version__}"
 
     @property
     def adds(self) -> dict[str, list[str]]:
@@ -106,7 +106,7 @@ def load(code: str) -> Any:
     return getattr(import_module(module), name)
 
 
-def later(code: str) -> Callable[..., Any]:
+def lazy_function(code: str) -> Callable[..., Any]:
     """Return a stand-in for a function, "module:name", that imports it when it is called."""
     return lambda *arguments: load(code)(*arguments)
 
@@ -117,10 +117,10 @@ opening: list[str] = []
 
 @cache
 def registry() -> tuple[Found, ...]:
-    """Return all extensions, the package's own first; broken ones are marked as left out."""
+    """Return all extensions, the package's own first. Broken ones are marked as left out."""
     if opening:
         raise ImportError(f"{opening[0]} imports code that uses extensions; it must name that code in quotes")
-    own = [Found(name, f"{OWN}{code}", "") for name, code in walkerlab.EXTENSIONS.items()]
+    own = [Found(name, f"{BUILT_IN}{code}", "") for name, code in walkerlab.EXTENSIONS.items()]
     return tuple(map(open_extension, (*own, *(Found(*entry) for entry in announced()))))
 
 
@@ -176,18 +176,21 @@ def foreign() -> tuple[Found, ...]:
 
 
 def origin_of(key: str) -> str:
-    """Describe which words of a config key come from other packages, to follow the key's source; empty if none do."""
+    """Describe which words of a config key come from other packages, to follow the key's source, or return '' if none
+    do.
+    """
     origins = ((found, word) for found in foreign() if found.extension for word in found.extension.words(key))
     return "".join(f"; {word}: extension {found.name} ({found.source})" for found, word in origins)
 
 
 def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> None:
-    """Raise ConfigError if two extensions, or an extension and the package, use one name; warn of broken extensions.
+    """Raise ConfigError if two extensions, or an extension and the package, use one name, and warn of broken
+    extensions.
 
     commands  names of the program's commands that are no stages
     """
-    owners = {("stage", name): OWN for name in commands}
-    owners |= {(key, word): OWN for key, own in WORDS.items() for word in own}
+    owners = {("stage", name): BUILT_IN for name in commands}
+    owners |= {(key, word): BUILT_IN for key, own in WORDS.items() for word in own}
     for found in registry():
         extension = found.extension or Extension(INTERFACE)
         names = [("extension", found.name), *(("stage", stage.name) for stage in extension.stages)]
@@ -204,7 +207,7 @@ def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> 
 
 @cache
 def versions() -> str:
-    """Describe the usable extensions of other packages: names, versions and code digests; empty without any."""
+    """Describe the usable extensions of other packages: names, versions and code digests, or return '' without any."""
     sources, described = Sources(), []
     for found in foreign():
         if found.extension is not None:
@@ -261,7 +264,7 @@ def scan(folder: str) -> list[list[str]]:
 
 
 def read_scans(file: Path) -> dict[str, Any]:
-    """Read earlier scans by folder; empty if there are none, or if another user may have written them."""
+    """Read earlier scans by folder, or return none if there are none or if another user may have written them."""
     with contextlib.suppress(OSError, ValueError):
         if not may_be_foreign(file):
             stored: dict[str, Any] = json.loads(file.read_text())
@@ -270,7 +273,7 @@ def read_scans(file: Path) -> dict[str, Any]:
 
 
 def write_scans(file: Path, scans: Mapping[str, Any]) -> None:
-    """Store the latest scans, of folders that have settled; if that fails, the next process scans again."""
+    """Store the latest scans, of folders that have settled. If that fails, the next process scans again."""
     now = time.time_ns()
     settled = {folder: entry for folder, entry in scans.items() if now - entry[0] > SETTLED_NS}
     temporary = file.with_name(f"{file.name}.{os.getpid()}")

@@ -23,7 +23,7 @@ ERROR_OF_EACH_STEP: Final = {
 
 @dataclass(frozen=True)
 class Label:
-    """Unit and meaning of a field or property of a row, used in `Annotated`; unlabelled fields are not stored."""
+    """Unit and meaning of a field or property of a row, used in `Annotated`. Unlabelled fields are not stored."""
 
     unit: str  # "1" for pure numbers, "" for text
     text: str  # meaning
@@ -43,12 +43,14 @@ def labels_of(row: type) -> Mapping[str, Label]:
 
 
 def unit_ending(name: str) -> str:
-    """Return the unit suffix of a name, e.g. m_s for velocity_m_s; empty if it has none."""
+    """Return the unit suffix of a name, e.g. m_s for velocity_m_s, or '' if it has none."""
     return max((ending for ending in UNITS if name.endswith(f"_{ending}")), key=len, default="")
 
 
 def unit_by_name(name: str) -> str:
-    """Return the unit in a name's suffix; '1' if it has none. In a dotted name, the last part with a unit has it."""
+    """Return the unit in the suffix of a name, or '1' if it has none. In a dotted name, the last part with a unit has
+    it.
+    """
     return next((UNITS[ending] for part in reversed(name.split(".")) if (ending := unit_ending(part))), "1")
 
 
@@ -58,7 +60,7 @@ def axis_label(key: str) -> str:
     return " ".join(part.removesuffix(f"_{unit_ending(part)}").replace("_", " ") for part in parts)
 
 
-def with_unit(words: str, unit: str) -> str:
+def add_unit(words: str, unit: str) -> str:
     return words if unit in ("", "1") else f"{words} ({unit})"
 
 

@@ -12,7 +12,7 @@ import pytest
 from walkerlab.config import schema
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import LoadedConfig, load
-from walkerlab.config.problems import beyond_scope
+from walkerlab.config.problems import explain_missing_feature
 from walkerlab.config.reference import keys
 from walkerlab.config.schema import Config, Contact, state_of
 from walkerlab.config.walkers import contact_to_add
@@ -217,7 +217,7 @@ def test_keys_beyond_scope_are_rejected_with_the_reason(refused: Refused, text: 
 
 def test_no_existing_key_or_config_counts_as_beyond_scope() -> None:
     names = {part for key in keys() for part in key.key.split(".")}
-    assert [name for name in (*names, *builtin_names()) if beyond_scope(name)] == []
+    assert [name for name in (*names, *builtin_names()) if explain_missing_feature(name)] == []
 
 
 def test_error_in_a_question_block_points_to_its_key(loaded: Loaded) -> None:

@@ -11,7 +11,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.benchmarks.contact_trials import CREEP_FACTOR, near_rigid_trial
+from walkerlab.evidence.benchmarks.contact_trials import CREEP_FACTOR, stiff_ground_trial
 from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.physics.ground import friction
 from walkerlab.physics.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
@@ -139,7 +139,7 @@ def test_rigid_limit_reduces_the_creep_of_any_law(own):
     assert stiff < 0.1
     setting = series_settings(STICTION_SERIES)[-1]
     assert with_scaled_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
-    trial = near_rigid_trial(load().config, START, 0.3714, 2)
+    trial = stiff_ground_trial(load().config, START, 0.3714, 2)
     assert trial.walker.friction.v_0 == pytest.approx(0.1 * CREEP_FACTOR)
 
 

@@ -21,7 +21,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.headlines import headline_values
 from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.views.report.text import in_words
+from walkerlab.views.report.text import format_value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,7 +100,7 @@ class Result:
     def __repr__(self) -> str:
         values = headline_values(self.stage, self.summary)
         lines = [f"no answer: {self.no_answer}"] if self.no_answer is not None else []
-        lines += [f"  {name:<{max(map(len, values))}}  {in_words(value)}" for name, value in values.items()]
+        lines += [f"  {name:<{max(map(len, values))}}  {format_value(value)}" for name, value in values.items()]
         lines += [f"groups: {', '.join(self.groups)}"] if self.groups else []
         return "\n".join([f"{type(self).__name__} of {self.stage}", *lines])
 

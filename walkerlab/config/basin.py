@@ -18,7 +18,7 @@ _Bounds = tuple[_Bound, ...]  # empty for the default window
 
 
 class Basin(Block):
-    """Grid of starts just after heel strike; coordinates that the grid does not vary have the gait's values."""
+    """Grid of starts just after heel strike. Coordinates that the grid does not vary have the gait's values."""
 
     model: Literal["rigid", "contact"] = key("rigid", "", "which model walks")
     plane: tuple[Coordinate, ...] = key(

@@ -9,7 +9,7 @@ from walkerlab.config.schema import Config
 
 
 def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
-    """Return the keys of a config that a type of `config.reads` lists, as nested JSON data; None returns all keys.
+    """Return the keys of a config that a type of `config.reads` lists, as nested JSON data. None returns all keys.
 
     Raises KeyError if a key is not in the schema.
     """
@@ -22,7 +22,7 @@ def slice_of(config: Config, takes: type | None) -> dict[str, Any]:
 
 
 def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield dotted names and values of nested objects; `lists` also splits lists into items, named by their index."""
+    """Yield dotted names and values of nested objects. `lists` also splits lists into items, named by their index."""
     for name, value in block.items():
         inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
         if isinstance(inner, Mapping):

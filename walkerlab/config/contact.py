@@ -122,7 +122,7 @@ class Contact(Block):
 
     @field_validator(*BOUNDS_SI)
     @classmethod
-    def _within_bounds(cls, value: float, info: ValidationInfo) -> float:
+    def _check_bounds(cls, value: float, info: ValidationInfo) -> float:
         """Check a length or velocity against its bounds, converted to the block's units."""
         units = info.data.get("units", "adams")
         scale, prefix = (MM_PER_M, "m") if units == "adams" else (1.0, "")

@@ -12,7 +12,7 @@ QUICKEST: Final = 1e4  # rad/s, fastest leg on a hip spring or damper; massless 
 
 
 class Hip(Block):
-    """Torques between the legs; for kneed legs, between the thighs."""
+    """Torques between the legs, or between the thighs of a kneed walker."""
 
     spring_N_m_per_rad: float = key(
         0.0, "N m/rad", "stiffness of a spring that pulls the legs together", KUO, ge=0.0, le=STRONGEST
@@ -63,5 +63,5 @@ def nonzero_words(acting: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def acting_on(config: Any) -> tuple[str, ...]:
-    """Describe the drives, hip spring and hip damper of a config's walker; empty if it is passive."""
+    """Describe the drives, hip spring and hip damper of a config's walker, or return () if it is passive."""
     return drives_of(config) + springs_of(config)

@@ -11,11 +11,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from walkerlab.config.numbers import short_number
-from walkerlab.labels import with_unit
+from walkerlab.labels import add_unit
 
 
 class Block(BaseModel):
-    """Base class of all config blocks: frozen and strictly typed; unknown keys, NaN and infinity are errors."""
+    """Base class of all config blocks: frozen and strictly typed. Unknown keys, NaN and infinity are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
 
@@ -65,7 +65,7 @@ Text = Annotated[str, AfterValidator(_storable)]
 
 
 def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
-    """Validate key `name` against key `other`, declared above it; `why` returns the reason for an error or ''."""
+    """Validate key `name` against key `other`, declared above it. `why` returns the reason for an error or ''."""
 
     def check(value: Any, info: ValidationInfo) -> Any:
         other_value = info.data.get(other)  # None if the other key is itself invalid
@@ -78,7 +78,9 @@ def check_against(name: str, other: str, why: Callable[[Any, Any], str]) -> Any:
 
 
 def block_of(field: FieldInfo) -> type[Block] | None:
-    """Return the type of the block that a key holds (the first kind if there are several); None if it holds a value."""
+    """Return the type of the block that a key holds (the first kind if there are several), or None if it
+    holds a value.
+    """
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Block):
             return candidate
@@ -86,7 +88,7 @@ def block_of(field: FieldInfo) -> type[Block] | None:
 
 
 def kinds_of(field: FieldInfo) -> dict[str, type[Block]]:
-    """Return the types of block that a key may hold, by the block's key `type`; empty if there is at most one."""
+    """Return the types of block that a key may hold, by the block's key `type`. It is empty if there is at most one."""
     kinds = {}
     for candidate in get_args(field.annotation):
         for tag in get_args(candidate)[1:]:
@@ -118,12 +120,12 @@ def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...],
 
 
 def value_at(config: Any, path: Iterable[str]) -> Any:
-    """Return the value at a path of keys; None if the config lacks a block on the path."""
+    """Return the value at a path of keys, or None if the config lacks a block on the path."""
     return reduce(lambda block, name: getattr(block, name, None), path, config)
 
 
 def annotation_of(field: FieldInfo, name: str) -> str:
-    """Return the annotation `unit`, `source`, `bounds` or `default_in_words` of a key; empty if it has none."""
+    """Return the annotation `unit`, `source`, `bounds` or `default_in_words` of a key, or '' if it has none."""
     extra = field.json_schema_extra
     return str(extra.get(name, "")) if isinstance(extra, dict) else ""
 
@@ -159,7 +161,7 @@ def words_of(annotation: Any) -> tuple[str, ...]:
 
 
 def bounds_of(field: FieldInfo) -> str:
-    """Describe a key's bounds without unit, e.g. `from 0.001 to 1000`; empty if it has none."""
+    """Describe a key's bounds without unit, e.g. `from 0.001 to 1000`, or return '' if it has none."""
     description, what = annotation_of(field, "bounds"), type_words(field.annotation)
     if description:
         return description
@@ -181,4 +183,4 @@ def describe_allowed(field: FieldInfo) -> str:
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
         bounds = f"{what}, {bounds}" if bounds not in ("", what, f"any {what}") else what
-    return with_unit(bounds, unit)
+    return add_unit(bounds, unit)

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from walkerlab.config.problems import KEYS_ARE_LISTED, beyond_scope, nearest, printable, problem_error
+from walkerlab.config.problems import KEYS_ARE_LISTED, explain_missing_feature, nearest, printable, problem_error
 from walkerlab.config.reader import MAX_CHARACTERS, read
 from walkerlab.config.tree import BlockNode, ListNode, Position, Scalar
 
@@ -34,7 +34,7 @@ class ConfigFile:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a path is a file; also False for a path that the system refuses, such as one that is too long."""
+    """Whether a path is a file. A path that the system refuses, such as one that is too long, is not."""
     try:
         return path.is_file()
     except OSError:
@@ -69,13 +69,14 @@ def file_at(path: Path) -> ConfigFile:
 
 
 def read_layers(file: ConfigFile) -> list[BlockNode]:
-    """Read a config file and all files that it extends, directly or indirectly; the file itself comes last.
+    """Read a config file and all files that it extends, directly or indirectly. The file itself comes last.
 
     Raises ConfigError if a file cannot be read, is not a block of keys, or extends itself, or if a stored config
     refers to another file.
     """
     layers = [
-        with_cases(root.without("extends"), layer_file.path.parent) for layer_file, root in files_and_blocks(file)
+        replace_cases_file(root.without("extends"), layer_file.path.parent)
+        for layer_file, root in files_and_blocks(file)
     ]
     return layers[::-1]
 
@@ -90,7 +91,7 @@ def files_read(file: ConfigFile) -> list[Path]:
 
 
 def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]:
-    """Yield (file, block of keys) of a config, then of each file it extends; raises the errors of `read_layers`."""
+    """Yield (file, block of keys) of a config, then of each file it extends. Raises the errors of `read_layers`."""
     seen: list[str] = []
     reference: Position | None = None  # position of the file's name in the config that extends it
     while True:
@@ -113,13 +114,13 @@ def files_and_blocks(file: ConfigFile) -> Iterator[tuple[ConfigFile, BlockNode]]
             return
         reference = extends.position
         if not isinstance(extends, Scalar) or not isinstance(extends.value, str) or not extends.value:
-            raise problem_error(reference, "extends: is not the name of a config", _what_there_is())
+            raise problem_error(reference, "extends: is not the name of a config", _describe_choices())
         is_builtin = extends.value in builtin_names()  # otherwise a path relative to the file's folder
         file = builtin_config(extends.value) if is_builtin else file_at(file.path.parent / extends.value)
 
 
 def _refuse_named_files(root: BlockNode) -> None:
-    """Raise ConfigError if a stored config names another file; stored configs are complete, and may be untrusted."""
+    """Raise ConfigError if a stored config names another file. Stored configs are complete and may be untrusted."""
     cases = cases_file(root, Path())
     places = [root.entries["extends"].position] if "extends" in root.entries else []
     places += [] if cases is None else [cases[1]]
@@ -128,7 +129,9 @@ def _refuse_named_files(root: BlockNode) -> None:
 
 
 def cases_file(layer: BlockNode, folder: Path) -> tuple[ConfigFile, Position] | None:
-    """Return the file under stability.cases (relative to `folder`) and where the config names it; None for a list."""
+    """Return the file under stability.cases (relative to `folder`) and where the config names it, or None
+    for a list.
+    """
     block = layer.entries.get("stability")
     file_name = block.entries.get("cases") if isinstance(block, BlockNode) else None
     if not isinstance(file_name, Scalar) or not isinstance(file_name.value, str):
@@ -136,7 +139,7 @@ def cases_file(layer: BlockNode, folder: Path) -> tuple[ConfigFile, Position] | 
     return file_at(folder / file_name.value), file_name.position
 
 
-def with_cases(layer: BlockNode, folder: Path) -> BlockNode:
+def replace_cases_file(layer: BlockNode, folder: Path) -> BlockNode:
     """Replace a file name under stability.cases (relative to `folder`) by the list of cases in that file.
 
     Raises ConfigError if the file cannot be read or holds no list.
@@ -154,7 +157,7 @@ def with_cases(layer: BlockNode, folder: Path) -> BlockNode:
     return result
 
 
-def _what_there_is() -> str:
+def _describe_choices() -> str:
     return f"a file, or one of {', '.join(builtin_names())}"
 
 
@@ -173,10 +176,10 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
         with file.path.open("rb") as stream:
             data = stream.read(4 * MAX_CHARACTERS + 1)
     except FileNotFoundError:
-        there_is = purpose or _what_there_is() if reference else f"a run, {_what_there_is()}"
-        beyond = "" if purpose or file.path.suffix else beyond_scope(file.path.name)
+        there_is = purpose or _describe_choices() if reference else f"a run, {_describe_choices()}"
+        beyond = "" if purpose or file.path.suffix else explain_missing_feature(file.path.name)
         text = f"there is no {kind} {file.label}{f'; {beyond}' if beyond else ''}"
-        raise problem_error(reference, text, there_is, "" if beyond else _near(file), advice) from None
+        raise problem_error(reference, text, there_is, "" if beyond else _suggest_name(file), advice) from None
     except (OSError, ValueError, RuntimeError) as error:  # ValueError: null byte in the name; RuntimeError: link loop
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise problem_error(reference, f"{kind} {file.label} cannot be read: {reason.lower()}", advice=advice) from None
@@ -190,7 +193,7 @@ def _text_of(file: ConfigFile, reference: Position | None, purpose: str = "") ->
         raise problem_error(where, f"byte 0x{data[error.start]:02x} is not UTF-8: is it a text file?") from None
 
 
-def _near(file: ConfigFile) -> str:
+def _suggest_name(file: ConfigFile) -> str:
     """Suggest an existing file or built-in config for a missing one."""
     neighbours: list[str] = []
     with contextlib.suppress(OSError, ValueError):

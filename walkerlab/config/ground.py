@@ -6,7 +6,7 @@ from walkerlab.config.fields import Block, check_against, key, meaning_error
 
 
 class Footholds(Block):
-    """Heights of the footholds, for uneven ground; even by default."""
+    """Heights of the footholds, for uneven ground. The default is even ground."""
 
     roughness_m: float = key(
         0.0, "m", "standard deviation of the footholds' heights, which are drawn independently", ge=0.0, le=1e3
@@ -29,7 +29,7 @@ class Footholds(Block):
 
     @field_validator("heights_m")
     @classmethod
-    def _near_the_slope(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+    def _check_heights(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if any(abs(height) > 1e3 for height in value):
             raise meaning_error("must be numbers from -1e3 to 1e3")
         return value

@@ -85,7 +85,7 @@ class Identify(Block):
 
     @field_validator("prior")
     @classmethod
-    def _with_deviation(cls, value: dict[str, Pair]) -> dict[str, Pair]:
+    def _check_deviations(cls, value: dict[str, Pair]) -> dict[str, Pair]:
         for name, pair in value.items():
             if len(pair) != 2 or pair[1] <= 0.0:
                 raise meaning_error(f"has [{listed(pair)}] for {name}, not a value and a standard deviation above 0")
@@ -93,7 +93,7 @@ class Identify(Block):
 
     @field_validator("nuisance")
     @classmethod
-    def _once(cls, value: tuple[Nuisance, ...]) -> tuple[Nuisance, ...]:
+    def _remove_duplicates(cls, value: tuple[Nuisance, ...]) -> tuple[Nuisance, ...]:
         return tuple(dict.fromkeys(value))
 
 

@@ -21,7 +21,7 @@ class ConfigSetting:
 
 
 def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
-    """Merge layers into one block; later layers override earlier ones, and only the last one sets the name.
+    """Merge layers into one block. Later layers override earlier ones, and only the last one sets the name.
 
     Raises ConfigError if a layer has more than one slope key.
     """
@@ -32,16 +32,16 @@ def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
         lower = merged.without("name")
         if any(name in layer.entries for name in SLOPE_KEYS):
             lower = lower.without(*SLOPE_KEYS)
-        merged = _merged(lower, layer)
+        merged = _merge_blocks(lower, layer)
     return merged
 
 
-def _merged(lower: BlockNode, upper: BlockNode) -> BlockNode:
+def _merge_blocks(lower: BlockNode, upper: BlockNode) -> BlockNode:
     result = lower.without()
     for name, node in upper.entries.items():
         below = lower.entries.get(name)
         if isinstance(below, BlockNode) and isinstance(node, BlockNode):
-            node = _merged(below, node)
+            node = _merge_blocks(below, node)
         result.put(name, node, upper.keys[name])
     return result
 
@@ -55,7 +55,10 @@ def _refuse_two_slopes(keys: dict[str, Position]) -> None:
 
 
 def parse_setting(text: str) -> ConfigSetting:
-    """Parse a `--set` option; ConfigError if it is not KEY=VALUE with a YAML value."""
+    """Parse a `--set` option.
+
+    Raises ConfigError if it is not KEY=VALUE with a YAML value.
+    """
     # If the text has an attribute `source`, it is the option's name in messages.
     key, equals, value = text.partition("=")
     source = printable(getattr(text, "source", "")) or f"--set {printable(text)}"
@@ -76,18 +79,21 @@ def option_setting(key: str, value: int | str) -> ConfigSetting:
 
 
 def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockNode:
-    """Apply settings in order; lists and blocks are replaced, not merged. ConfigError if a key's parent is no block."""
+    """Apply settings in order. Lists and blocks are replaced, not merged.
+
+    Raises ConfigError if a key's parent is no block.
+    """
     _refuse_two_slopes({setting.path[0]: setting.position for setting in settings})
     copies: dict[int, BlockNode] = {}
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:
             tree = tree.without(*SLOPE_KEYS)
-        tree = _placed(tree, setting, 0, copies)
+        tree = _place_setting(tree, setting, 0, copies)
     return tree
 
 
-def _placed(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[int, BlockNode]) -> BlockNode:
-    """Place a setting in a copy of a block; `copies` holds, by id, the copies that earlier settings made."""
+def _place_setting(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[int, BlockNode]) -> BlockNode:
+    """Place a setting in a copy of a block. `copies` holds, by id, the copies that earlier settings made."""
     result = copies.get(id(block)) or block.without()
     copies[id(result)] = result
     name = setting.path[depth]
@@ -102,5 +108,5 @@ def _placed(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[i
         raise problem_error(
             setting.position, f"{printable(full_key)}: {printable(above)} is a value, not a block of keys"
         )
-    result.put(name, _placed(inner, setting, depth + 1, copies), block.keys.get(name, setting.position))
+    result.put(name, _place_setting(inner, setting, depth + 1, copies), block.keys.get(name, setting.position))
     return result

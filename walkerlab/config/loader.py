@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from walkerlab.config.canonical import flatten
 from walkerlab.config.fields import block_of
-from walkerlab.config.files import DEFAULT, ConfigFile, builtin_config, find_config, read_layers, with_cases
+from walkerlab.config.files import DEFAULT, ConfigFile, builtin_config, find_config, read_layers, replace_cases_file
 from walkerlab.config.layers import ConfigSetting, apply_settings, merge_layers, option_setting, parse_setting
 from walkerlab.config.numbers import short_number
 from walkerlab.config.overlay import check_cases
@@ -60,7 +60,10 @@ class LoadedConfig:
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
 
     def variant(self, settings: Sequence[ConfigSetting]) -> Config:
-        """Set some keys and validate the result; ConfigError with positions if it is invalid."""
+        """Return the config with some keys changed.
+
+        Raises ConfigError with positions if it is invalid.
+        """
         tree = apply_settings(self.tree, settings)
         return align_start(validate_tree(tree), tree)[0]
 
@@ -71,7 +74,8 @@ def load(
     strides: int | None = None,
     name: str | None = None,
 ) -> LoadedConfig:
-    """Load a config from a file, by the name of a built-in config, or from a stored run; by default the paper's.
+    """Load a config from a file, by the name of a built-in config, or from a stored run. The default is the paper's
+    config.
 
     sets     `--set` options, KEY=VALUE, in order
     strides  `--strides`, which overrides everything else
@@ -89,7 +93,7 @@ def load(
     settings = [parse_setting(text) for text in sets]
     options = {"strides": strides, "name": name}
     settings += [option_setting(key, value) for key, value in options.items() if value is not None]
-    changed_tree = with_cases(apply_settings(tree, settings), Path())
+    changed_tree = replace_cases_file(apply_settings(tree, settings), Path())
     changed = validate_tree(changed_tree)
     base = validate_tree(tree) if settings else changed
     check_cases(changed, changed_tree)
@@ -165,7 +169,7 @@ UNSAFE: Final = re.compile(r"[^A-Za-z0-9._,@=+-]")
 
 
 def changes_of(base: Config, changed: Config, slope_deg: float | None = None) -> tuple[str, ...]:
-    """List each key in which `changed` differs from `base` as KEY=VALUE; slope_deg, if given, replaces slope_rad."""
+    """List each key in which `changed` differs from `base` as KEY=VALUE. If given, slope_deg replaces slope_rad."""
     before, after = base.model_dump(mode="json", exclude={"name"}), changed.model_dump(mode="json", exclude={"name"})
     added = []
     for name in before:

@@ -5,14 +5,16 @@ import re
 from decimal import Decimal
 from typing import Any, Final
 
-SAME: Final = 1e-9
+RELATIVE_ROUNDING: Final = 1e-9
 """Maximum relative difference between numbers that count as equal; unit conversion rounds numbers by less."""
 
 DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d*(?:[eE][-+]?\d+)?")
 
 
 def short_number(number: float) -> str:
-    """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6; integers in full."""
+    """Return the shortest text that reads back as `number` (finite), e.g. 3, 0.0174, 1e6. Integers are
+    written in full.
+    """
     if isinstance(number, int):
         return str(number)
     plain = repr(number).removesuffix(".0")
@@ -22,8 +24,8 @@ def short_number(number: float) -> str:
     return min(plain, f"{digits}e{int(exponent)}", key=len)
 
 
-def same(first: Any, second: Any) -> bool:
+def are_equal(first: Any, second: Any) -> bool:
     """Whether two values are equal, numbers up to rounding."""
     if isinstance(first, float | int) and isinstance(second, float | int):
-        return math.isclose(first, second, rel_tol=SAME)
+        return math.isclose(first, second, rel_tol=RELATIVE_ROUNDING)
     return bool(first == second)

@@ -13,7 +13,7 @@ from walkerlab.config.validation import align_start, validate_tree
 
 
 def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> Config:
-    """Build the paper config with changes (nested keys with values); error messages name their `source`.
+    """Build the paper config with changes (nested keys with values). Error messages name their `source`.
 
     Raises ConfigError if the result is invalid; a start is moved onto its constraints without a warning.
     """
@@ -21,7 +21,10 @@ def paper_config_with(lines: Mapping[str, Any], source: str = "the paper's") -> 
 
 
 def paper_config_with_tree(upper: BlockNode) -> Config:
-    """Build the paper config with a block of keys on top; ConfigError with positions if the result is invalid."""
+    """Build the paper config with a block of keys on top.
+
+    Raises ConfigError with positions if the result is invalid.
+    """
     # With SI units, keys missing in the contact block keep the paper's physical value, not its number in N, mm, s.
     layers = read_layers(builtin_config(DEFAULT))
     contact = upper.entries.get("contact")

@@ -48,24 +48,24 @@ def problems_error(problems: Sequence[Problem], advice: str = KEYS_ARE_LISTED) -
 def problem_error(
     position: Position | None, text: str, allowed: str = "", near: str = "", advice: str = KEYS_ARE_LISTED
 ) -> ConfigError:
-    """Build the error for a single problem; see `Problem`."""
+    """Build the error for a single problem. See `Problem`."""
     return problems_error([Problem(position, text, allowed, near)], advice)
 
 
-def beyond_scope(word: str) -> str:
-    """Explain in a sentence why walkerlab lacks the feature that `word` names; empty if no pattern matches."""
+def explain_missing_feature(word: str) -> str:
+    """Explain in a sentence why walkerlab lacks the feature that `word` names, or return '' if no pattern matches."""
     return next((why for pattern, why in BEYOND_SCOPE.items() if re.search(pattern, word.lower())), "")
 
 
 def nearest(word: str, candidates: Iterable[str]) -> str:
-    """Return the candidate most similar to `word`; empty if none is similar."""
+    """Return the candidate most similar to `word`, or '' if none is similar."""
     spelled = {candidate.lower(): candidate for candidate in candidates}
     matches = difflib.get_close_matches(word[:SHOWN_LENGTH].lower(), spelled, n=1, cutoff=0.5)
     return spelled[matches[0]] if matches else ""
 
 
 def suggestion(word: str, candidates: Iterable[str]) -> str:
-    """Return ` Did you mean X?` for the nearest candidate; empty if none is similar."""
+    """Return ` Did you mean X?` for the nearest candidate, or '' if none is similar."""
     near = nearest(word, candidates)
     return f" Did you mean {near}?" if near else ""
 
@@ -77,7 +77,7 @@ def printable(text: str, length: int = SHOWN_LENGTH) -> str:
 
 
 def format_node(node: Node) -> str:
-    """Format a value as in the config; strings are quoted."""
+    """Format a value as in the config. Strings are quoted."""
     if isinstance(node, BlockNode):
         return "a block" if node.entries else "an empty block"
     if not isinstance(node, Scalar):

@@ -44,7 +44,7 @@ def value_of(text: str) -> str | int | float | bool | None:
 
 
 def read(text: str, source: str, column: int = 1) -> Node | None:
-    """Parse the text of a single document to a tree; None if it is empty.
+    """Parse the text of a single document to a tree, or return None if it is empty.
 
     Positions name the `source` (a file or option); `column` is the column at which the text starts. Raises ConfigError
     with the position of anything that is not plain YAML.
@@ -115,9 +115,9 @@ class _Composer:
         if depth == MAX_DEPTH:
             self._refuse(event, f"nested deeper than {MAX_DEPTH} levels")
         if name == "SequenceStartEvent":
-            return ListNode(position, [self._node(item, depth + 1) for item in self._until("SequenceEndEvent")])
+            return ListNode(position, [self._node(item, depth + 1) for item in self._read_until("SequenceEndEvent")])
         block = BlockNode(position)
-        for word in self._until("MappingEndEvent"):
+        for word in self._read_until("MappingEndEvent"):
             if type(word).__name__ in ("MappingStartEvent", "SequenceStartEvent"):
                 self._refuse(word, "a key must be a word, not a list or a block")
             key, value = self._node(word, depth + 1), self._node(next(self._events), depth + 1)
@@ -129,7 +129,7 @@ class _Composer:
                 block.put(key.text, value, key.position)
         return block
 
-    def _until(self, end: str) -> Iterator[Any]:
+    def _read_until(self, end: str) -> Iterator[Any]:
         return takewhile(lambda event: type(event).__name__ != end, self._events)
 
     def _refuse(self, event: Any, reason: str) -> NoReturn:

@@ -1,4 +1,4 @@
-"""Types for the parts of a config that stages and their helpers may read; mypy enforces them.
+"""Types for the parts of a config that stages and their helpers may read, which mypy enforces.
 
 Each type lists its keys, and a config satisfies all types. A stage gets an object with only the keys of its type, and
 their values determine the key of its result. Meaning, unit and bounds of the keys are in config/schema.py.
@@ -43,13 +43,13 @@ def _part(member: property) -> type | None:
 
 
 def dotted_keys(takes: type) -> Iterator[str]:
-    """Yield the keys of a type; keys in a block that is read only in part are dotted, e.g. `solver.rigid`."""
+    """Yield the keys of a type. Keys in a block that is read only in part are dotted, e.g. `solver.rigid`."""
     for name, part in keys_of(takes).items():
         yield from (name,) if part is None else (f"{name}.{key}" for key in dotted_keys(part))
 
 
 def only(config: Any, takes: type | None) -> Any:
-    """Return an object with only the keys of a type; the config itself if the type is None."""
+    """Return an object with only the keys of a type, or the config itself if the type is None."""
     if takes is None:
         return config
     return SimpleNamespace(**{name: only(getattr(config, name), part) for name, part in keys_of(takes).items()})
@@ -165,7 +165,7 @@ class OwnCases(Protocol):
 
 
 class CompassCasesConfig(Protocol):
-    """Keys that `stability` reads for the paper's compass; its cases are variations of the paper's config."""
+    """Keys that `stability` reads for the paper's compass. Its cases are variations of the paper's config."""
 
     @property
     def walker(self) -> Walker: ...
@@ -176,7 +176,7 @@ class CompassCasesConfig(Protocol):
 
 
 class SceneCasesConfig(WalksConfig, Protocol):
-    """Keys that `stability` reads for other walkers; their cases are variations of their own scene."""
+    """Keys that `stability` reads for other walkers. Their cases are variations of their own scene."""
 
     @property
     def stability(self) -> OwnCases: ...
@@ -188,7 +188,7 @@ class MapCells(Protocol):
 
 
 class MapsConfig(Protocol):
-    """Keys that `stability-maps` reads; it maps the paper's config."""
+    """Keys that `stability-maps` reads. It maps the paper's config."""
 
     @property
     def stability(self) -> MapCells: ...
@@ -249,6 +249,6 @@ if TYPE_CHECKING:
         ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, IdentifyConfig, PlanConfig, NamedConfig,
     ]  # fmt: skip
 
-    def for_each_type(config: schema.Config) -> OfEachType:
+    def check_every_type(config: schema.Config) -> OfEachType:
         """Let mypy check that a config satisfies every type."""
         return config, config, config, config, config, config, config, config, config, config, config, config, config

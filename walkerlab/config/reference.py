@@ -19,7 +19,7 @@ from walkerlab.errors import ConfigError
 
 COLUMNS: Final = 79
 SHOWN_KEYS: Final = 4  # largest number of keys that a message suggests
-OF_A_KIND: Final = re.compile(r"\([a-z-]+\)")
+KIND_SUFFIX: Final = re.compile(r"\([a-z-]+\)")
 """Kind in parentheses in a key's name, such as `(kneed)`: only blocks of that kind have the key."""
 SCHEMA_REFERENCE: Final = re.compile(r'"#/\$defs/([^"]+)"')
 EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file's folder, or the name of a built-in one"
@@ -27,7 +27,7 @@ EXTENDS_MEANING: Final = "config this one inherits from: a file, from this file'
 
 @dataclass(frozen=True, slots=True)
 class KeyReference:
-    """Description of one config key; every field is text."""
+    """Description of one config key. Every field is text."""
 
     key: str
     type: str
@@ -57,17 +57,17 @@ def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
         type=type_words(field.annotation),
         unit=annotation_of(field, "unit"),
         bounds=bounds_of(field),
-        default=annotation_of(field, "default_in_words") or _spelled(default),
+        default=annotation_of(field, "default_in_words") or _format_default(default),
         meaning=field.description or "",
         source=annotation_of(field, "source"),
     )
 
 
-def _spelled(value: Any) -> str:
+def _format_default(value: Any) -> str:
     if value in (None, {}, PydanticUndefined):
         return "none"
     if isinstance(value, tuple):
-        return f"[{', '.join(_spelled(item) for item in value)}]"
+        return f"[{', '.join(_format_default(item) for item in value)}]"
     return short_number(value) if isinstance(value, int | float) else str(value)
 
 
@@ -86,11 +86,13 @@ def as_paragraphs(selection: str = "") -> str:
 
 
 def select_keys(selection: str) -> list[KeyReference]:
-    """Return a block's keys, a single key, or by default all keys; ConfigError with the nearest key if none match.
+    """Return a block's keys, a single key, or by default all keys.
 
     Keys that are equal in every kind of a block are listed only once.
+
+    Raises ConfigError with the nearest key if none match.
     """
-    plain = {key: OF_A_KIND.sub("", key.key) for key in keys()}
+    plain = {key: KIND_SUFFIX.sub("", key.key) for key in keys()}
     matches = [
         key
         for key in plain

@@ -1,4 +1,4 @@
-"""All config keys with type, unit, bounds, default, meaning and source; the defaults are the paper's values."""
+"""All config keys with type, unit, bounds, default, meaning and source. The defaults are the paper's values."""
 
 import math
 from importlib.util import find_spec
@@ -52,7 +52,7 @@ CVODE_PACKAGE: Final = "sksundae"
 
 
 class SlopeInDegrees(Block):
-    """Slope in degrees, allowed in a file or `--set` instead of slope_rad; the resolved config has only slope_rad."""
+    """Slope in degrees, allowed in a file or `--set` instead of slope_rad. The resolved config has only slope_rad."""
 
     slope_deg: float = key(
         ...,
@@ -92,7 +92,7 @@ def state_of(start: Any) -> tuple[float, ...]:
     return start.state if isinstance(start, MidStep) else tuple(start)
 
 
-def with_state(start: Any, state: tuple[float, ...]) -> Any:
+def replace_state(start: Any, state: tuple[float, ...]) -> Any:
     """Return a start at the same instant with another state."""
     return MidStep(instant=MID_STEP, state=state) if isinstance(start, MidStep) else state
 

@@ -8,18 +8,18 @@ from typing import TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Place in a config text: file or option, line and column from 1; line 0 means the entire source."""
+    """Place in a config text: file or option, line and column from 1. Line 0 means the entire source."""
 
     source: str
     line: int
     column: int
 
     def __bool__(self) -> bool:
-        """Whether there is a position; values passed from Python have none."""
+        """Whether there is a position. Values passed from Python have none."""
         return bool(self.source)
 
     def __str__(self) -> str:
-        """Format as source:line:column, which editors understand; options without line and column."""
+        """Format as source:line:column, which editors understand. Options have no line and column."""
         without_line = not self.line or self.source.startswith("--")
         return self.source if without_line else f"{self.source}:{self.line}:{self.column}"
 

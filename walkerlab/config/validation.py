@@ -1,4 +1,4 @@
-"""Validation of a config tree against the schema; all problems are reported together, with positions."""
+"""Validation of a config tree against the schema. All problems are reported together, with positions."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ from walkerlab.config.layers import merge_layers
 from walkerlab.config.numbers import DECIMAL_COMMA, short_number
 from walkerlab.config.problems import (
     Problem,
-    beyond_scope,
+    explain_missing_feature,
     format_node,
     nearest,
     printable,
@@ -202,7 +202,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
     if what == "union_tag_invalid":
         node, position = node_at(tree, (*location, "type"))
         word = str(node.value) if isinstance(node, Scalar) else ""
-        beyond = beyond_scope(word)
+        beyond = explain_missing_feature(word)
         text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
         return Problem(position, text, f"one of {', '.join(kinds)}", "" if beyond else nearest(word, kinds))
     # pydantic inserts the kind of value that it tried
@@ -210,7 +210,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
         location = (location[0], *location[2:])
     if what == "extra_forbidden":
         return _unknown_key(location, tree)
-    path, field, _ = _along(model, location, tree)
+    path, field, _ = _locate_key(model, location, tree)
     assert field is not None, "the key of an invalid value is in the schema"
     key = ".".join(path)
     node, position = node_at(tree, location)
@@ -241,7 +241,7 @@ def _is_later(place: Position, earlier: Position) -> bool:
     return place.source.startswith("--") or (bool(place) and earlier.source.startswith("built-in"))
 
 
-def _along(
+def _locate_key(
     model: type[Block], location: Location, tree: BlockNode
 ) -> tuple[list[str], FieldInfo | None, type[Block] | None]:
     """Return the key and field at a location, and the type of block that the key holds in this tree.
@@ -266,7 +266,7 @@ def _along(
 
 
 def _unknown_key(location: Location, tree: BlockNode) -> Problem:
-    above, field, inner = _along(Config, location[:-1], tree)
+    above, field, inner = _locate_key(Config, location[:-1], tree)
     name, block = str(location[-1]), inner or Config
     kinds = {} if field is None else kinds_of(field)
     parent, _ = node_at(tree, location[:-1])
@@ -278,13 +278,15 @@ def _unknown_key(location: Location, tree: BlockNode) -> Problem:
     siblings = [*block.model_fields, *(("slope_deg", "extends") if block is Config else ())]
     text = f"{printable('.'.join((*above, name)))}: unknown key ({format_node(parent.entries[name])})"
     value = parent.entries[name]
-    beyond = beyond_scope(name) or (beyond_scope(value.text) if name == "type" and isinstance(value, Scalar) else "")
+    beyond = explain_missing_feature(name) or (
+        explain_missing_feature(value.text) if name == "type" and isinstance(value, Scalar) else ""
+    )
     if beyond:
         return Problem(parent.keys[name], f"{text}; {beyond}", ", ".join(siblings))
     similar = nearest(name, siblings) if "." not in name else ""
     if similar == "slope_rad" and "rad" not in name:
         similar = "slope_deg"
-    intended = ".".join((*above, similar)) if similar else _elsewhere(name, exactly=bool(above))
+    intended = ".".join((*above, similar)) if similar else _find_key_elsewhere(name, exactly=bool(above))
     return Problem(parent.keys[name], text, ", ".join(siblings), intended)
 
 
@@ -308,7 +310,7 @@ def _keys_of_another_kind(
     return Problem(type_at, f"{above}.type: {chosen} {has_no}, given at {where}", instead)
 
 
-def _elsewhere(name: str, exactly: bool) -> str:
+def _find_key_elsewhere(name: str, exactly: bool) -> str:
     """Return the path of the key with the nearest name (`exactly`: the same name) in any block, or an empty string."""
     paths = {path[-1]: ".".join(path) for path, _ in reversed(list(leaves(Config)))}
     if "." in name:
@@ -319,7 +321,7 @@ def _elsewhere(name: str, exactly: bool) -> str:
 
 
 def node_at(tree: BlockNode, location: Location) -> tuple[Node | None, Position]:
-    """Return the value at a location and its position; for a missing key, None and the position of its block.
+    """Return the value at a location and its position. For a missing key, they are None and the position of its block.
 
     Parts of the location that are not in the tree, such as the kind of value that pydantic tried, are skipped.
     """

@@ -91,7 +91,7 @@ class _Legged(Block):
 
     @property
     def lean_rad(self: Any) -> float:
-        """Angle (rad) between an upright leg and the line from hip to foot centre; 0 for walkers of parts."""
+        """Angle (rad) between an upright leg and the line from hip to foot centre, or 0 for walkers of parts."""
         ahead = getattr(self, "foot_centre_ahead_m", 0.0)
         return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
 
@@ -344,7 +344,9 @@ class PartsWalker(_Legged):
 def hip_to_sole(
     hinges: tuple[PartHinge, ...], feet: tuple[PartFoot, PartFoot], legs: tuple[LegBodies, LegBodies]
 ) -> float | None:
-    """Return the depth (m) of the first leg's sole below the hip, legs upright; None if hinges do not connect them."""
+    """Return the depth (m) of the first leg's sole below the hip, legs upright, or None if hinges do not
+    connect them.
+    """
     places = {(hinge.parent, hinge.child): (hinge.parent_point_m, hinge.child_point_m) for hinge in hinges}
     places |= {(hinge.child, hinge.parent): (hinge.child_point_m, hinge.parent_point_m) for hinge in hinges}
     chain = [legs[1][0], *legs[0]] if legs[0] and legs[1] else []
@@ -361,7 +363,7 @@ def hip_to_sole(
 
 
 def why_off_the_leg(mass_m: float, length_m: float) -> str:
-    """Explain why a mass at `mass_m` from the foot is not on the leg; empty if it is on the leg."""
+    """Explain why a mass at `mass_m` from the foot is not on the leg, or return '' if it is on the leg."""
     if mass_m < length_m:
         return ""
     massless = "equals leg_length_m, so b = 0: the leg's mass sits at the hip and the swing leg is massless; "
@@ -402,7 +404,7 @@ def is_passive_compass(config: Any) -> bool:
 
 
 def leg_inertia(walker: Any) -> float:
-    """Return the inertia of one leg about the hip (kg m^2); for walkers of parts, an upper bound."""
+    """Return the inertia of one leg about the hip (kg m^2). For walkers of parts, it is an upper bound."""
     if walker.type == "compass":
         below = walker.leg_length_m - walker.foot_to_mass_m
         return float(walker.leg_mass_kg * below**2 + walker.leg_inertia_kg_m2)
@@ -421,7 +423,7 @@ def leg_inertia(walker: Any) -> float:
 
 
 def why_no_push_off(walker: Any) -> str:
-    """Explain why a walker cannot push off along its trailing leg; empty if it can."""
+    """Explain why a walker cannot push off along its trailing leg, or return '' if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
         return "cannot act: it needs a locked trailing knee, but walker.knee.at_heel_strike is free" if free else ""
@@ -436,7 +438,7 @@ def why_no_push_off(walker: Any) -> str:
 
 
 def too_light_for_contact(walker: Any) -> str:
-    """Explain why a walker cannot stand on compliant ground; empty if it can."""
+    """Explain why a walker cannot stand on compliant ground, or return '' if it can."""
     share = walker.leg_mass_kg / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
     if share >= LIGHTEST_CONTACT:
         return ""
@@ -447,13 +449,13 @@ def too_light_for_contact(walker: Any) -> str:
 
 
 def why_no_contact(walker: Any) -> str:
-    """Explain why a walker cannot have a contact block, with advice; empty if it can."""
+    """Explain why a walker cannot have a contact block, with advice, or return '' if it can."""
     why = too_light_for_contact(walker)
     return f"cannot carry this walker, as {why}; leave the contact block out, or give the legs mass" if why else ""
 
 
 def why_no_state(start: Any, walker: Any) -> str:
-    """Explain why a start has the wrong number of values for a walker; empty if the number is right."""
+    """Explain why a start has the wrong number of values for a walker, or return '' if the number is right."""
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers
     return "" if fits else f"has {len(start)} values; this walker needs {numbers}"
@@ -479,7 +481,7 @@ def why_rigid_alone(walker: Any) -> str:
 
 
 def contact_required_error(request: str, walker: Any, instead: str) -> ConfigError:
-    """Build the error for a request that needs contact; `instead` is the advice if only the block is missing."""
+    """Build the error for a request that needs contact. `instead` is the advice if only the block is missing."""
     why = too_light_for_contact(walker)
     if why:
         return ConfigError(f"{request} needs contact, but {why}.", "Use the rigid model, or give the legs mass.")

@@ -1,4 +1,4 @@
-"""Write a config as YAML, with or without comments; loading it gives an equal config."""
+"""Write a config as YAML, with or without comments. Loading it gives an equal config."""
 
 import json
 import math

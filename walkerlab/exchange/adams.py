@@ -15,7 +15,7 @@ def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
 
 
 def statements(model: AdamsModel) -> Iterator[str]:
-    """Yield the lines of all statements; objects of each kind are numbered from 1, and part 1 is the ground."""
+    """Yield the lines of all statements. Objects of each kind are numbered from 1, and part 1 is the ground."""
     ids = model.numbers
 
     def expression(text: str) -> str:
@@ -23,45 +23,51 @@ def statements(model: AdamsModel) -> Iterator[str]:
 
     yield from statement("UNITS/", "FORCE = NEWTON", "MASS = KILOGRAM", "LENGTH = MILLIMETER", "TIME = SECOND")
     for number, name in enumerate((GROUND, *model.parts), start=1):
-        yield from named(name, f"PART/{number}", *part_arguments(model, name, ids))
+        yield from named_statement(name, f"PART/{number}", *part_arguments(model, name, ids))
         for marker_name, marker in model.markers.items():
             if marker.part == name:
                 place = "FLOATING" if marker.floating else f"QP = {values(*marker.place)}"
                 own = marker_name.rpartition(".")[2]
-                yield from named(own, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
+                yield from named_statement(own, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
     for name, joint in model.joints.items():
         head = f"{'JPRIM' if joint.kind == 'INLINE' else 'JOINT'}/{ids[name]}"
-        yield from named(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
+        yield from named_statement(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
     for name, weights in model.couplers.items():
         coupled, kinds_of_joint = ", ".join(str(ids[joint]) for joint in weights), ":".join("R" for _ in weights)
         scales = f"SCALES = {values(*weights.values())}"
-        yield from named(name, f"COUPLER/{ids[name]}", f"JOINTS = {coupled}", f"TYPE = {kinds_of_joint}", scales)
+        yield from named_statement(
+            name, f"COUPLER/{ids[name]}", f"JOINTS = {coupled}", f"TYPE = {kinds_of_joint}", scales
+        )
     for name, shape in model.shapes.items():
         box = shape.kind == "BOX"
         where = f"{'CORNER' if box else 'CM'} = {ids[shape.marker]}"
         edges = zip("XYZ", shape.size, strict=True)
         sizes = (f"{axis}{'' if box else 'SCALE'} = {finite(edge)}" for axis, edge in edges)
-        yield from named(name, f"GRAPHICS/{ids[name]}", shape.kind, where, *sizes)
+        yield from named_statement(name, f"GRAPHICS/{ids[name]}", shape.kind, where, *sizes)
     for name, ends in model.outlines.items():
-        yield from named(name, f"GRAPHICS/{ids[name]}", f"OUTLINE = {', '.join(str(ids[end]) for end in ends)}")
+        yield from named_statement(
+            name, f"GRAPHICS/{ids[name]}", f"OUTLINE = {', '.join(str(ids[end]) for end in ends)}"
+        )
     for name, contact in model.contacts.items():
-        yield from named(name, f"CONTACT/{ids[name]}", *contact_arguments(contact, ids))
+        yield from named_statement(name, f"CONTACT/{ids[name]}", *contact_arguments(contact, ids))
     for name, function in model.variables.items():
-        yield from named(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
+        yield from named_statement(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
     for name, force in model.forces.items():
-        yield from named(
+        yield from named_statement(
             name, f"GFORCE/{ids[name]}", f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
             f"RM = {ids[ORIGIN]}", f"FX = {expression(force.x)}\\", f"FY = {expression(force.y)}\\",
             "FZ = 0\\", "TX = 0\\", "TY = 0\\", f"TZ = {expression(force.torque)}",
         )  # fmt: skip
     for name, torque in model.torques.items():
         ends = f"I = {ids[torque.i]}", f"J = {ids[torque.j]}"
-        yield from named(name, f"SFORCE/{ids[name]}", "ROTATIONAL", *ends, f"FUNCTION = {expression(torque.function)}")
+        yield from named_statement(
+            name, f"SFORCE/{ids[name]}", "ROTATIONAL", *ends, f"FUNCTION = {expression(torque.function)}"
+        )
     for name, held in model.motions.items():
         how = f"JOINT = {ids[held]}", "ROTATION", "VELOCITY", "FUNCTION = 0"
-        yield from named(name, f"MOTION/{ids[name]}", *how)
+        yield from named_statement(name, f"MOTION/{ids[name]}", *how)
     for name, sensor in model.sensors.items():
-        yield from named(
+        yield from named_statement(
             name, f"SENSOR/{ids[name]}", "GE", "VALUE = 0", f"ERROR = {finite(sensor.error)}",
             "HALT" if sensor.halts else "RETURN", f"FUNCTION = {expression(sensor.function)}",
         )  # fmt: skip
@@ -70,7 +76,7 @@ def statements(model: AdamsModel) -> Iterator[str]:
     for number, (name, components) in enumerate(model.requests.items(), start=1):
         columns = ", ".join(f'"{component}"' for component in components)
         functions = [f"F{k} = {expression(text)}" for k, text in enumerate(components.values(), start=1)]
-        yield from named(
+        yield from named_statement(
             f"request_{name}", f"REQUEST/{number}", f"RESULTS_NAME = {name}", f"CNAMES = {columns}",
             *(f"{text}\\" for text in functions[:-1]), functions[-1],
         )  # fmt: skip
@@ -92,7 +98,7 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
     yield f"IP = {values(part.inertia, part.inertia, part.inertia)}"
 
 
-def named(name: str, head: str, *arguments: str) -> Iterator[str]:
+def named_statement(name: str, head: str, *arguments: str) -> Iterator[str]:
     """Yield a statement after the comment that names its object in Adams View."""
     yield f"!                adams_view_name='{name}'"
     yield from statement(head, *arguments)

@@ -47,7 +47,7 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Marker:
-    """Point of a part, in the part's frame (mm); a floating marker follows the point at which a reaction acts."""
+    """Point of a part, in the part's frame (mm). A floating marker follows the point at which a reaction acts."""
 
     part: str
     place: Place = (0.0, 0.0, 0.0)
@@ -78,7 +78,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Shape:
-    """Ellipsoid centred on a marker, or box with a corner there; `size` holds its diameters or edge lengths (mm)."""
+    """Ellipsoid centred on a marker, or box with a corner there. `size` holds its diameters or edge lengths (mm)."""
 
     kind: str
     marker: str
@@ -97,7 +97,7 @@ class AdamsContact:
 
 @dataclass(frozen=True)
 class Force:
-    """In-plane force (N) and torque (N mm) on a marker, as expressions; the ground takes the reaction."""
+    """In-plane force (N) and torque (N mm) on a marker, as expressions. The ground takes the reaction."""
 
     i: str
     reaction: str
@@ -108,7 +108,7 @@ class Force:
 
 @dataclass(frozen=True)
 class Torque:
-    """Torque (N mm) on the part of marker `i`; its reaction acts on the part of marker `j`."""
+    """Torque (N mm) on the part of marker `i`. Its reaction acts on the part of marker `j`."""
 
     i: str
     j: str
@@ -117,7 +117,7 @@ class Torque:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Condition that ends a simulation: an expression reaches zero from below; `halts` stops the whole run."""
+    """Condition that ends a simulation: an expression reaches zero from below. `halts` stops the whole run."""
 
     function: str
     error: float
@@ -245,7 +245,7 @@ def marker_at(part: str, point_m: Position, across_m: float = 0.0) -> Marker:
 
 
 def add_bodies(model: AdamsModel, export: Exported) -> None:
-    """Add parts, markers, hinges, feet and couplers; a planar joint keeps the base in the plane of the walk."""
+    """Add parts, markers, hinges, feet and couplers. A planar joint keeps the base in the plane of the walk."""
     planar, names = export.model, export.names
     q, v = ([float(x) for x in part] for part in export.start)
     frames: list[MovingFrame] = []
@@ -327,8 +327,8 @@ class FootTerms:
     def height(self) -> str:
         return f"DY({self.place()})-{finite(self.radius)}" if self.radius else f"DY({self.place()})"
 
-    def where_carried(self, expression: str, elsewhere: str = "0") -> str:
-        """Restrict an expression to the pads of the foot's lane; over the gaps between them it is `elsewhere`."""
+    def restrict_to_pads(self, expression: str, elsewhere: str = "0") -> str:
+        """Restrict an expression to the pads of the foot's lane. Over the gaps between them it is `elsewhere`."""
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
@@ -350,7 +350,10 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
 
 
 def laws(export: Exported) -> tuple[NormalLaw, Coulomb | None]:
-    """Return normal-force law and Coulomb friction (None: no friction) in N, mm, s; ConfigError for other friction."""
+    """Return normal-force law and Coulomb friction (None: no friction) in N, mm, s.
+
+    Raises ConfigError for other friction.
+    """
     normal, friction = export.scene.ours.normal, export.scene.ours.friction
     in_mm = NormalLaw(
         normal.stiffness / MM**normal.exponent,
@@ -401,7 +404,7 @@ def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
         place, length = (foot.place(), foot.radius) if foot.radius else (foot.place(BELOW), FREE_LENGTH_MM)
         numbers = ",".join(finite(value) for value in (length, *normal))
         model.variables[f"{leg}_slip"] = foot.slip
-        model.variables[f"{leg}_normal"] = foot.where_carried(f"IMPACT(DY({place}),VY({foot.motion}),{numbers})")
+        model.variables[f"{leg}_normal"] = foot.restrict_to_pads(f"IMPACT(DY({place}),VY({foot.motion}),{numbers})")
         model.variables[f"{leg}_friction"] = "0" if friction is None else friction_function(leg, friction)
 
 
@@ -414,7 +417,7 @@ def friction_function(leg: str, law: Coulomb) -> str:
 
 
 def add_push_offs(model: AdamsModel, export: Exported) -> None:
-    """Add the push-off pulses on the trailing feet; they begin at the touchdown times of walkerlab's walk."""
+    """Add the push-off pulses on the trailing feet. They begin at the touchdown times of walkerlab's walk."""
     impulse, duration = export.config.push_off.impulse_N_s, export.config.push_off.duration_s
     if impulse == 0.0:
         return
@@ -454,7 +457,7 @@ def add_forces(model: AdamsModel, export: Exported) -> None:
 
 
 def add_hip(model: AdamsModel, export: Exported) -> None:
-    """Add the hip's spring, damper and torque; the torque changes sign at the touchdowns of walkerlab's walk."""
+    """Add the hip's spring, damper and torque. The torque changes sign at the touchdowns of walkerlab's walk."""
     hip, name = export.hip, export.names[export.hip_link]
     i, j = f"{name}.hinge", model.joints[f"hinge_of_{name}"].j
     terms = []
@@ -489,7 +492,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         model.torques[f"stop_{number + 1}"] = Torque(i, j, f"-IMPACT(1-{angle},-{rate},{stop})")
         model.motions[f"lock_{number + 1}"] = f"hinge_of_{shank}"
         place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
-        down = foot.where_carried(f"-({foot.height})", elsewhere="-1")
+        down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
         sinking = f"VY({foot.motion})"
         if f"{other}_pulses" in model.variables:
             # the trailing knee stays locked during the push-off
@@ -523,7 +526,7 @@ def step_events(export: Exported, swing: int) -> Iterator[Event]:
 
 
 def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
-    """Add requests named after the quantities of a walk; angles are from the vertical, lengths in mm."""
+    """Add requests named after the quantities of a walk. Angles are from the vertical, lengths in mm."""
     tilt = f"{-export.scene.ours.slope:+.17g}" if export.scene.ours.slope else ""
     uppers = export.names[export.hip_link], export.names[0]
     for foot, (leg, part) in enumerate(zip(LEGS, uppers, strict=True)):
@@ -540,7 +543,7 @@ def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
             "foot_height": terms.height,
             "normal_force": normal,
             "friction_force": friction,
-            "penetration": terms.where_carried(f"MAX(0,-({terms.height}))"),
+            "penetration": terms.restrict_to_pads(f"MAX(0,-({terms.height}))"),
             "slip_velocity": terms.slip,
         }
     hip = f"{{{export.names[0]}.hinge}}"

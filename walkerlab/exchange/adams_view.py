@@ -20,7 +20,7 @@ def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until
     pinned_until_s  time (s) at which to remove the pin at the first stance foot; None if there is no pin
     """
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
-    commands = ", ".join(map(quoted, model.commands(end_s, pinned_until_s)))
+    commands = ", ".join(map(quote, model.commands(end_s, pinned_until_s)))
     script = command("simulation script create", sim_script_name=f".{model.name}.walk", solver_commands=commands)
     lines += [line for each in (*building(model), script) for line in each]
     return "\n".join([*lines, ""])
@@ -32,7 +32,7 @@ def command(words: str, **arguments: str) -> list[str]:
     return [*(f"{line}  &" for line in lines[:-1]), lines[-1]]
 
 
-def quoted(text: str) -> str:
+def quote(text: str) -> str:
     return f'"{text}"'
 
 
@@ -43,14 +43,14 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
         return f"{root}.{name}"
 
     def function(text: str) -> str:
-        return quoted(REFERENCE.sub(lambda match: full(match[1]), text))
+        return quote(REFERENCE.sub(lambda match: full(match[1]), text))
 
     yield command("defaults units", length="mm", angle="rad", force="newton", mass="kg", time="sec")
     yield command("defaults units", coordinate_system_type="cartesian", orientation_type="body313")
     yield command("model create", model_name=model.name)
     yield from bodies(model, full)
     for name in model.variables:
-        yield command("data_element create variable", variable_name=full(name), function=quoted(""))
+        yield command("data_element create variable", variable_name=full(name), function=quote(""))
     for name, joint in model.joints.items():
         kind = "primitive_joint inline" if joint.kind == "INLINE" else f"joint {joint.kind.lower()}"
         named = {"jprim_name": full(name), "adams_id": "1"} if joint.kind == "INLINE" else {"joint_name": full(name)}
@@ -63,7 +63,7 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
         )  # fmt: skip
     yield from contacts(model, full)
     for name, force in model.forces.items():
-        empty = {f"{axis}_{kind}_function": quoted("") for kind in ("force", "torque") for axis in "xyz"}
+        empty = {f"{axis}_{kind}_function": quote("") for kind in ("force", "torque") for axis in "xyz"}
         yield command(
             "force create direct general_force", general_force_name=full(name), i_marker_name=full(force.i),
             j_floating_marker_name=full(force.reaction), ref_marker_name=full(ORIGIN), **empty,
@@ -72,18 +72,18 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
         yield command(
             "force create direct single_component_force", single_component_force_name=full(name),
             adams_id=str(model.numbers[name]), type_of_freedom="rotational", i_marker_name=full(torque.i),
-            j_marker_name=full(torque.j), action_only="off", function=quoted(""),
+            j_marker_name=full(torque.j), action_only="off", function=quote(""),
         )  # fmt: skip
     for name, held in model.motions.items():
         yield command(
             "constraint create motion_generator", motion_name=full(name), adams_id=str(model.numbers[name]),
-            type_of_freedom="rotational", joint_name=full(held), time_derivative="velocity", function=quoted("0"),
+            type_of_freedom="rotational", joint_name=full(held), time_derivative="velocity", function=quote("0"),
         )  # fmt: skip
     for name, sensor in model.sensors.items():
         ending = {"halt": "on", "return": "off"} if sensor.halts else {"halt": "off", "return": "on"}
         yield command(
             "executive_control create sensor", sensor_name=full(name), adams_id=str(model.numbers[name]), compare="ge",
-            value="0", error=finite(sensor.error), **ending, function=quoted(""),
+            value="0", error=finite(sensor.error), **ending, function=quote(""),
         )  # fmt: skip
     along, up = (finite(component) for component in model.gravity)
     gravity = {"x_component_gravity": along, "y_component_gravity": up, "z_component_gravity": "0"}
@@ -91,16 +91,16 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
     for name, components in model.requests.items():
         functions = {f"f{k}": function(text) for k, text in enumerate(components.values(), start=1)}
         yield command(
-            "output_control create request", request_name=full(f"request_{name}"), results_name=quoted(name),
-            component_names=", ".join(quoted(component) for component in components), **functions,
+            "output_control create request", request_name=full(f"request_{name}"), results_name=quote(name),
+            component_names=", ".join(quote(component) for component in components), **functions,
         )  # fmt: skip
     for name, text in model.variables.items():
         yield command("data_element modify variable", variable_name=full(name), function=function(text))
     for name, force in model.forces.items():
         yield command(
             "force modify direct general_force", general_force_name=full(name), x_force_function=function(force.x),
-            y_force_function=function(force.y), z_force_function=quoted("0"), x_torque_function=quoted("0"),
-            y_torque_function=quoted("0"), z_torque_function=function(force.torque),
+            y_force_function=function(force.y), z_force_function=quote("0"), x_torque_function=quote("0"),
+            y_torque_function=quote("0"), z_torque_function=function(force.torque),
         )  # fmt: skip
     for name, torque in model.torques.items():
         yield command(
@@ -112,19 +112,19 @@ def building(model: AdamsModel) -> Iterator[list[str]]:
 
 
 def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
-    """Yield commands for parts, markers, masses, velocities and shapes; angular velocities include their unit."""
+    """Yield commands for parts, markers, masses, velocities and shapes. Angular velocities include their unit."""
     for number, (name, part) in enumerate([(GROUND, None), *model.parts.items()], start=1):
         if part is not None:
             yield command(
                 "part create rigid_body name_and_position", part_name=full(name), adams_id=str(number),
-                location=values(*part.place, 0.0), orientation=turned(part.angle),
+                location=values(*part.place, 0.0), orientation=format_rotation(part.angle),
             )  # fmt: skip
         yield command("defaults coordinate_system", default_coordinate_system=full(name))
         for marker_name, marker in model.markers.items():
             if marker.part == name and marker.floating:
                 yield command("floating_marker create", floating_marker_name=full(marker_name))
             elif marker.part == name:
-                place = {"location": values(*marker.place), "orientation": turned(0.0)}
+                place = {"location": values(*marker.place), "orientation": format_rotation(0.0)}
                 yield command("marker create", marker_name=full(marker_name), **place)
         if part is not None:
             moments = dict.fromkeys(("ixx", "iyy", "izz"), finite(part.inertia))
@@ -150,7 +150,7 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
         yield command("geometry create curve outline", outline_name=own, marker_name=points)
 
 
-def turned(angle: float) -> str:
+def format_rotation(angle: float) -> str:
     """Write a rotation by `angle` (rad) about the normal of the plane, with its unit."""
     return f"({finite(angle)}(rad)), (0(rad)), (0(rad))"
 

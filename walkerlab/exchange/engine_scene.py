@@ -51,19 +51,21 @@ class EngineScene:
 
     @cached_property
     def knee_places(self) -> tuple[int, ...]:
-        """Index of each knee's angle among the engine's coordinates; -1 for a locked knee."""
+        """Index of each knee's angle among the engine's coordinates, or -1 for a locked knee."""
         ends = [(self.assembly.index(knee.shank), self.assembly.index(knee.thigh)) for knee in self.assembly.knees]
         bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
-    def with_knees_locked(self, doing: NDArray[np.int8]) -> EngineScene:
+    def lock_knees(self, doing: NDArray[np.int8]) -> EngineScene:
         """Scene in which the knees in state LOCKED are locked."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
 
     @cached_property
     def centre_levers(self) -> Floats:
-        """Vectors (bodies, 2) in body frames (m); rotated, they add up to the vector from base to centre of mass."""
+        """Vectors (bodies, 2) in body frames (m), which, when rotated, add up to the vector from base to
+        centre of mass.
+        """
         weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
         return np.asarray(sum(weighted) / total_mass(self.assembly))
 
@@ -89,14 +91,16 @@ class EngineScene:
         forward, upward = c * d[:, 0] - s * d[:, 1], s * d[:, 0] + c * d[:, 1]
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
-    def started(self, factor: float) -> EngineScene:
-        """Scene with the start's velocities multiplied by `factor`; the stance foot still does not slip."""
+    def scale_start(self, factor: float) -> EngineScene:
+        """Scene with the start's velocities multiplied by `factor`. The stance foot still does not slip."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
 def engine_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """Build a config's scene, no foot pinned and no knee locked; pad_pitch `own` becomes the rigid step length."""
+    """Build the scene of a config, with no foot pinned and no knee locked. `pad_pitch: own` becomes the rigid step
+    length.
+    """
     scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m)
     return scene_for_engines(replace(scene, pinned=False), rigid_state)
 
@@ -136,7 +140,7 @@ def creep_velocity(friction: FrictionLaw, load: float) -> float:
 
 
 def contact_target(scene: EngineScene) -> EngineContact | None:
-    """Linearise the walker's contact under its weight on one foot; None on frictionless ground."""
+    """Linearise the walker's contact under its weight on one foot, or None on frictionless ground."""
     walker = scene.ours
     law, friction = walker.normal, walker.friction
     if friction.largest == 0.0:

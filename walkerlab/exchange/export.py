@@ -79,7 +79,10 @@ def export_model(
 
 
 def law_named(text: str) -> Law:
-    """Return the ADAMS contact law of this name; raises ConfigError for an unknown name."""
+    """Return the ADAMS contact law of this name.
+
+    Raises ConfigError for an unknown name.
+    """
     for law in CONTACT_LAWS:
         if text == law:
             return law
@@ -87,7 +90,10 @@ def law_named(text: str) -> Law:
 
 
 def slope_named(text: str) -> Slope:
-    """Return the way of this name to express a slope; raises ConfigError for an unknown name."""
+    """Return the way of this name to express a slope.
+
+    Raises ConfigError for an unknown name.
+    """
     for slope in SLOPES:
         if text == slope:
             return slope

@@ -45,7 +45,7 @@ STEP_S, DAMPED_STEP, PAD_M = 2.5e-5, 0.33, 0.05
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
 """Settings that make couplings and locks as stiff as MuJoCo's constraints can be with time steps of STEP_S."""
-CLOSE = 'iterations="100" tolerance="1e-12"'
+TIGHT_SOLVER = 'iterations="100" tolerance="1e-12"'
 
 
 Slope = Literal["gravity", "geometry"]
@@ -139,14 +139,14 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
 
 
 def rates_at(point: Position, start: Position, rates: Floats) -> Floats:
-    """Return a link's rates at `point`, from its rates at `start`; both points in the upright link's frame."""
+    """Return the rates of a link at `point` from those at `start`. Both points are in the frame of the upright link."""
     return rates + np.outer((start[1] - point[1], point[0] - start[0], 0.0), rates[2])
 
 
 def option_text(model: PlanarModel, contact: Mapping[str, float] | None, more: str = "") -> str:
     """Write the element `option`: tilted gravity and, with contact, the friction cone."""
     cone = "" if contact is None else f'cone="elliptic" impratio="{contact["impratio"]!r}" '
-    return f'<option {more}gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {cone}{CLOSE}/>'
+    return f'<option {more}gravity="{model.gravity_along!r} 0 {-model.gravity_down!r}" {cone}{TIGHT_SOLVER}/>'
 
 
 def body_text(
@@ -189,7 +189,7 @@ def joint_texts(model: PlanarModel, link_number: int, hinge: Hinge | None) -> It
 
 
 def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, float]) -> str:
-    """Write a foot, tuned for ground that is added to the file; `pair_text` tunes the contacts with its own ground."""
+    """Write a foot, tuned for ground that is added to the file. `pair_text` tunes the contacts with its own ground."""
     (x, z), mu = ball.centre_m, contact["friction"]
     return (
         f'<geom name="{foot.name}" type="sphere" size="{ball.radius_m!r}" pos="{x!r} {foot.across_m!r} {z!r}" '
@@ -242,7 +242,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
     scene = "".join(
         (
             *(pad_text(export, number, pad) for number, pad in enumerate(export.pads)),
-            body_text(model, 0, contact, feet, named_hinges(export)),
+            body_text(model, 0, contact, feet, hinge_names(export)),
         )
     )
     if slope == "geometry":
@@ -283,7 +283,7 @@ def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
     return min(STEP_S, float(f"{DAMPED_STEP / max(rates):.0e}"))
 
 
-def named_hinges(export: Exported) -> dict[int, Hinge]:
+def hinge_names(export: Exported) -> dict[int, Hinge]:
     """Name the hip and the knees, with the hip's spring and damper and the stops of compliant knees."""
     hip, weights, stop = export.hip, inverse_weights(export.model).joints, export.scene.ours.stop
     acts = f'stiffness="{hip.spring_N_m_per_rad!r}" damping="{hip.damping_N_m_s_per_rad!r}"'
@@ -308,7 +308,7 @@ def limbs(export: Exported, foot: int) -> dict[int, Position]:
 
 
 def limb_text(hinge: Position, end: Position, foot: Foot, ball: Ball) -> str:
-    """Draw a part of a leg as a capsule from its hinge to its lower end; it collides with nothing.
+    """Draw a part of a leg as a capsule from its hinge to its lower end. It collides with nothing.
 
     Above the foot it ends early, so that it does not reach below the ball in programs that let it collide.
     """
@@ -343,7 +343,7 @@ def custom_texts(export: Exported) -> Iterator[str]:
 
 
 def lock_texts(export: Exported) -> Iterator[str]:
-    """Yield the locks of the knees; at the start only that of the stance leg is active."""
+    """Yield the locks of the knees. At the start, only that of the stance leg is active."""
     for leg in range(len(export.knee_links)):
         active = "true" if leg == STANCE_FOOT else "false"
         knee = f'joint1="knee_{leg + 1}" polycoef="0 0 0 0 0"'
@@ -351,7 +351,10 @@ def lock_texts(export: Exported) -> Iterator[str]:
 
 
 def coupling_texts(export: Exported) -> Iterator[str]:
-    """Yield the constraints of coupled hinges; raises ConfigError for a coupling of more than two hinges."""
+    """Yield the constraints of coupled hinges.
+
+    Raises ConfigError for a coupling of more than two hinges.
+    """
     for coupling in export.couplings:
         if len(coupling) > 2:
             raise ConfigError(

@@ -59,7 +59,7 @@ class Walk:
             self.model.jnt_limited[self.knees[leg]] = 0
 
     def control(self, _model: Any, data: Any) -> None:
-        """Apply push-off and hip torque; once in a time step, look for a touchdown and turn the knees."""
+        """Apply push-off and hip torque. Once in a time step, look for a touchdown and turn the knees."""
         if data is not self.data:
             return
         if data.time < self.time_s:
@@ -100,7 +100,7 @@ class Walk:
             self.push(self.feet[swing], share)
 
     def push(self, foot: int, share: float) -> None:
-        """Push a foot towards the hip; `share` is the elapsed fraction of the pulse."""
+        """Push a foot towards the hip. `share` is the elapsed fraction of the pulse."""
         point = self.data.geom_xpos[foot] - self.model.geom_size[foot, 0] * self.up
         line = self.data.xanchor[self.hip.id] - point
         line[1] = 0.0
@@ -109,7 +109,7 @@ class Walk:
         mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, body, self.data.qfrc_applied)
 
     def turn_knees(self) -> None:
-        """Release the trailing knee when nothing holds it any longer; lock a knee that comes straight from behind."""
+        """Release the trailing knee when nothing holds it any longer. Lock a knee that comes straight from behind."""
         model, data, trailing = self.model, self.data, 1 - self.stance
         if self.pushes:
             motion = np.zeros(6)

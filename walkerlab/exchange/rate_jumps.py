@@ -29,7 +29,7 @@ MOST_FOUND: Final = 4
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
-    """Return likely values (rad) of the leg angles' sum at heel strikes, where leg rates jump; clearest jumps first.
+    """Return likely values (rad) of the leg angles' sum at heel strikes, where leg rates jump. Clearest jumps first.
 
     time   (samples,) s
     angle  (samples, 2) rad, from the vertical
@@ -81,12 +81,12 @@ def noise_of(angle: Array) -> float:
 
 
 def typical_interval(instants: Sequence[float], time: Array) -> float:
-    """Return the median interval (s) between instants of a recording; its duration if there are fewer than two."""
+    """Return the median interval (s) between instants of a recording. Its duration if there are fewer than two."""
     return float(np.median(np.diff(instants))) if len(instants) > 1 else float(time[-1] - time[0])
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:
-    """Fit a rate jump at an instant; return the squared scatter it explains and leaves, and the degrees of freedom.
+    """Fit a rate jump at an instant, and return the squared scatter it explains and leaves, and the degrees of freedom.
 
     Returns None if there are too few samples before or after the instant.
     """

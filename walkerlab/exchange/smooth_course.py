@@ -118,7 +118,7 @@ class Strike:
         return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
 
     def best_with_strike(self) -> tuple[Stretch, float]:
-        """Return the stretch that, with the strike where it then is, leaves least; and how much it leaves (rad^2)."""
+        """Return the stretch that, with the strike where it then is, leaves least. And how much it leaves (rad^2)."""
 
         def left(at: float) -> float:
             return float(np.sum(self.fit(at)[1] ** 2)) - self.best_stretch(at).explained
@@ -223,7 +223,7 @@ def stretches_near(course: Course, place: int, limit: float, smallest: float) ->
     """Return the stretches in the steps around a strike that explain more than a limit (rad^2)."""
 
     def worst(others: Sequence[Stretch]) -> Stretch | None:
-        """Return the worst stretch besides others; None if it is within the limit."""
+        """Return the worst stretch besides others, or None if it is within the limit."""
         strike = course.without(others).strike(place)
         smooth = strike.smooth_instant
         if strike.best_stretch(smooth).explained <= SUSPECT * limit:

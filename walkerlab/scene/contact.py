@@ -86,9 +86,11 @@ def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
 def scene_on_pads(
     config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
 ) -> ContactScene:
-    """Build the scene of a config with its pads; raises NoAnswer if their pitch needs a contact gait and none is found.
+    """Build the scene of a config with its pads.
 
     answer  result of the search for the contact gait; None to search if necessary
+
+    Raises NoAnswer if their pitch needs a contact gait and none is found.
     """
     own = None
     if wants_own_pitch(require_contact(config)):
@@ -149,7 +151,7 @@ def wants_own_pitch(contact: Contact) -> bool:
 
 
 def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float | None) -> float:
-    """Return the pad pitch (m); terrain without pads uses the rigid step length as reference length."""
+    """Return the pad pitch (m). Terrain without pads uses the rigid step length as reference length."""
     if contact.terrain != "checkerboard" or contact.pad_pitch == "rigid":
         return rigid_step_length_m
     if contact.pad_pitch == "own":
@@ -165,7 +167,7 @@ def normal_law(contact: Contact) -> NormalLaw:
 
 
 def friction_law(contact: Contact) -> FrictionLaw:
-    """Return the friction law in SI; frictionless contact is a law of its own, not a zero coefficient.
+    """Return the friction law in SI. Frictionless contact is a law of its own, not a zero coefficient.
 
     Raises ConfigError if a law that an extension added is incomplete.
     """
@@ -179,7 +181,8 @@ def friction_law(contact: Contact) -> FrictionLaw:
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
-    """Convert a rigid start to the contact model's state; the stance foot just touches ground at along = 0, and rolls.
+    """Convert a rigid start to the contact model's state. The stance foot just touches the ground at along = 0 and
+    rolls.
 
     rigid_state  state of the rigid model with both feet on the slope; for a compass (theta_1 swing, theta_2 stance,
                  dtheta_1, dtheta_2)

@@ -57,7 +57,7 @@ def iterate_values(value: Any) -> Iterator[Any]:
 
 
 def model_reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a parameter affects a model; True if the config allows no neighbouring value to test with."""
+    """Whether a parameter affects a model. It is True if the config allows no neighbouring value to test with."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
     neighbours = (value + sign * RELATIVE_CHANGE * (abs(value) or 1.0) for sign in (1.0, -1.0))

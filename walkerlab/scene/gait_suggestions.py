@@ -35,20 +35,20 @@ FOOT_SHARES = (0.02, 0.03, 0.04, 0.05)  # distances of the feet ahead of the sha
 
 @dataclass(frozen=True)
 class SlopeRange:
-    """Range of slopes (rad) with gaits, and the part of it with stable gaits; None if no gait is stable."""
+    """Range of slopes (rad) with gaits, and the part of it with stable gaits, or None if no gait is stable."""
 
     slopes: tuple[float, float]
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
-        """Return a slope just inside the range, at the end nearer to `target`; prefers the range of stable gaits."""
+        """Return a slope just inside the range, at the end nearer to `target`, preferring the range of stable gaits."""
         low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
         return near + INSET * (far - near)
 
 
 def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
-    """Return the nearest range of slopes with gaits, preferring stable gaits; None if no gait is found."""
+    """Return the nearest range of slopes with gaits, preferring stable gaits, or None if no gait is found."""
     own = config.slope_rad
     span = ValueSpan(0.02 * own, min(MAX_FOLLOWED_TO, max(3.0 * own, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
@@ -115,7 +115,9 @@ def rigid_alone(scene: RigidConfig) -> Config:
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
-    """Return the distance (m) of feet ahead of the shanks with the most stable gait, and the gait; None if no gait."""
+    """Return the distance (m) of feet ahead of the shanks with the most stable gait, and the gait, or None
+    if no gait.
+    """
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).over(config, rigid_walker)(ahead_m)

@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.config.fields import value_at
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
-from walkerlab.labels import unit_by_name, with_unit
+from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
@@ -122,7 +122,7 @@ def identify_walk(
     note: Callable[[str], None] = lambda _: None,
     begin: Begin = lambda _label, _rounds: lambda: None,
 ) -> Identification:
-    """Fit parameters to a measured walk with each model; return the likeliest result, preferring models that fit.
+    """Fit parameters to a measured walk with each model, and return the likeliest result, preferring models that fit.
 
     gait   summary of `fixedpoint` for the config
     note   receives messages
@@ -154,7 +154,7 @@ def identify_with(
     note: Callable[[str], None],
     begin: Begin,
 ) -> Identification | str:
-    """Fit one model; return the reason as text if no walk of the model can be fitted."""
+    """Fit one model, or return the reason as text if no walk of the model can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
@@ -167,14 +167,16 @@ def identify_with(
     if not walked:
         return str(fits[0])
     best = max(walked, key=lambda result: (not result.why, result.evaluation.likelihood))
-    timed = in_time(best, begin)
+    timed = refit_in_time(best, begin)
     if timed is None:
         return describe(subject, question, best, best)
     return describe(subject, question, evaluate_at(timed.u[: best.u.size], best) or best, timed)
 
 
-def in_time(first: Fitted, begin: Begin) -> Fitted | None:
-    """Refit angles at their sample times, from the fit at equal phase; None for measured steps or a failed fit."""
+def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
+    """Refit angles at their sample times, from the fit at equal phase, or return None for measured steps or a failed
+    fit.
+    """
     forecast, u = first.forecast, first.u
     if not forecast.measured.sampled:
         return None
@@ -317,7 +319,7 @@ def better_with(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Ite
         if gain * left > DECISIVE_GAIN:
             start = NUISANCES.get(other.name, (other.value, 0.0))[0]
             option = "--nuisance" if other.name in NUISANCES else "--fit"
-            value = with_unit(f"{start + free.move[-1] * other.scale:.4g}", other.unit)
+            value = add_unit(f"{start + free.move[-1] * other.scale:.4g}", other.unit)
             yield (
                 f"{other.name} of {value} instead of {start:.4g} would raise the log-likelihood by about {gain:.3g}: "
                 f"estimate it, too ({option} {other.name})"
@@ -398,7 +400,7 @@ def measurement_noise(fitted: Fitted) -> dict[str, float]:
 
 
 def process_noise(fitted: Fitted) -> dict[str, Any]:
-    """Return the floor's roughness and the kicks, with standard errors; kicks are None where they are not estimated."""
+    """Return the floor's roughness and the kicks, with standard errors. Kicks are None if they are not estimated."""
     noise, kicks = fitted.noise, fitted.data.kicks
     reason = "" if kicks else "only lengths or angles tell kicks from a rough floor, and only with the rigid model"
     return {
@@ -413,7 +415,9 @@ def process_noise(fitted: Fitted) -> dict[str, Any]:
 
 
 def error_of_noise(fitted: Fitted, name: str) -> float | None:
-    """Return the standard error of a disturbance from the curvature of the restricted likelihood; None at zero."""
+    """Return the standard error of a disturbance from the curvature of the restricted likelihood, or None if the
+    disturbance is zero.
+    """
     h, value = 1e-2, getattr(fitted.noise, name)
     if value == 0.0:
         return None

@@ -89,7 +89,10 @@ Errors = tuple[dict[str, float | None], tuple[Unidentifiable, ...]]
 
 
 def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) -> tuple[MeasuredWalk, MeasuredWalk]:
-    """Predict the measurements of a walk from the subject's state z; raises NoAnswer if the walk ends early."""
+    """Predict the measurements of a walk from the subject's state z.
+
+    Raises NoAnswer if the walk ends early.
+    """
     family = ConfigFamily(subject.config, question.keys)
     walks, level = step_map_of(subject, family), np.zeros(plan.max_steps + 2)
     walk = walks.disturbed(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
@@ -116,7 +119,10 @@ class PlannedWalk:
 
 
 def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> PlannedWalk:
-    """Return the planned walk with its derivatives; raises NoAnswer if a slightly changed walk ends early."""
+    """Return the planned walk with its derivatives.
+
+    Raises NoAnswer if a slightly changed walk ends early.
+    """
     problem = problem_of(subject, measured, question)
     if measured.sampled:
         nuisances = tuple(dict.fromkeys((*question.nuisance, DELAY)))
@@ -149,7 +155,7 @@ def expected_errors(
 
 
 def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], most: int) -> int | None:
-    """Return the smallest number of steps that reduces a key's error to `wanted`; None if it is more than `most`."""
+    """Return the smallest number of steps that reduces a key's error to `wanted`, or None if it is more than `most`."""
 
     def suffices(count: int) -> bool:
         error = errors_after(count)[0].get(key)

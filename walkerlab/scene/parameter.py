@@ -33,7 +33,7 @@ class Parameter:
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
-        """Return the config at another value, with dependent defaults recomputed; None if the schema rejects it."""
+        """Return the config at another value, with dependent defaults recomputed, or None if the schema rejects it."""
         return config_with(config, (self,), (value,))
 
     def refusal(self, config: ContactConfig, value: float, key: Key) -> ConfigError:
@@ -65,7 +65,7 @@ class Parameter:
 
 
 def config_with(config: ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config | None:
-    """Return the config at values of several parameters (parameters,); None if the schema rejects them."""
+    """Return the config at values of several parameters (parameters,), or None if the schema rejects them."""
     try:
         return _changed(config, parameters, values)
     except ValidationError:
@@ -93,12 +93,15 @@ def _keys_set(value: Any) -> Any:
 
 
 def dotted(key: Key) -> str:
-    """Join a key's path with dots, for messages; indices of list items are left out."""
+    """Join the path of a key with dots, for messages. Indices of list items are left out."""
     return ".".join(part for part in key if isinstance(part, str))
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """Return the parameter for a config key; raises ConfigError if the key is not a number that a model uses."""
+    """Return the parameter for a config key.
+
+    Raises ConfigError if the key is not a number that a model uses.
+    """
     # `asker` is the config key that names this parameter, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
@@ -114,14 +117,14 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 
 def parameter_keys(config: ContactConfig) -> Iterator[str]:
-    """Yield the dotted keys of a config's parameters; the slope's as the config writes it."""
+    """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
     written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
     yield from (written.get(key, key) for key in own if not why_no_parameter(key, config, own))
 
 
 def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
-    """Explain why a key is not a parameter of the config's models; empty if it is one."""
+    """Explain why a key is not a parameter of the config's models, or return '' if it is one."""
     # `own` has the keys that exist for this config's type of walker
     if key not in own:
         if any(name.startswith(f"{key}.") for name in own):

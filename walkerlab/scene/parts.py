@@ -13,7 +13,10 @@ AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 
 
 def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
-    """Return the parts of a walker; in the rigid model a compass has point feet. ConfigError for inconsistent parts."""
+    """Return the parts of a walker. In the rigid model a compass has point feet.
+
+    Raises ConfigError for inconsistent parts.
+    """
     if isinstance(walker, CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
         parts = straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))

@@ -17,7 +17,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.parts import PARTS_DOCS, assembly_of, drive_parameters, knee_locked_at_strike
-from walkerlab.scene.studies import with_equations
+from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import RigidConfig
@@ -44,7 +44,7 @@ class RigidScene:
         advance: Callable[[int], None] | None = None,
         step_length: float | None = None,
     ) -> RigidWalkResult:
-        """Simulate up to `steps` steps from a state (2 n); `sampled` records the requested outputs. See `take_walk`."""
+        """Simulate up to `steps` steps from a state (2 n). `sampled` records the requested outputs, see `take_walk`."""
         heights, sampled = foothold_heights(self.ground, steps), sampled and bool(self.outputs)
         return take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
@@ -60,14 +60,17 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 
 
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
-    """Return the rigid walker of a config; `equations` overrides the config's set of equations."""
+    """Return the rigid walker of a config. `equations` overrides the config's set of equations."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
-    return with_equations(passive.changed(**drive_parameters(config)), equations or config.equations)
+    return replace_equations(passive.changed(**drive_parameters(config)), equations or config.equations)
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)
 def level_walker(walker: Walker, gravity: float) -> RigidModel:
-    """Return a walker on level ground (gravity in m/s^2); raises ConfigError if the parts are not a valid walker."""
+    """Return a walker on level ground (gravity in m/s^2).
+
+    Raises ConfigError if the parts are not a valid walker.
+    """
     try:
         return on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
     except ValueError as error:

@@ -18,7 +18,9 @@ LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and mu
 def starts_of(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Build a scene's starts from a rigid start with scaled velocities; walks must settle on the gait if known."""
+    """Build a scene's starts from a rigid start with scaled velocities. Walks must settle on the gait if it
+    is known.
+    """
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
     def start(swing: float, stance: float) -> State:
@@ -28,7 +30,7 @@ def starts_of(
     return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
 
 
-def for_a_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
+def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:
     """Return the same starts with the solver settings of a map.
 
     evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them

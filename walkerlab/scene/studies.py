@@ -24,7 +24,7 @@ def is_studied(config: Any) -> bool:
     return study_of(config) is not None
 
 
-def with_equations(model: RigidModel, equations: Equations) -> RigidModel:
+def replace_equations(model: RigidModel, equations: Equations) -> RigidModel:
     moved: RigidModel = model if equations == LAGRANGE_EQUATIONS else load(declared("equations")[equations])(model)
     return moved
 

@@ -69,10 +69,12 @@ def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
 def find_model_gait(
     model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]
 ) -> ModelUnderTest:
-    """Return a model with its gait (the contact model's is on ground without pads); NoAnswer if it has no gait.
+    """Return a model with its gait, which for the contact model is on ground without pads.
 
     gait  summary of `fixedpoint`
     note  receives a message about each difference from the config's scene
+
+    Raises NoAnswer if it has no gait.
     """
     length = float(gait["step_length_m"])
     if model == RIGID:

@@ -66,10 +66,10 @@ def ground_causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads
         steps = "" if pads.step_m is None else f"; their last steps were {format_range(pads.step_m)} long"
         sentences.append(f"The pads' pitch is {format_range(pads.pitch_m)}{PITCH_SOURCES.get(pads.laid, '')}{steps}.")
     own = "" if config.contact.pad_pitch == "own" else " or contact.pad_pitch=own"
-    return [*sentences, f"Try {without_pads(config)}{own}."]
+    return [*sentences, f"Try {ground_without_pads(config)}{own}."]
 
 
-def without_pads(config: ContactConfig) -> str:
+def ground_without_pads(config: ContactConfig) -> str:
     """Return a setting for ground without pads: a plane for kneed walkers, whose feet clear it, or after-mid-swing."""
     return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
 

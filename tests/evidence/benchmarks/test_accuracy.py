@@ -93,8 +93,8 @@ def test_no_method_is_compared_with_its_own_result(rows, reference):
     assert all(row.against != row.method for row in rows)
     near = Reference(End("dop853", np.zeros(4)), End("radau5", np.full(4, 1e-12)))
     assert near.agreement == 1e-12
-    assert near.for_method("dop853").method == "radau5"
-    assert {near.for_method(method).method for method in ("radau5", "scipy-radau")} == {"dop853"}
+    assert near.reference_for("dop853").method == "radau5"
+    assert {near.reference_for(method).method for method in ("radau5", "scipy-radau")} == {"dop853"}
 
 
 def test_error_below_the_uncertainty_of_the_reference_is_marked():
@@ -155,7 +155,7 @@ def test_interrupted_measurement_resumes_with_its_finished_runs(tmp_path):
     finished = Checkpoint(path, "key").kept
     assert 1 <= len(finished) < len(ladder.OWN_LADDER)
     resumed = ascend(TRIAL, "dop853", Checkpoint(path, "key"))
-    assert [run.packed() for run in resumed.runs[: len(finished)]] == list(finished.values())
+    assert [run.pack() for run in resumed.runs[: len(finished)]] == list(finished.values())
     fresh = ascend(TRIAL, "dop853", Checkpoint(None, ""))
     for run, same in zip(resumed.runs, fresh.runs, strict=True):
         assert (run.tolerance, run.result.outcome) == (same.tolerance, same.result.outcome)
@@ -166,7 +166,7 @@ def test_interrupted_measurement_resumes_with_its_finished_runs(tmp_path):
 def test_interrupted_measurement_keeps_its_references(tmp_path):
     path = tmp_path / "accuracy.parts"
     end = accuracy.resumed_end(TRIAL, "first end", first_end, Checkpoint(path, "key"))
-    assert accuracy.resumed_end(TRIAL, "first end", None, Checkpoint(path, "key")).packed() == end.packed()
+    assert accuracy.resumed_end(TRIAL, "first end", None, Checkpoint(path, "key")).pack() == end.pack()
 
 
 class SlowAtFirst:

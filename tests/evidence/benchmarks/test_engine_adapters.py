@@ -9,7 +9,7 @@ from engine_scenes import compass, kneed
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, simulate, swing_truth
-from walkerlab.evidence.benchmarks.engines.mujoco import model_xml, tuned
+from walkerlab.evidence.benchmarks.engines.mujoco import model_xml, tune
 from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask, TuningTask, WalkTask, pinned_model
 from walkerlab.exchange.engine_scene import contact_target
@@ -80,8 +80,8 @@ def test_block_creeps_and_slides_according_to_the_law(engine):
 @pytest.mark.parametrize("locked", [(BENT, BENT), (BENT, LOCKED), (LOCKED, LOCKED)])
 def test_mujoco_gives_both_feet_of_a_kneed_walker_the_same_spring(locked):
     mujoco = pytest.importorskip("mujoco")
-    scene = kneed().with_knees_locked(np.array(locked, np.int8))
-    own = tuned("soft", contact_target(scene))
+    scene = kneed().lock_knees(np.array(locked, np.int8))
+    own = tune("soft", contact_target(scene))
     model = mujoco.MjModel.from_xml_string(model_xml(scene.model, own))
     assert inverse_weights(scene.model).bodies == pytest.approx(model.body_invweight0[1:, 0], rel=1e-9)
     feet = [model.geom(f"foot {foot}").id for foot in (0, 1)]
@@ -137,10 +137,12 @@ def test_same_contact_law_gives_the_same_walk_in_an_engine(engine, drives):
 def test_runs_are_reproducible(engine):
     scene = compass()
     contact, integrator = next(iter(engine.adapter().CONTACTS.items()))
-    own = engine.adapter().tuned(contact, contact_target(scene))
+    own = engine.adapter().tune(contact, contact_target(scene))
     ends = []
     for _ in range(2):
-        task = WalkTask(engine.name, Stepping(integrator, 2e-4), scene.started(START_FACTORS[-1]), 1, 10.0, own, 6_000)
+        task = WalkTask(
+            engine.name, Stepping(integrator, 2e-4), scene.scale_start(START_FACTORS[-1]), 1, 10.0, own, 6_000
+        )
         ends.append(task.run())
     assert ends[0].touches_s.tolist() == ends[1].touches_s.tolist()
     assert ends[0].steps == ends[1].steps

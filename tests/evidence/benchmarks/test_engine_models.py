@@ -76,7 +76,7 @@ def test_feet_ahead_of_the_shanks_keep_their_offset_in_an_engine():
 
 @pytest.mark.parametrize("doing", [(BENT, BENT), (LOCKED, BENT), (LOCKED, LOCKED)])
 def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
-    scene = kneed().with_knees_locked(np.array(doing, np.int8))
+    scene = kneed().lock_knees(np.array(doing, np.int8))
     y = np.array(scene.start)
     for knee in scene.locked:
         shank, thigh = (scene.assembly.index(body) for body in (knee.shank, knee.thigh))

@@ -169,7 +169,7 @@ def test_complete_tables_are_stored():
 
 def test_start_with_scaled_velocities_has_the_same_angles():
     scene = supported_scene(load().config, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
-    slower = scene.started(0.95)
+    slower = scene.scale_start(0.95)
     assert slower.start[:4] == scene.start[:4]
     assert slower.start[4:] == pytest.approx([0.95 * x for x in scene.start[4:]])
 

@@ -9,7 +9,7 @@ from walkerlab.evidence.benchmarks.engines.rows import EngineRow
 from walkerlab.evidence.benchmarks.engines.section import section
 from walkerlab.evidence.benchmarks.figures import COLOURS, FIGURES, engine_series
 from walkerlab.labels import labels_of
-from walkerlab.views.figures.canvas import as_file, styled
+from walkerlab.views.figures.canvas import as_file, figure_style
 from walkerlab.views.report.blocks import Statements
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.tables import Table
@@ -35,7 +35,7 @@ def lines_of(axes):
 
 
 def test_every_finite_error_is_plotted_over_run_time(results):
-    with styled():
+    with figure_style():
         left, right = ERRORS.draw(results)[0].axes
     for axes, experiment in ((left, "same-law"), (right, "own-law")):
         drawn = sorted((x, y) for line in lines_of(axes) for x, y in zip(*line.get_data(), strict=True))
@@ -44,7 +44,7 @@ def test_every_finite_error_is_plotted_over_run_time(results):
 
 
 def test_period_axis_includes_the_adams_law_and_the_rigid_gait(results):
-    with styled():
+    with figure_style():
         (axes,) = PERIODS.draw(results)[0].axes
     levels = [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "None"]
     assert levels == pytest.approx([PERIOD, 0.7036])
@@ -60,7 +60,7 @@ def test_engines_differ_in_colour_and_their_integrators_in_marker(results):
 
 
 def test_each_panel_has_its_own_legend(results):
-    with styled():
+    with figure_style():
         drawn = ERRORS.draw(results)[0]
     for axes, legend in zip(drawn.axes, drawn.legends, strict=True):
         assert legend.get_title().get_text() == axes.get_title(loc="left")
@@ -71,7 +71,7 @@ def test_each_panel_has_its_own_legend(results):
 
 def test_panel_without_a_finished_walk_says_so():
     unfinished = {"engines": content([row for row in ROWS if row.experiment == "same-law" or row.engine == "exudyn"])}
-    with styled():
+    with figure_style():
         for figure, place in ((ERRORS, 1), (PERIODS, 0)):
             drawn = figure.draw(unfinished)[0]
             assert [text.get_text() for text in drawn.axes[place].texts] == ["no run reached the end"]

@@ -16,7 +16,7 @@ from walkerlab.evidence.paper.measured import (
     EnergyRecord,
     Measured,
     characteristics,
-    over_last_steps,
+    mean_over_last_steps,
 )
 from walkerlab.evidence.paper.printed import (
     CYCLES_WALKED,
@@ -109,10 +109,10 @@ def test_table_3_of_a_single_step_has_no_cycle():
 def test_energy_is_time_averaged_over_the_last_five_steps():
     time = [0.0, 1.0, 1.5, 2.0, 5.0, 7.0]
     energy = [9.0, 9.0, 2.0, 2.0, 2.0, 9.0]
-    record = over_last_steps(*map(np.array, (time, energy, [1.0, 1.5, 2.0, 3.0, 4.0, 5.0])))
+    record = mean_over_last_steps(*map(np.array, (time, energy, [1.0, 1.5, 2.0, 3.0, 4.0, 5.0])))
     assert record.mean == pytest.approx((0.5 * (9 + 2) * 0.5 + 3.5 * 2) / 4.0)
     assert (record.least, record.most) == (2.0, 9.0)
-    assert over_last_steps(*map(np.array, (time, energy, []))) is None
+    assert mean_over_last_steps(*map(np.array, (time, energy, []))) is None
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ from walkerlab.evidence.verification.catalogue import config_of, package_cases
 from walkerlab.evidence.verification.momentum import (
     MAX_UNKNOWN,
     MEASURE,
+    add_midpoints,
     impulse,
     momentum_balance,
     momentum_finding,
     split,
     unsettled,
-    with_middles,
 )
 from walkerlab.evidence.verification.starts import prepare_start
 from walkerlab.evidence.verification.verdict import NotMeasured
@@ -81,7 +81,7 @@ def test_momentum_error_of_very_fast_feet_is_relative_to_their_momentum():
 
 
 def test_simpson_sums_report_their_uncertainty():
-    times = with_middles(np.array([0.0, 1.0, 1.5, 4.0]))
+    times = add_midpoints(np.array([0.0, 1.0, 1.5, 4.0]))
     cubic = (times**3)[:, None]
     np.testing.assert_allclose(impulse(times, cubic)[:, 0], np.array([0.0, 1.0, 1.5, 4.0]) ** 4 / 4.0)
     kink = np.maximum(0.0, times - 1.25)[:, None]
@@ -90,5 +90,5 @@ def test_simpson_sums_report_their_uncertainty():
 
 
 def test_uncertain_intervals_are_split_into_four():
-    times = with_middles(np.array([0.0, 1.0, 2.0]))
+    times = add_midpoints(np.array([0.0, 1.0, 2.0]))
     assert split(times, np.array([False, True])).tolist() == [0.0, 1.0, 1.25, 1.5, 1.75, 2.0]

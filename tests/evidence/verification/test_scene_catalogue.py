@@ -12,7 +12,7 @@ from walkerlab.evidence.verification.catalogue import PHYSICAL_ENDS, STOPPED_END
 from walkerlab.evidence.verification.judge import CaseCell
 from walkerlab.evidence.verification.masses import RigidMasses, energy_won, feet_off_the_slope
 from walkerlab.evidence.verification.scaling import scaled, to_twin
-from walkerlab.evidence.verification.stability import with_numbers
+from walkerlab.evidence.verification.stability import resolve_scene
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, STANCE, kinetic_energy
 from walkerlab.physics.orbits.similarity import Units
@@ -35,7 +35,7 @@ def config_of(name, *sets):
 
 def cases_of(config, gait=GAIT):
     return {
-        case.name: (case, own) for case, own in scene_cases(with_numbers(config, {"fixedpoint": Content({}, gait)}))
+        case.name: (case, own) for case, own in scene_cases(resolve_scene(config, {"fixedpoint": Content({}, gait)}))
     }
 
 

@@ -7,7 +7,7 @@ import pytest
 from walkerlab.config.stability import Case
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
 from walkerlab.evidence.verification.judge import LIBRARY_BUDGET, judge, other_methods, second_walk
-from walkerlab.evidence.verification.verdict import promised
+from walkerlab.evidence.verification.verdict import allowed_difference
 from walkerlab.outcome import Outcome
 
 CASES = {case.name: case for case in package_cases()}
@@ -65,4 +65,4 @@ def test_case_without_an_answer_is_not_compared_with_a_reason():
 @pytest.mark.parametrize(("rtol", "limit"), [(1e-10, 1e-7), (1e-3, 1e-4)])
 def test_allowed_difference_follows_the_tolerance(rtol, limit):
     case = Case(name="x", expected=("walked",), reason="to be compared")
-    assert promised(case, rtol, 100) == pytest.approx(limit)
+    assert allowed_difference(case, rtol, 100) == pytest.approx(limit)

@@ -4,7 +4,7 @@ import numpy as np
 
 from walkerlab.physics.hybrid.recorded_walk import Samples
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.stages.walk import FIRST_STEPS, LAST_STEPS, MAX_BETWEEN, thinned
+from walkerlab.pipeline.stages.walk import FIRST_STEPS, LAST_STEPS, MAX_BETWEEN, thin_samples
 
 
 def walk(steps, per_step=50):
@@ -18,12 +18,12 @@ def walk(steps, per_step=50):
 
 def test_short_walk_is_stored_completely():
     samples, ends = walk(FIRST_STEPS + LAST_STEPS)
-    assert thinned(samples, ends, Silent()) is samples
+    assert thin_samples(samples, ends, Silent()) is samples
 
 
 def test_thinned_walk_keeps_both_sides_of_every_heel_strike():
     samples, ends = walk(20_000)
-    kept = thinned(samples, ends, Silent())
+    kept = thin_samples(samples, ends, Silent())
     assert np.isin(ends[:-1], kept.time_s).all()
     assert np.isin(np.nextafter(ends, 0.0), kept.time_s).all()
     assert kept.state[:, 0].tolist() == np.sin(kept.time_s).tolist()
@@ -31,7 +31,7 @@ def test_thinned_walk_keeps_both_sides_of_every_heel_strike():
 
 def test_thinned_walk_has_complete_ends_and_a_bounded_middle():
     samples, ends = walk(20_000)
-    kept = thinned(samples, ends, Silent())
+    kept = thin_samples(samples, ends, Silent())
     first, last = samples.time_s < FIRST_STEPS, samples.time_s >= ends.size - LAST_STEPS
     assert np.isin(samples.time_s[first | last], kept.time_s).all()
     assert kept.time_s.size <= MAX_BETWEEN + 2 * ends.size + (first | last).sum()
@@ -43,5 +43,5 @@ def test_thinning_is_reported():
     progress = Silent()
     progress.note = told.append
     samples, ends = walk(1000)
-    thinned(samples, ends, progress)
+    thin_samples(samples, ends, progress)
     assert told[0].startswith("1000 steps: of ")

@@ -64,4 +64,4 @@ def test_leftovers_are_searched_only_in_run_folders(tmp_path):
     unfinished = tmp_path / "figures" / ".figure-02.svg.12345678.tmp"
     unfinished.parent.mkdir()
     unfinished.touch()
-    assert files_of(RunFolder.at(tmp_path), ()) == [unfinished]
+    assert files_of(RunFolder.open_folder(tmp_path), ()) == [unfinished]

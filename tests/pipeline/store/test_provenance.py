@@ -25,7 +25,7 @@ def test_stored_config_loads_unchanged(name, tmp_path):
 
 
 def test_result_records_seed_inputs_and_times():
-    origin = provenance.begin(Config(seed=7), {"fixedpoint": "abc"}).until_now()
+    origin = provenance.begin(Config(seed=7), {"fixedpoint": "abc"}).finish()
     assert origin.seed == 7
     assert origin.input_digests == {"fixedpoint": "abc"}
     assert origin.started_utc <= origin.ended_utc

@@ -21,11 +21,11 @@ from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages.numerical_error import SAMPLE
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.content import untimed
+from walkerlab.pipeline.store.content import remove_timings
 from walkerlab.pipeline.store.files import refused
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.pipeline.sweeps import sweep as sweeps
-from walkerlab.pipeline.sweeps.chunk import FOLDER, Chunk, PointResult, by_name, compute_point, without_outputs
+from walkerlab.pipeline.sweeps.chunk import FOLDER, Chunk, PointResult, compute_point, flatten_summary, omit_outputs
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
 from walkerlab.pipeline.sweeps.result import Merge, as_csv, last_of_each
 from walkerlab.views.report.sweep_page import summary_lines
@@ -316,10 +316,10 @@ def test_walk_in_a_sweep_has_the_summary_of_a_single_walk(stage):
     (row,) = compute_point(config, "key", PIPELINE, stage, again=True).rows
     alone = answer_in_memory(config, stage, MemoryResults())
     assert "trajectory" in alone.groups
-    assert json.loads(row.numbers) == by_name(untimed(alone.summary, alone.timed))
+    assert json.loads(row.numbers) == flatten_summary(remove_timings(alone.summary, alone.timed))
 
 
 def test_arrays_needed_by_another_stage_are_kept():
     config = load().config
-    assert without_outputs(config, "compare", PIPELINE) == config
-    assert without_outputs(config, "contact-sim", PIPELINE).outputs == ()
+    assert omit_outputs(config, "compare", PIPELINE) == config
+    assert omit_outputs(config, "contact-sim", PIPELINE).outputs == ()

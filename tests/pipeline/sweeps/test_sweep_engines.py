@@ -28,7 +28,7 @@ from walkerlab.pipeline.sweeps.engines import (
     SlurmQueue,
     engine_named,
     environment_of_workers,
-    until_told,
+    run_until_signalled,
 )
 
 LOCAL = ENGINES["local"]
@@ -206,9 +206,9 @@ def test_jobs_on_this_machine_give_the_same_result(toy, tmp_path, monkeypatch):
 def test_terminated_job_returns_its_finished_units(number):
     units = (WorkUnit("a", 1, int), WorkUnit("b", 1, partial(signal.raise_signal, number)), WorkUnit("c", 1, int))
     with WorkerPool(1) as pool:
-        results = pool.submit(until_told, compute, units).result(timeout=60)
+        results = pool.submit(run_until_signalled, compute, units).result(timeout=60)
         assert [value for value, _ in results] == [0]
-        assert pool.submit(until_told, compute, units[1:]).result(timeout=60) == []
+        assert pool.submit(run_until_signalled, compute, units[1:]).result(timeout=60) == []
 
 
 class Cut(WorkerPool):

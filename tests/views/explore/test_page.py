@@ -11,7 +11,7 @@ from walkerlab.config.loader import load
 PATH = executable()
 pytestmark = pytest.mark.skipif(PATH is None, reason="no Chromium is installed; `CHROMIUM` may name one")
 
-SAID = "document.getElementById('said').textContent"
+MESSAGE = "document.getElementById('message').textContent"
 SHOWN = "document.getElementById('shown').textContent"
 STATE = "document.body.dataset.state"
 TIME = "Number(document.querySelector('[data-player]')?.dataset.time)"
@@ -120,24 +120,24 @@ def test_picture_is_labelled_with_the_parameters_it_shows(page):
     first = page.evaluate(SHOWN)
     typed(page, "walker.leg_mass_kg", "-4")
     page.until(f"{STATE} === 'failed'")
-    assert "from 1e-12 to 1e6 (kg)" in page.evaluate(SAID)
+    assert "from 1e-12 to 1e6 (kg)" in page.evaluate(MESSAGE)
     assert page.evaluate(SHOWN) == first
-    assert page.evaluate("rows.get('walker.leg_mass_kg').place.classList.contains('wrong')")
+    assert page.evaluate("rows.get('walker.leg_mass_kg').root.classList.contains('wrong')")
     typed(page, "walker.leg_mass_kg", "5")
     page.until(f"{STATE} === 'shown'")
     typed(page, "slope_deg", "30")
-    page.until(f"{SAID}.startsWith('No gait at a slope')")
+    page.until(f"{MESSAGE}.startsWith('No gait at a slope')")
     assert page.evaluate("document.querySelector('.scenes').hidden")
     assert page.evaluate(f"{SHOWN} + {PERIOD}") == "No walk: paper with slope_deg 30–"
 
 
 def test_any_key_can_be_searched_and_changed(page):
     page.evaluate("document.getElementById('search').value = 'gravity'; search()")
-    page.evaluate("document.querySelector('#found button').click()")
+    page.evaluate("document.querySelector('#matches button').click()")
     page.evaluate(slider("gravity_m_s2", 0, "change"))
     page.until(f"{SHOWN} === 'Shown: paper with gravity_m_s2 1.962'")
     page.evaluate("document.getElementById('search').value = 'zebra'; search()")
-    assert "No key" in page.evaluate("document.getElementById('found').textContent")
+    assert "No key" in page.evaluate("document.getElementById('matches').textContent")
 
 
 def test_enter_selects_the_only_match_of_a_search(page):
@@ -149,7 +149,7 @@ def test_enter_selects_the_only_match_of_a_search(page):
 
 def test_arriving_result_does_not_disturb_typing(page):
     page.evaluate(
-        "(async () => { const late = settle(); window.typing = rows.get('slope_deg').text; typing.focus();"
+        "(async () => { const late = refreshParameters(); window.typing = rows.get('slope_deg').text; typing.focus();"
         " typing.value = '2.'; await late; })()"
     )
     assert page.evaluate("typing.value") == "2."
@@ -160,8 +160,10 @@ def test_arriving_result_does_not_disturb_typing(page):
 
 def test_outdated_result_does_not_replace_a_newer_one(page):
     first, value = page.evaluate(
-        "(async () => { turn('slope_deg', 3, false); const late = settle(), first = rows.get('slope_deg').number.start;"
-        " turn('slope_deg', first, false); await late; return [first, Number(rows.get('slope_deg').text.value)]; })()"
+        "(async () => { setParameter('slope_deg', 3, false);"
+        " const late = refreshParameters(), first = rows.get('slope_deg').number.start;"
+        " setParameter('slope_deg', first, false); await late;"
+        " return [first, Number(rows.get('slope_deg').text.value)]; })()"
     )
     assert value == pytest.approx(first, rel=1e-6)
     page.until(f"{SHOWN} === 'Shown: paper'")
@@ -180,7 +182,7 @@ def test_camera_follows_the_model_that_still_walks(page):
         )
         walks = "Rigid" if ends[0] > ends[1] else "Contact"
         [x, width] = page.evaluate(
-            f"(() => {{ const hip = player.walk.points.find(({{ said }}) => said.startsWith('{walks} model, hip'));"
+            f"(() => {{ const hip = player.walk.points.find(({{ text }}) => text.startsWith('{walks} model, hip'));"
             " return [hip.at[0], player.walk.width]; })()"
         )
         assert x == pytest.approx(width / 2, abs=0.1 * width)
@@ -204,7 +206,7 @@ def test_clicking_a_gait_curve_sets_the_parameter(whole_page):
 def test_ground_parameters_plot_contact_gaits_on_a_log_axis(whole_page):
     page = whole_page
     typed(page, "contact.stiffness", "50000")
-    page.until("along.key === 'contact.stiffness' && along.found?.every(({ model }) => model === 'contact')")
+    page.until("along.key === 'contact.stiffness' && along.gaits?.every(({ model }) => model === 'contact')")
     page.until("along.series.length > 0")
     assert page.evaluate("along.dot.getAttribute('visibility')") == "hidden"  # the rigid gait has no place there
     marked = page.evaluate("along.value(along.fromX(Number(along.line.getAttribute('x1'))))")
@@ -225,14 +227,16 @@ def test_each_model_can_be_hidden(page):
 def test_current_config_can_be_saved(page, served):
     typed(page, "slope_deg", "3")
     page.evaluate("document.getElementById('name').value = 'found.yaml'; document.getElementById('save').click()")
-    page.until("document.getElementById('made').textContent.startsWith('Saved')")
+    page.until("document.getElementById('export-status').textContent.startsWith('Saved')")
     assert load(served.folder / "found.yaml").config == load(None, ["slope_deg=3", "name=found"]).config
     page.evaluate("document.getElementById('save').click()")
-    page.until("document.getElementById('made').textContent.includes('already exists')")
+    page.until("document.getElementById('export-status').textContent.includes('already exists')")
 
 
 def test_saved_picture_has_the_page_background_and_size(page):
-    page.evaluate("window.leave = (name, address) => (window.left = address); document.getElementById('png').click()")
+    page.evaluate(
+        "window.download = (name, address) => (window.left = address); document.getElementById('png').click()"
+    )
     page.evaluate("window.seen = new Image(); seen.src = left; seen.decode()")
     corner, size = page.evaluate(
         "(() => { const c = document.createElement('canvas'); [c.width, c.height] = [seen.width, seen.height];"
@@ -248,10 +252,13 @@ def test_film_is_written_and_linked(page):
     page.until(f"{SHOWN} === 'Shown: paper with strides 1'")
     page.evaluate("document.getElementById('contact').click()")
     page.evaluate("document.getElementById('gif').click()")
-    page.until("!!document.querySelector('#made a') || document.getElementById('made').textContent.includes('rror')")
-    link = page.evaluate("document.querySelector('#made a')?.href")
+    page.until(
+        "!!document.querySelector('#export-status a')"
+        " || document.getElementById('export-status').textContent.includes('rror')"
+    )
+    link = page.evaluate("document.querySelector('#export-status a')?.href")
     kind = page.evaluate(
-        "fetch(document.querySelector('#made a').href).then((answer) => answer.headers.get('Content-Type'))"
+        "fetch(document.querySelector('#export-status a').href).then((answer) => answer.headers.get('Content-Type'))"
     )
     assert link.partition("?")[0].endswith("simulate.gif")
     assert kind == "image/gif"
@@ -289,7 +296,7 @@ def test_skip_link_keeps_the_parameters(page):
 
 def test_typed_list_is_restored_from_the_address(page):
     page.evaluate("document.getElementById('search').value = 'heights'; search()")
-    page.evaluate("document.querySelector('#found button').click()")
+    page.evaluate("document.querySelector('#matches button').click()")
     typed(page, "ground.heights_m", "[0.002, -0.001]")
     page.until(f"{SHOWN} === 'Shown: paper with ground.heights_m [0.002,-0.001]'")
     page.evaluate("window.old = true; location.reload()")
@@ -337,10 +344,10 @@ def test_lost_server_is_reported(browser, other, tmp_path):
     opened(browser, other)
     other.close()
     typed(browser, "slope_deg", "2")
-    browser.until(f"{SAID}.startsWith('The server does not answer')")
+    browser.until(f"{MESSAGE}.startsWith('The server does not answer')")
     again = Served(tmp_path, "--port", str(other.port))
     try:
-        browser.until(f"{SAID}.includes('Open the address as it was printed')")
+        browser.until(f"{MESSAGE}.includes('Open the address as it was printed')")
     finally:
         again.close()
 
@@ -363,7 +370,10 @@ def test_phone_shows_walk_play_button_and_a_slider_together(browser, served):
         middle = f"document.querySelector('{slider}').closest('.turn').getBoundingClientRect()"
         assert page.evaluate(f"document.querySelector('.walk').getBoundingClientRect().bottom <= {middle}.top")
         assert page.evaluate(f"{middle}.bottom <= document.querySelector('.controls').getBoundingClientRect().top")
-    scrolling = "[...document.querySelectorAll('#seen, #seen *')].filter(one => one.scrollHeight > one.clientHeight + 1"
+    scrolling = (
+        "[...document.querySelectorAll('#walk-section, #walk-section *')]"
+        ".filter(one => one.scrollHeight > one.clientHeight + 1"
+    )
     assert page.evaluate(f"{scrolling} && getComputedStyle(one).overflowY === 'auto').length") == 0
     page.evaluate("document.querySelector('.play').click()")
     page.until(f"{TIME} > 0")

@@ -370,7 +370,7 @@ def test_jobs_import_nothing_from_the_start_folder(tmp_path):
         (tmp_path / "signal.py").write_text(f"open({str(tmp_path / 'imported')!r}, 'w')")
         assert one.asked("/api/job", {"kind": "report"})[0] == 200
         deadline = time.monotonic() + 30
-        while not one.asked("/api/job")[1]["said"]:
+        while not one.asked("/api/job")[1]["progress"]:
             assert time.monotonic() < deadline
             time.sleep(0.05)
         assert not (tmp_path / "imported").exists()

@@ -8,7 +8,7 @@ from synthetic_methods import RUNS, SCENES, measured_methods
 from walkerlab.evidence.benchmarks import figures as costs
 from walkerlab.evidence.benchmarks.figures import LOOKS, legend_entries, method_series
 from walkerlab.physics.solvers.registry import METHODS
-from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.canvas import figure_style
 
 FIGURES = [figure for figure in costs.FIGURES if figure.name.startswith("accuracy")]
 RIGID = FIGURES[0]
@@ -16,7 +16,7 @@ AGREEMENT = 9e-16
 
 
 def drawn_lines(figure=RIGID):
-    with styled():
+    with figure_style():
         left, right = figure.draw(measured_methods())[0].axes
     return left.lines, right.lines
 

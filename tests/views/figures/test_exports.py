@@ -31,7 +31,7 @@ from walkerlab.views.figures import illustration
 from walkerlab.views.figures import stage as plot
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.figures.style import WIDTH
-from walkerlab.views.report.tex import in_tex
+from walkerlab.views.report.tex import escape_tex
 
 xarray = import_late("xarray")
 
@@ -46,14 +46,14 @@ def original(tmp_path_factory):
         content = Content(result.groups, {**result.summary, **extra})
         write(folder / f"{name}.h5", content, result.identity, begin(load().config, {}))
     # without, all results are read to know the config
-    RunFolder.at(folder).write_record(Record("paper", "", to_yaml(load().config)))
+    RunFolder.open_folder(folder).write_record(Record("paper", "", to_yaml(load().config)))
     return folder
 
 
 @pytest.fixture
 def run(original, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return RunFolder.at(shutil.copytree(original, tmp_path / "runs" / "paper"))
+    return RunFolder.open_folder(shutil.copytree(original, tmp_path / "runs" / "paper"))
 
 
 @pytest.mark.parametrize(
@@ -151,11 +151,11 @@ def test_netcdf_trajectory_opens_without_a_group(run):
 def test_latex_table_escapes_special_characters(run):
     text = export_from(run, "table-3", Target("tex", None), 516.0, "", QUIET).read_text()
     assert r"left step period, $t_\mathrm{left}$ (s) & 0.70000 \\" in text
-    assert in_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
-    assert in_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
-    assert in_tex("end_time_s") == r"end\_time\_s"
-    assert in_tex("50 %") == r"50 \%"
-    assert in_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
+    assert escape_tex("x_p, dtheta_1") == r"$x_p$, $\dot{\theta}_1$"
+    assert escape_tex("θ̇₁ (rad/s)") == r"$\dot{\theta}_{1}$ (rad/s)"
+    assert escape_tex("end_time_s") == r"end\_time\_s"
+    assert escape_tex("50 %") == r"50 \%"
+    assert escape_tex("m/s^2, 10^-4") == "m/s$^{2}$, 10$^{-4}$"
 
 
 @pytest.mark.parametrize("name", ["9", "09", "figure-9", "fig 9"])

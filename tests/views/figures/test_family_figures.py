@@ -11,7 +11,7 @@ from walkerlab.config.fields import leaves, leaves_of_other_kinds
 from walkerlab.config.schema import Config
 from walkerlab.labels import axis_label
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.views.figures.canvas import settle, styled
+from walkerlab.views.figures.canvas import figure_style, settle
 from walkerlab.views.figures.families import (
     FIGURE_13,
     FIGURE_14,
@@ -22,7 +22,7 @@ from walkerlab.views.figures.families import (
     DrawnBranch,
     births_in,
     curve_of,
-    finely,
+    interpolate,
     multipliers_of,
     region_kinds,
     stretch_of,
@@ -33,7 +33,7 @@ FIGURES = [FIGURE_13, FIGURE_14, FIGURE_16]
 
 
 def plotted(figure):
-    with styled():
+    with figure_style():
         return figure.draw(families())[0]
 
 
@@ -59,7 +59,7 @@ def test_gaits_that_begin_at_a_fold_are_labelled_with_their_steps():
     results["continuation"] = replace(
         results["continuation"], groups=results["continuation"].groups | {"rigid/branch_1": born}
     )
-    with styled():
+    with figure_style():
         figure, _ = FIGURE_13.draw(results)
     close = figure.axes[1]
     [above] = close.child_axes
@@ -68,7 +68,7 @@ def test_gaits_that_begin_at_a_fold_are_labelled_with_their_steps():
 
 
 def test_one_column_figure_stacks_its_panels():
-    with styled(3.5):
+    with figure_style(3.5):
         figure, _ = FIGURE_13.draw(families())
     assert {axes.get_subplotspec().colspan.start for axes in figure.axes} == {0}
     assert len(figure.axes) == 4
@@ -135,7 +135,7 @@ def test_one_step_gaits_have_distinct_styles_labelled_with_their_period():
     results = families()
     result = results["continuation"]
     result.groups["rigid/branch_1"].attrs["period"] = 1
-    with styled():
+    with figure_style():
         figure = FIGURE_14.draw(results)[0]
     looks = {(line.get_color(), line.get_linestyle()) for line in figure.axes[1].lines} - {(GREY, "-")}
     assert len(looks) == 2
@@ -155,12 +155,12 @@ def test_multipliers_that_meet_become_complex():
     )
     found = multipliers_of(DrawnBranch("rigid", group))
     # both are real up to a product of a quarter, and then on a circle of its root
-    exact = [np.sort(np.abs(np.roots([1.0, -1.0, one])))[::-1] for one in finely(product)]
+    exact = [np.sort(np.abs(np.roots([1.0, -1.0, one])))[::-1] for one in interpolate(product)]
     np.testing.assert_allclose(np.abs(found), exact, atol=1e-9)
 
 
 def test_families_without_bifurcations_have_one_panel():
-    with styled():
+    with figure_style():
         figure = FIGURE_13.draw(families(flips=False))[0]
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["", ""]
 
@@ -169,7 +169,7 @@ def test_ticks_near_a_single_flip_have_few_digits():
     results = families()
     summary = results["continuation"].summary
     summary["to"] = summary["attractors"][0]["to"] = FLIP + 1e-6
-    with styled():
+    with figure_style():
         figure = FIGURE_13.draw(results)[0]
         settle(figure)
     for axes in figure.axes:
@@ -188,7 +188,7 @@ def test_axes_show_keys_as_words():
         ("contact.exponent", "1", "contact exponent"),
     ):
         result.summary.update(over=key, unit=unit)
-        with styled():
+        with figure_style():
             for figure in (FIGURE_13, FIGURE_14, FIGURE_16):
                 assert said in {axes.get_xlabel() for axes in figure.draw({"continuation": result})[0].axes}
     keys = [path for path, _ in (*leaves(Config), *leaves_of_other_kinds(Config)) if path[0] != "name"]

@@ -19,7 +19,7 @@ from synthetic_walks import both_models, contact, rigid, rigid_alone
 
 from walkerlab.evidence.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
-from walkerlab.views.figures.canvas import settle, styled
+from walkerlab.views.figures.canvas import figure_style, settle
 from walkerlab.views.figures.maps import ATTRACTORS
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.figures.style import CONTACT, LEGS, POINT, RIGID
@@ -74,7 +74,7 @@ VISIBLE = 0.1
 @pytest.fixture(scope="module")
 def drawn(request):
     results, figure, width = request.param
-    with styled(POINT * width):
+    with figure_style(POINT * width):
         made = figure.draw(results)[0]
         settle(made)
         made.texts_drawn = texts_drawn(made)

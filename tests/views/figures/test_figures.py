@@ -18,7 +18,7 @@ from synthetic_walks import both_models, compared, contact, rigid, rigid_alone, 
 from walkerlab.evidence.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures import stick_diagram, walks
-from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.illustration import WORDS, Illustration
 from walkerlab.views.figures.registry import FIGURES as ALL_FIGURES
 from walkerlab.views.figures.style import CONTACT, RIGID
@@ -41,12 +41,12 @@ def drawable(results):
 
 
 def plotted(figure, results):
-    with styled():
+    with figure_style():
         return figure.draw(results)[0]
 
 
 def caption_of(figure, results):
-    with styled():
+    with figure_style():
         return figure.say("caption", *figure.draw(results)[1])
 
 
@@ -329,7 +329,7 @@ def test_legend_of_limit_cycles_has_the_markers_of_both_models():
 def test_overlaid_runs_have_an_axis_for_each_leg():
     first, second = both_models(), both_models(simulate=rigid(6))
     trajectories = [run["simulate"]["trajectory"] for run in (first, second)]
-    with styled():
+    with figure_style():
         figure = walks.draw_overlay([("simulate", trajectories)], ("one", "other"))
     for leg, axes in enumerate(figure.axes[:2]):
         assert len({line.get_color() for line in axes.lines}) == len(axes.lines) == 2

@@ -5,7 +5,7 @@ import pytest
 from synthetic_walks import WEIGHT, both_models, contact, stored, without
 
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.ground import FIGURES, losses
 from walkerlab.views.figures.style import CONTACT
 from walkerlab.views.figures.walks import walk_of
@@ -14,7 +14,7 @@ FORCES, LOST = FIGURES
 
 
 def plotted(figure, results):
-    with styled():
+    with figure_style():
         return figure.draw(results)[0]
 
 

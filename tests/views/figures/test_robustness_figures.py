@@ -6,7 +6,7 @@ from synthetic_walks import rigid, stored
 
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures import robustness
-from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.families import MODELS
 
 CUT_OFF = 40
@@ -29,7 +29,7 @@ def rough():
 
 
 def test_share_still_walking_falls_at_failures_but_not_at_the_cut_off(rough):
-    with styled():
+    with figure_style():
         figure, _ = robustness.FIGURE_18.draw(rough)
     for walks, line in zip(STEPS[0], figure.axes[2].lines, strict=True):
         at, share = line.get_data()
@@ -40,7 +40,7 @@ def test_share_still_walking_falls_at_failures_but_not_at_the_cut_off(rough):
 
 
 def test_foothold_heights_are_drawn_under_the_walker(rough):
-    with styled():
+    with figure_style():
         figure, _ = robustness.FIGURE_18.draw(rough)
     heights = rough["robustness"]["rough_walk/steps"]["foothold_height_m"]
     bars = [bar.get_height() for bar in figure.axes[1].patches]

@@ -5,14 +5,14 @@ from matplotlib.colors import to_hex
 from synthetic_maps import ENDS, stability_maps
 
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
-from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.maps import STABILITY, VERDICT_COLOURS, edges
 
 STICTION, STEP = STABILITY
 
 
 def meshes(figure):
-    with styled():
+    with figure_style():
         left, right, _ = figure.draw(stability_maps())[0].axes
     return [[mesh for mesh in axes.collections if mesh.get_array() is not None] for axes in (left, right)]
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.colors import to_hex, to_rgb
 from synthetic_walks import LEG_LENGTH, SLOPE, STEP_LENGTH, both_models, contact, rigid, rigid_alone
 
-from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.stick_diagram import (
     FIGURE_2,
     FIGURE_6,
@@ -49,7 +49,7 @@ def test_feet_land_one_step_length_ahead(sticks):
 
 def test_plane_descends_in_walking_direction():
     sticks = sticks_of(rigid_alone()["simulate"])
-    x, y = sticks.in_plane(np.array([STEP_LENGTH, 0.0]))
+    x, y = sticks.project(np.array([STEP_LENGTH, 0.0]))
     assert np.arctan2(-y, x) == pytest.approx(SLOPE)
     assert np.hypot(x, y) == pytest.approx(STEP_LENGTH)
 
@@ -66,19 +66,19 @@ def test_incomplete_cycle_is_drawn_to_its_end():
 def test_slope_label_is_above_the_named_torso():
     bare = sticks_of(rigid_alone()["simulate"])
     sticks = replace(bare, head=bare.hip + np.array([0.0, 0.4 * LEG_LENGTH]))
-    with styled():
+    with figure_style():
         figure, axes = stick_diagram(sticks)
         figure.draw_without_rendering()
     (label,) = [text for text in axes.texts if text.get_text().startswith("walking direction")]
     bottom = axes.transData.inverted().transform(label.get_window_extent())[0, 1]
-    assert bottom > sticks.in_plane(sticks.head)[:, 1].max()
+    assert bottom > sticks.project(sticks.head)[:, 1].max()
     assert axes.get_ylim()[1] > axes.transData.inverted().transform(label.get_window_extent())[1, 1]
     assert "torso" in [entry.get_label() for entry in entries(sticks)]
     assert "torso" not in [entry.get_label() for entry in entries(bare)]
 
 
 def drawn(figure, results):
-    with styled():
+    with figure_style():
         return figure.draw(results)[0].axes[0]
 
 

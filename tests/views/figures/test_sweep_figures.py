@@ -5,7 +5,7 @@ import pytest
 
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.views.figures.canvas import styled
+from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.maps import is_logarithmic
 from walkerlab.views.figures.sweep import choose, illustration, lines, maps, one_over_another
 from walkerlab.views.report.sweep_page import check_options
@@ -32,7 +32,7 @@ def swept(slopes, masses, answered=True):
 
 
 def drawn(made, group):
-    with styled():
+    with figure_style():
         return made(group, PARAMETERS, ["spectral_radius"])
 
 
@@ -97,7 +97,7 @@ def test_quantity_can_be_plotted_over_another():
         "x": x, "status": words, "outcome": words,
         "speed_m_s": Variable(speed, ("x",), "m/s", "speed"), "cost_of_transport": Variable(cost, ("x",), "1", "cost"),
     })  # fmt: skip
-    with styled():
+    with figure_style():
         axes = one_over_another(group, ["cost_of_transport"], "speed_m_s").axes[0]
     (curve,) = axes.lines
     np.testing.assert_array_equal((curve.get_xdata(), curve.get_ydata()), (speed, cost))

@@ -13,8 +13,8 @@ from walkerlab.config.loader import load
 from walkerlab.config.walkers import Kneed, PartsWalker, StraightLegs
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Target, draw_walker
-from walkerlab.views.figures.canvas import settle, styled
-from walkerlab.views.figures.measures import draw_measures, draw_parts, draw_upright, upright
+from walkerlab.views.figures.canvas import figure_style, settle
+from walkerlab.views.figures.measures import draw_measures, draw_parts, draw_upright, measure_leg
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "draw_walkers.py"))
@@ -59,7 +59,7 @@ def test_every_length_of_the_walker_is_labelled_with_its_value():
 
 @pytest.mark.parametrize("walker", [KNEED, StraightLegs(type="straight-legs", foot_centre_ahead_m=0.02)])
 def test_dimension_lines_have_the_labelled_length(walker):
-    for measure in upright(walker).lengths:
+    for measure in measure_leg(walker).lengths:
         gaps = np.abs(np.subtract(measure.end, measure.start))
         assert np.abs(gaps - abs(measure.value)).min() < 1e-12
 
@@ -125,7 +125,7 @@ def figures():
 
 @pytest.mark.parametrize("place", range(len(OF_TYPES) + 3))
 def test_labels_do_not_overlap_or_leave_the_picture(place):
-    with styled():
+    with figure_style():
         figure = next(itertools.islice(figures(), place, None))
         settle(figure)
         words = texts_drawn(figure)

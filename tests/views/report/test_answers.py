@@ -14,10 +14,10 @@ from walkerlab.views.report.tables import (
     aligned,
     as_csv,
     csv_text,
-    in_lines,
     measured,
     side_by_side,
     table,
+    table_lines,
     width,
 )
 from walkerlab.views.report.tex import as_tex
@@ -283,7 +283,7 @@ def test_paragraphs_of_every_stage_are_wrapped_alike(stage):
 def test_page_and_terminal_show_the_same_gait_table():
     gaits = {"as-printed": {**GAIT, "equations": "as-printed"}, "corrected": GAIT}
     shown = gait_table(gaits, ["theta_1", "theta_2", "dtheta_1", "dtheta_2"])
-    lines = in_lines(shown)
+    lines = table_lines(shown)
     for cells in (row for rows in shown.groups.values() for row in rows):
         assert " ".join(row(lines, cells[0].text)) == " ".join(cell.text for cell in cells[1:])
     assert cells_of_head(lines) == " ".join(column.title for column in shown.columns)
@@ -297,7 +297,7 @@ def test_terminal_tables_omit_sentences_and_add_a_group_column():
     columns = [Column("case", "name"), Column("error", "error", number, numeric=True), Column("why", "why", wide=True)]
     record = {"name": "slow", "error": 0.5, "why": LONG}
     shown = table("Cases", columns, {"start": [record], "ground": [record]}, by="family")
-    assert [line.split() for line in in_lines(shown)] == [
+    assert [line.split() for line in table_lines(shown)] == [
         ["family", "case", "error"],
         ["start", "slow", "0.5"],
         ["ground", "slow", "0.5"],
@@ -329,6 +329,6 @@ def test_side_by_side_table_includes_rows_of_either_record():
 
 def test_cell_is_rounded_for_readers_and_exact_in_files():
     shown = table("", [measured("period", "period_s", lambda value: number(value, 2))], [{"period_s": 0.7036}])
-    assert in_lines(shown) == ["period (s)", "0.7"]
+    assert table_lines(shown) == ["period (s)", "0.7"]
     assert as_csv(shown) == b"period (s)\n0.7036\n"
     assert rb"0.70360 \\" in as_tex(shown)

@@ -6,7 +6,7 @@ import walkerlab
 from walkerlab.pipeline.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headline_values, headlines
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.sweeps.chunk import by_name
+from walkerlab.pipeline.sweeps.chunk import flatten_summary
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_every_value_of_a_sweep_point_can_be_requested(stage, tmp_path):
     strides = None if stage == "fixedpoint" else 1
     path = walkerlab.run(stage, "kneed", LEVEL, tmp_path, strides=strides).artifact
     summary = artifact.read(path).summary
-    numbers = {name for name, value in by_name(summary).items() if isinstance(value, int | float)}
+    numbers = {name for name, value in flatten_summary(summary).items() if isinstance(value, int | float)}
     assert [name for name in numbers if not has_quantity(stage, name)] == []
     assert {"speed_m_s", "froude", "cost_of_transport"} <= numbers
     assert summary["froude"] == pytest.approx(summary["speed_m_s"] / (9.81 * 1.0) ** 0.5, rel=1e-12)

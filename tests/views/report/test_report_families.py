@@ -7,7 +7,7 @@ from synthetic_results import config, families, families_that_move, simulate
 from walkerlab.config.loader import load
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections import families as section
-from walkerlab.views.report.sections.families import MIN_MARK_DISTANCE, apart, gait_diagram
+from walkerlab.views.report.sections.families import MIN_MARK_DISTANCE, gait_diagram, separate_marks
 from walkerlab.views.report.words import words
 
 
@@ -54,5 +54,5 @@ def test_marks_do_not_overlap_and_stable_gaits_keep_theirs():
     walk = simulate()
     (mark, _) = gait_diagram(Results(config(), {"continuation": families_that_move(walk)})).gaits
     near, far = replace(mark, x=mark.x + 0.9 * MIN_MARK_DISTANCE), replace(mark, x=mark.x + MIN_MARK_DISTANCE)
-    assert apart([mark, near, far]) == (mark, far)
-    assert apart([replace(mark, stable=False), near, far]) == (near,)
+    assert separate_marks([mark, near, far]) == (mark, far)
+    assert separate_marks([replace(mark, stable=False), near, far]) == (near,)

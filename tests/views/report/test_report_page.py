@@ -19,7 +19,7 @@ from walkerlab.views.report.page import render, source, to_markup
 from walkerlab.views.report.registry import pages_of
 from walkerlab.views.report.results import Results
 from walkerlab.views.report.tables import Cell, Column, table
-from walkerlab.views.report.words import in_row, words
+from walkerlab.views.report.words import join_row, words
 
 NASTY = "<script>alert('x')</script><b title=\"y\">&amp;"
 PIXELS = "data:image/png;base64,"
@@ -217,5 +217,5 @@ def test_sentence_is_one_line_with_nonbreaking_spaces():
 
 def test_template_parts_are_separated_and_not_empty():
     assert parts("| one |\n two,\u00a0m | | three|four |") == ["one", "two,\u00a0m", "three|four"]
-    assert in_row(" a |\n b | c |") == "a, b and c"
+    assert join_row(" a |\n b | c |") == "a, b and c"
     assert words.terms("adjustment.walks", True)["released"] == "without the joint, from the rigid state"

@@ -378,7 +378,7 @@ def test_provenance_lists_key_digest_commit_and_command_of_each_result():
 
 def channels(walker):
     """The numbers of a player's walker, by their names."""
-    floats = np.frombuffer(base64.b64decode(walker.track.packed()), "<f4").reshape(len(walker.track.channels), -1)
+    floats = np.frombuffer(base64.b64decode(walker.track.pack()), "<f4").reshape(len(walker.track.channels), -1)
     return dict(zip(walker.track.channels, floats.astype(float), strict=True))
 
 
@@ -414,7 +414,7 @@ def test_thinning_keeps_jumps_and_the_largest_force():
     force = np.ones(time.size)
     force[1234] = 9.0
     angle = np.where(np.arange(time.size) <= 1000, 1.0, -1.0)
-    thin = Track({"t": time, "a0": angle, "n0": force, "n1": 0.0 * force}).thinned(0.05)
+    thin = Track({"t": time, "a0": angle, "n0": force, "n1": 0.0 * force}).thin(0.05)
     assert thin["t"].size < 100
     assert thin["n0"].max() == 9.0
     assert thin.end == 2.0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.symbols import typeset
 
 
 @pytest.mark.parametrize(
@@ -16,11 +16,11 @@ from walkerlab.views.report.symbols import in_signs
     ],
 )
 def test_formulas_are_shown_with_symbols(plain, signs):
-    assert in_signs(plain) == signs
+    assert typeset(plain) == signs
 
 
 @pytest.mark.parametrize(
     "text", ["eq. 9-2", "as-printed", "A.5 row 2, A.29", "t_left, v_com", "--set a.b=1", "less than 1%", "k-1e8-linear"]
 )
 def test_prose_is_left_unchanged(text):
-    assert in_signs(text) == text
+    assert typeset(text) == text

@@ -5,7 +5,7 @@ from latex import compile_tables
 
 from walkerlab.evidence.paper.sections import table_of
 from walkerlab.views.report.tables import Column, as_csv, record_table, table
-from walkerlab.views.report.tex import WITHOUT_GRAPHICX, as_tex, in_tex
+from walkerlab.views.report.tex import WITHOUT_GRAPHICX, as_tex, escape_tex
 
 END = r" \\"
 SMALL_TABLE = table("Periods", [Column("period (s)", numeric=True)], [[0.7036]])
@@ -88,7 +88,7 @@ def test_units_have_a_separate_row_under_multiline_headers():
 
 
 def test_adjacent_superscripts_are_merged():
-    assert in_tex("10⁻¹² m, x₁², 2^-3") == "10$^{-12}$ m, x$_{1}^{2}$, 2$^{-3}$"
+    assert escape_tex("10⁻¹² m, x₁², 2^-3") == "10$^{-12}$ m, x$_{1}^{2}$, 2$^{-3}$"
 
 
 def test_missing_values_are_empty_in_a_file():

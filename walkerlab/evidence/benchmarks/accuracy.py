@@ -73,10 +73,13 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
 
 
 def resumed_end(trial: Trial, name: str, compute: Callable[[Trial], End], checkpoint: Checkpoint) -> End:
-    """Return an end state from the checkpoint, or compute and keep it; may raise WalkEndsError."""
+    """Return an end state from the checkpoint, or compute and keep it.
+
+    Raises WalkEndsError if the walk ends early.
+    """
     unit = unit_name(trial.name, name)
     if unit not in checkpoint.kept:
-        checkpoint.keep(unit, compute(trial).packed())
+        checkpoint.keep(unit, compute(trial).pack())
     return End.unpack(checkpoint.kept[unit])
 
 
@@ -94,12 +97,12 @@ def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Itera
     if config.contact is None:
         return
     # contact code is loaded only for scenes that have contact
-    from walkerlab.evidence.benchmarks.contact_trials import contact_trial, near_rigid_trial
+    from walkerlab.evidence.benchmarks.contact_trials import contact_trial, stiff_ground_trial
 
     compass = is_passive_compass(config)
     yield contact_trial(config, state, length, CONTACT_STEPS if compass else SLOW_CONTACT_STEPS)
     if compass:
-        yield near_rigid_trial(config, state, length, NEAR_RIGID_STEPS)
+        yield stiff_ground_trial(config, state, length, NEAR_RIGID_STEPS)
 
 
 def summarise(

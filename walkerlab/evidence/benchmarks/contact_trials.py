@@ -17,7 +17,7 @@ def contact_trial(config: ContactConfig, state: State, length_m: float, steps: i
     return ContactTrial(scene.walker, scene.ground, start_state(scene, state), steps, "contact")
 
 
-def near_rigid_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
+def stiff_ground_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
     """Set up a walk that is harder to integrate: on much stiffer ground with less creep."""
     trial = contact_trial(config, state, length_m, steps)
     law, friction = trial.walker.normal, trial.walker.friction.with_creep(CREEP_FACTOR)

@@ -70,7 +70,7 @@ FAILURE_LEVEL = 30.0  # height of failed runs in the figure, as a multiple of th
 
 
 def method_series(scene: str, results: Results) -> Iterator[Series]:
-    """Yield the methods' series in the order measured; fully compiled methods have filled markers."""
+    """Yield the series of each method in the order measured. Fully compiled methods have filled markers."""
     rows = results["accuracy"].groups[f"{scene}/rows"]
     methods = rows["method"].astype(str)
     for name in dict.fromkeys(methods.tolist()):
@@ -131,7 +131,7 @@ SERIES_DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2
 
 
 def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Series]:
-    """Yield an experiment's series of runs from the gait; each engine's first series has filled markers."""
+    """Yield an experiment's series of runs from the gait. Each engine's first series has filled markers."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
     engines, names = rows["engine"].astype(str), rows["integrator"].astype(str)
     selected = (rows["scene"] == scene) & (rows["experiment"] == experiment)

@@ -37,7 +37,7 @@ class MethodRun:
     result: TrialRun
     walls_s: tuple[float, ...]
 
-    def packed(self) -> Numbers:
+    def pack(self) -> Numbers:
         """Return the numbers that `unpack` takes, for a checkpoint."""
         run = self.result
         counts = run.rhs_evaluations, run.accepted, run.rejected
@@ -81,17 +81,17 @@ class MethodRow:
 
     @property
     def reached(self) -> Annotated[int, Label("1", "whether the end state was reached")]:
-        """1 if the run reached the end state, so that its error is known; otherwise 0."""
+        """1 if the run reached the end state, so that its error is known, otherwise 0."""
         return int(self.error is not None)
 
 
 def unit_name(*parts: object) -> str:
-    """Name a measurement in a checkpoint; one from another machine is not resumed, because run times are compared."""
+    """Name a measurement in a checkpoint. One from another machine is not resumed, because run times are compared."""
     return "/".join(map(str, (platform.node(), *parts)))
 
 
 def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
-    """Run a method at tighter and tighter tolerances until a run is too expensive; resume runs of the checkpoint."""
+    """Run a method at tighter and tighter tolerances until a run is too expensive. Resume runs of the checkpoint."""
     ladder, budget, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
     if method not in METHODS or not METHODS[method].compiled:
         ladder, budget, last = LIBRARY_LADDER, LIBRARY_RUN_BUDGET, LAST_RUN_SIZE
@@ -100,7 +100,7 @@ def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
     for tolerance in ladder:
         unit = unit_name(trial.name, method, tolerance)
         if unit not in checkpoint.kept:
-            checkpoint.keep(unit, measure(trial, method, tolerance, budget).packed())
+            checkpoint.keep(unit, measure(trial, method, tolerance, budget).pack())
         runs.append(MethodRun.unpack(checkpoint.kept[unit]))
         if runs[-1].result.rhs_evaluations >= last:
             break
@@ -125,7 +125,7 @@ def time_walk(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
 
 
 def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
-    end, result = reference.for_method(ascent.method), run.result
+    end, result = reference.reference_for(ascent.method), run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
     below_agreement = error is not None and error <= reference.agreement
     return MethodRow(

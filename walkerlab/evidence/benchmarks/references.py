@@ -31,7 +31,7 @@ class End:
     tolerance: float = 0.0  # relative tolerance; 0 for Taylor series at machine precision
     rhs_evaluations: int = 0  # 0 if they are not counted
 
-    def packed(self) -> Numbers:
+    def pack(self) -> Numbers:
         """Return the numbers that `unpack` takes, for a checkpoint."""
         return [END_METHODS.index(self.method), self.tolerance, self.rhs_evaluations, *self.state.tolist()]
 
@@ -43,7 +43,7 @@ class End:
 
 @dataclass(frozen=True)
 class Reference:
-    """End states of a walk by two different methods; their difference is the uncertainty."""
+    """End states of a walk by two different methods. Their difference is the uncertainty."""
 
     first: End
     second: End
@@ -58,7 +58,7 @@ class Reference:
         """Largest difference between the two end states."""
         return float(np.max(np.abs(self.first.state - self.second.state)))
 
-    def for_method(self, method: str) -> End:
+    def reference_for(self, method: str) -> End:
         """Return the end state to compare a method with, always one computed by another method."""
         return self.second if method == self.first.method else self.first
 
@@ -98,7 +98,10 @@ def compass_of(trial: Trial) -> RigidWalker | None:
 
 
 def tightest_end(trial: Trial, method: str) -> End:
-    """Compute the end state by one of our methods at its tightest useful tolerance; may raise WalkEndsError."""
+    """Compute the end state by one of our methods at its tightest useful tolerance.
+
+    Raises WalkEndsError if the walk ends early.
+    """
     tolerances = TIGHTEST_RIGID if isinstance(trial, RigidTrial) else TIGHTEST_CONTACT
     result = trial.prepare(method, tolerances[method], REFERENCE_RUN_BUDGET)()
     if result.outcome == Outcome.BUDGET_EXHAUSTED.label:

@@ -39,7 +39,7 @@ class TrialRun:
 
 @dataclass(frozen=True)
 class RigidTrial:
-    """Walk of the rigid model; its end state is the one just after the last impact."""
+    """Walk of the rigid model. Its end state is the one just after the last impact."""
 
     walker: RigidModel
     start: tuple[float, ...]
@@ -53,7 +53,7 @@ class RigidTrial:
         return (*METHODS, USER_SCRIPT) if self.compass is not None else tuple(METHODS)
 
     def prepare(self, method: str, rtol: float, budget: int) -> Callable[[], TrialRun]:
-        """Return a function that walks with a method, ready to be timed; its calls reuse the same memory."""
+        """Return a function that walks with a method, ready to be timed. Its calls reuse the same memory."""
         atol = rtol * ATOL_PER_RTOL
         if method == USER_SCRIPT:
             assert self.compass is not None, "the script is not among this walker's methods"
@@ -83,7 +83,7 @@ class RigidTrial:
 
 @dataclass(frozen=True)
 class ContactTrial:
-    """Walk on compliant ground; its end state is the one at the last touch."""
+    """Walk on compliant ground. Its end state is the one at the last touch."""
 
     walker: ContactWalker
     ground: JudgedGround
@@ -114,6 +114,6 @@ Trial = RigidTrial | ContactTrial
 
 
 def make_run(outcome: Outcome, state: Floats, counts: Any) -> TrialRun:
-    """Build a run's record; it has an end state only if the outcome is `WALKED`."""
+    """Build a run's record. It has an end state only if the outcome is `WALKED`."""
     end = state.copy() if outcome is Outcome.WALKED else np.zeros(0)
     return TrialRun(outcome.label, end, int(counts[RHS]), int(counts[ACCEPTED]), int(counts[REJECTED]))

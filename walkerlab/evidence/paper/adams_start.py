@@ -105,7 +105,7 @@ def adams_walk(
 
 
 def first_below_zero(time: Array, values: Array) -> float | None:
-    """Return the interpolated time (s) at which sampled values first cross zero downwards; None if they do not."""
+    """Return the interpolated time (s) at which sampled values first cross zero downwards, or None if they do not."""
     below = np.flatnonzero(values < 0.0)
     if below.size == 0:
         return None

@@ -22,7 +22,7 @@ AS_PRINTED = 1.0
 
 
 class RigidWalker(NamedTuple):
-    """Compass walker on a slope, SI units; the paper's symbols are in brackets."""
+    """Compass walker on a slope, in SI units, with the symbols of the paper in brackets."""
 
     leg_length: float  # [L] m
     foot_to_mass: float  # [a] m
@@ -75,7 +75,7 @@ def step_length(walker: RigidWalker, theta_1: float, theta_2: float) -> float:
 
 
 def impact_matrices(walker: RigidWalker, cos_d: float) -> tuple[float, float, float, float, float, float]:
-    """Entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-; legs 1 and 2 are numbered as before the impact.
+    """Entries A_11, A_12, A_22, B_11, B_12, B_22 of A w+ = B w-. Legs 1 and 2 are numbered as before the impact.
 
     They follow from (A.57): the constraint E dq+ = 0 gives dq+ = Z w+, so Z' D_e Z w+ = Z' D_e dq- without the impulse.
     With the right sign in (A.55) they depend on cos(theta_2 - theta_1) alone, and B_21 = 0 because the trailing leg

@@ -83,23 +83,23 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
     shared = motion.summary | ({"numerical_error": errors} if errors else {})
     progress.advance()
     if papers:
-        groups, summary = against_the_paper(config, inputs, motion, progress)
+        groups, summary = compare_with_paper(config, inputs, motion, progress)
     else:
         groups, summary = {}, models_compared(config, inputs)
     progress.advance()
     recorded_groups, recorded = compare_recorded(inputs)
     for symbol, row in summary.get("table3", {}).items() if recorded else ():
         row["recorded"] = recorded["recorded"]["table3"]["recorded"][symbol]
-    left_out = [*summary.pop("left_out"), *motion.left_out]
+    omissions = [*summary.pop("left_out"), *motion.left_out]
     return Content(
-        {**groups, **motion.groups, **recorded_groups}, {**summary, **shared, **recorded, "left_out": left_out}
+        {**groups, **motion.groups, **recorded_groups}, {**summary, **shared, **recorded, "left_out": omissions}
     )
 
 
-def against_the_paper(
+def compare_with_paper(
     config: CompareConfig, inputs: Mapping[str, Content], motion: Comparison, progress: Progress
 ) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Compare both models with the paper's numbers, tables and errata; returns groups and summary."""
+    """Compare both models with the paper's numbers, tables and errata, and return groups and summary."""
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)
@@ -114,7 +114,7 @@ def against_the_paper(
         **tables,
         "errata": [vars(erratum) for erratum in paper_errata],
         "departures": list(measured.departures.contact),
-        "left_out": left_out(inputs, measured),
+        "left_out": list_omissions(inputs, measured),
     }
 
 
@@ -186,7 +186,7 @@ def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasur
     )
 
 
-def left_out(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str, str]]:
+def list_omissions(inputs: Mapping[str, Content], measured: Measured) -> list[dict[str, str]]:
     """List the comparisons with the paper that could not be made, with reasons."""
     sets = inputs["fixedpoint"].summary["equation_sets"]
     missing = [

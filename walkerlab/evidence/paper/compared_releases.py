@@ -33,7 +33,9 @@ LOCK_OMISSION = omission(
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Walk up to 20 steps from a gait with each knee release; None for walkers without knees or with a push-off."""
+    """Walk up to 20 steps from a gait with each knee release, or return None for walkers without knees or with a
+    push-off.
+    """
     scene = contact_scene(config, pitch_m, pitch_m)
     if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
         return None

@@ -1,11 +1,13 @@
-"""Differences from the paper's scene; if there are any, a config's numbers neither confirm nor refute the paper's."""
+"""Differences from the scene of the paper. If there are any, a config's numbers neither confirm nor refute
+the paper's.
+"""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from walkerlab.config.contact import BOUNDS_SI, Contact
 from walkerlab.config.drives import acting_on
-from walkerlab.config.numbers import same
+from walkerlab.config.numbers import are_equal
 from walkerlab.config.reads import CompareConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import CompassWalker
@@ -20,7 +22,7 @@ UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not i
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
-    """Describe the differences from the paper's scene; slopes that agree within the rounding of x_p count as equal."""
+    """Describe the differences from the paper's scene. Slopes that agree within the rounding of x_p count as equal."""
     walker, contact, paper = config.walker, config.contact, CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []
@@ -50,7 +52,7 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
 
 def describe_differences(used: Any, paper: Any, names: Iterable[str], called: str = "{}") -> Iterator[str]:
     for name in names:
-        if not same(getattr(used, name), getattr(paper, name)):
+        if not are_equal(getattr(used, name), getattr(paper, name)):
             yield describe(called.format(name), getattr(used, name), getattr(paper, name))
 
 

@@ -26,13 +26,15 @@ def stored_variable(walk: Content, group: str, name: str) -> comparison.Array | 
 
 
 def times_of_steps(walk: Content, name: str) -> comparison.Array:
-    """Return the times (s) of a walk's steps; empty if they were not stored."""
+    """Return the times (s) of a walk's steps, or nothing if they were not stored."""
     times = stored_variable(walk, "steps", name)
     return np.zeros(0) if times is None else times
 
 
 def motion_of(walk: Content) -> comparison.Motion | None:
-    """Return the motion of the legs in a stored walk; None if states were not stored or the walk ended immediately."""
+    """Return the motion of the legs in a stored walk, or None if states were not stored or the walk ended
+    immediately.
+    """
     angle = stored_variable(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
         return None
@@ -53,7 +55,7 @@ class Comparison:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Largest errors of both legs by alignment; None for an alignment without a comparison."""
+        """Largest errors of both legs by alignment, or None for an alignment without a comparison."""
         errors: dict[str, Any] = {}
         for name, quantity in QUANTITY_KEYS.items():
             per_leg = {way: self.errors[way].largest(quantity) if way in self.errors else None for way in ALIGNMENTS}
@@ -65,7 +67,7 @@ class Comparison:
 def compare_motion(
     rigid: comparison.Motion | None, contact: comparison.Motion | None, meaning: str = "contact less rigid model"
 ) -> Comparison:
-    """Compare two walks in time, in phase and as orbits, second minus first; `meaning` describes the difference."""
+    """Compare two walks in time, in phase and as orbits, second minus first. `meaning` describes the difference."""
     if rigid is None or contact is None:
         why = "states of both walks are not available: outputs omits them, or a walk ended immediately"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
@@ -110,7 +112,7 @@ def select(difference: comparison.WalkDifference, where: Any) -> comparison.Walk
 def differences(
     way: str, difference: comparison.WalkDifference, dims: tuple[str, ...], meaning: str
 ) -> dict[str, Variable]:
-    """Return differences of angles and velocities as variables to store; `way` is their alignment."""
+    """Return differences of angles and velocities as variables to store. `way` is their alignment."""
     return {
         f"{way}_angle_error_rad": Variable(difference.angle, dims, "rad", f"angle, {meaning}"),
         f"{way}_velocity_error_rad_s": Variable(difference.velocity, dims, "rad/s", f"velocity, {meaning}"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from walkerlab.config import reads
-from walkerlab.extensions import INTERFACE, Extension, Study, later
+from walkerlab.extensions import INTERFACE, Extension, Study, lazy_function
 from walkerlab.pipeline.plan.stage import DRAWINGS, Option, Stage, results_of, walks_and
 
 WITH = ("--with",)
@@ -23,7 +23,7 @@ STAGES = (
         "tune", "walkerlab.evidence.paper.tune",
         "Adjust the initial velocities until the contact model walks; report how much was needed, and why.",
         reads.TuneConfig, results_of("fixedpoint"), requires=("contact",), needed_by=("report",), shown_by=("plot",),
-        does_without=later("walkerlab.evidence.paper.omissions:adjustment_omissions"),
+        does_without=lazy_function("walkerlab.evidence.paper.omissions:adjustment_omissions"),
     ),
 )  # fmt: skip
 EXTENSION = Extension(

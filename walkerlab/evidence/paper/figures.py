@@ -89,7 +89,9 @@ def draw_differences(results: Results) -> Drawn:
 
 
 def largest_of_recorded(summary: Mapping[str, Any]) -> tuple[str, list[tuple[str, float, str]]] | None:
-    """Return the recorded walk's name and its largest differences from the rigid one in phase; None if not recorded."""
+    """Return the recorded walk's name and its largest differences from the rigid one in phase, or None if
+    not recorded.
+    """
     if not summary:
         return None
     differences = summary["differences"]["rigid"]

@@ -5,7 +5,7 @@ Results with the equations as printed depend on this file, so the rest of the st
 
 from typing import Any
 
-from walkerlab.config.numbers import same
+from walkerlab.config.numbers import are_equal
 from walkerlab.config.walkers import CompassWalker, is_passive_compass
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 
@@ -14,7 +14,7 @@ def is_own_walker(config: Any) -> bool:
     """Whether a config has the paper's walker, up to rounding of its values."""
     walker, paper = config.walker, CompassWalker()
     return is_passive_compass(config) and all(
-        same(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
+        are_equal(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
     )
 
 

@@ -24,7 +24,7 @@ ENERGY_STEPS = 5  # steps over which the paper averages the energy
 
 @dataclass(frozen=True)
 class Characteristics:
-    """Quantities of Table 3, SI units; None if the walk or its record is too short."""
+    """Quantities of Table 3, SI units, or None if the walk or its record is too short."""
 
     t_left: float | None  # period of the first step of the last completed stride
     t_right: float | None  # period of the second step of that stride
@@ -55,8 +55,10 @@ class EnergyRecord:
     most: float
 
 
-def over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
-    """Average a sampled energy (J) over the last five completed steps (all if fewer); None if no step was completed."""
+def mean_over_last_steps(time: Array, energy: Array, step_ends: Array) -> EnergyRecord | None:
+    """Average a sampled energy (J) over the last five completed steps (all if fewer), or return None if no step was
+    completed.
+    """
     if step_ends.size == 0:
         return None
     start = step_ends[-1 - ENERGY_STEPS] if step_ends.size > ENERGY_STEPS else time[0]
@@ -82,7 +84,7 @@ class RigidMeasurements:
 
 
 def measure_rigid_model(walker: RigidWalker, state: State) -> RigidMeasurements:
-    """Walk five cycles from a gait's fixed point; energies are measured from the current stance foot."""
+    """Walk five cycles from a gait's fixed point. Energies are measured from the current stance foot."""
     model = assembled(walker)
     walk = take_walk(model, TIGHT, state, 2 * PAPER_CYCLES, sampled=True)
     assert walk.samples is not None

@@ -1,4 +1,4 @@
-"""Effects of Appendix A's misprints; the heel strike solves the six equations of (A.57) as printed."""
+"""Effects of Appendix A's misprints. The heel strike solves the six equations of (A.57) as printed."""
 
 import math
 
@@ -34,7 +34,7 @@ def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Ar
 
 
 def swing_foot(walker: RigidWalker, theta_1: float, theta_2: float, row_2: float) -> Array:
-    """Position P (m) of the swing foot, (A.55), with the stance foot at the origin; `row_2` is RIGHT or MISPRINTED."""
+    """Position P (m) of the swing foot, (A.55), with the stance foot at the origin. `row_2` is RIGHT or MISPRINTED."""
     L = walker.leg_length
     rise = L * (math.cos(theta_2) - math.cos(theta_1))
     return np.array([L * (math.sin(theta_1) - math.sin(theta_2)), row_2 * rise])
@@ -73,7 +73,7 @@ def foothold_speed_after_impact(walker: RigidWalker, before: State, row_2: float
 
 
 def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
-    """Return the state after one step with the impact of (A.57); None if no heel strike occurs."""
+    """Return the state after one step with the impact of (A.57), or None if no heel strike occurs."""
     walk = take_walk(assembled(walker), TIGHT, start, 1)
     if walk.steps == 0:
         return None
@@ -83,7 +83,9 @@ def step(walker: RigidWalker, start: State, row_2: float) -> State | None:
 
 
 def fixed_point(walker: RigidWalker, guess: State, row_2: float) -> State | None:
-    """Find the fixed point, near `guess`, of the step map with the impact of (A.57); None if the search fails."""
+    """Find the fixed point, near `guess`, of the step map with the impact of (A.57), or return None if the search
+    fails.
+    """
 
     def state(z: Array) -> State:
         return -2.0 * walker.slope - float(z[0]), float(z[0]), float(z[1]), float(z[2])

@@ -167,19 +167,19 @@ def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
 
 
 def walker_of_the_paper(c21_sign: float) -> RigidWalker:
-    """Walker of Table 1 on the slope of x_p, with the masses at mid-leg; `c21_sign`: CORRECTED or AS_PRINTED."""
+    """Walker of Table 1 on the slope of x_p, with the masses at mid-leg. `c21_sign` is CORRECTED or AS_PRINTED."""
     length, mass, hip, gravity = (entry.value for entry in TABLE_1)
     return RigidWalker(length, 0.5 * length, mass, hip, LEG_INERTIA.value, gravity, slope_of(*X_P[:2])[0], c21_sign)
 
 
-def printed_speed(cycle: float) -> float:
+def speed_as_printed(cycle: float) -> float:
     """Speed (m/s) as section 5 computes it: the printed step length divided by the time (s) of a cycle."""
     return STEP_LENGTH.value / cycle
 
 
 def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
     """Relative difference (%) of the speeds implied by two cycle times (s)."""
-    matlab, adams = printed_speed(matlab_cycle), printed_speed(adams_cycle)
+    matlab, adams = speed_as_printed(matlab_cycle), speed_as_printed(adams_cycle)
     return 100.0 * abs(adams - matlab) / matlab
 
 
@@ -189,7 +189,8 @@ def softening_in_metres() -> float:
 
 
 def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
-    """Return the paper's resting foot for three readings of Fig. 4b: N, mm, s; SI; ADAMS defaults in metres.
+    """Return the paper's resting foot for three readings of Fig. 4b: in N, mm and s, in SI, and as ADAMS defaults in
+    metres.
 
     Adams View converts a default stiffness as force over length, whatever the exponent. The same dialog in a model in
     metres therefore means a stiffness 1000^(exponent - 1) times lower than 10^5 N/mm^exponent.

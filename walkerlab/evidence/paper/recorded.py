@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from walkerlab.evidence.paper.differences import Comparison, compare_motion, motion_of, stored_variable, times_of_steps
-from walkerlab.evidence.paper.measured import Characteristics, EnergyRecord, characteristics, over_last_steps
+from walkerlab.evidence.paper.measured import Characteristics, EnergyRecord, characteristics, mean_over_last_steps
 from walkerlab.pipeline.stages.walk import last_step
 from walkerlab.pipeline.store.content import Content, Group
 
@@ -15,7 +15,7 @@ MODELS = {"rigid": "simulate", "contact": "contact-sim"}
 
 
 def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], dict[str, Any]]:
-    """Return groups and summary of the recorded walk's differences from each model; empty if no walk was recorded."""
+    """Return groups and summary of the recorded walk's differences from each model, or () if no walk was recorded."""
     recorded = inputs.get("recorded-walk")
     if recorded is None:
         return {}, {}
@@ -40,15 +40,15 @@ def compare_recorded(inputs: Mapping[str, Content]) -> tuple[dict[str, Group], d
 
 
 def characteristics_of(walk: Content) -> Characteristics:
-    """Return the quantities of Table 3 for a stored walk; the mean energy is None if energies were not stored."""
+    """Return the quantities of Table 3 for a stored walk. The mean energy is None if energies were not stored."""
     periods, lengths = (np.array(walk.summary[key]) for key in ("step_periods_s", "step_lengths_m"))
     energy = stored_energy(walk)
     return characteristics(periods, lengths, None if energy is None else energy.mean)
 
 
 def stored_energy(walk: Content) -> EnergyRecord | None:
-    """Return the energy of a stored walk over its last steps; None if energies were not stored."""
+    """Return the energy of a stored walk over its last steps, or None if energies were not stored."""
     joules = stored_variable(walk, "trajectory", "mechanical_J")
     if joules is None:
         return None
-    return over_last_steps(walk["trajectory"]["time"], joules, times_of_steps(walk, "touch_time_s"))
+    return mean_over_last_steps(walk["trajectory"]["time"], joules, times_of_steps(walk, "touch_time_s"))

@@ -31,7 +31,7 @@ class NumberVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class JudgedNumber:
-    """Printed value and the models' values, in the printed unit; None if a model has no such value."""
+    """Printed value and the models' values, in the printed unit, or None if a model has no such value."""
 
     where: str
     quantity: str
@@ -50,7 +50,7 @@ Scene = Literal["rigid", "contact", "any"]
 
 
 def count_verdicts(rows: Iterable[JudgedNumber]) -> dict[str, int]:
-    """Count values by verdict; `refuted` repeats the sum of the last two verdicts until 0.3 is released."""
+    """Count values by verdict. `refuted` repeats the sum of the last two verdicts until 0.3 is released."""
     verdicts = Counter(row.verdict for row in rows)
     by_class = {verdict.value: verdicts[verdict] for verdict in NumberVerdict}
     return {**by_class, "refuted": verdicts[CONTRADICTED] + verdicts[NOT_REPRODUCED]}
@@ -98,7 +98,7 @@ class Judge:
         scene: Scene,
         evidence: str,
     ) -> JudgedNumber:
-        """Build the row of a printed value; `rigid` holds the rigid model's values by set of equations.
+        """Build the row of a printed value. `rigid` holds the rigid model's values by set of equations.
 
         verdict  verdict on the paper's own scene; replaced if another value of the paper contradicts the printed one
         """
@@ -199,7 +199,7 @@ class Judge:
         return self.row(entry, lengths, contact, verdict_if(agrees), "rigid", text)
 
     def velocity_difference(self) -> JudgedNumber:
-        """Judge the difference of the average velocities; the evidence includes the paper's own arithmetic."""
+        """Judge the difference of the average velocities. The evidence includes the paper's own arithmetic."""
         entry, contact = printed.VELOCITY_DIFFERENCE, self.measured.contact.table_3.v_com
         speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
         percentages = {

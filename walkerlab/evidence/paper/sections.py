@@ -5,13 +5,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.labels import with_unit
+from walkerlab.labels import add_unit
 from walkerlab.views.report.answers import last_steps
 from walkerlab.views.report.blocks import PAPER_PAGE, PageBlock, Paragraph, Section, Shares, Statement, Statements
 from walkerlab.views.report.numbers import count, number
 from walkerlab.views.report.outcomes import describe_error
 from walkerlab.views.report.results import Results
-from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.symbols import typeset
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
 from walkerlab.views.report.words import words
 
@@ -50,10 +50,10 @@ def numbers_table(rows: Sequence[Row]) -> Table:
     models = [key for key in MODEL_COLUMNS if any(row.get(key) is not None for row in rows)]
     columns = (
         Column("quantity", lambda row: name_with_unit(row["quantity"], row.get("unit"))),
-        Column("printed", "printed", in_signs, numeric=True),
+        Column("printed", "printed", typeset, numeric=True),
         *(Column(MODEL_COLUMNS[key], key, number, numeric=True) for key in models),
         Column("verdict", "verdict", lambda verdict: Cell(spell_verdict(verdict), TONES.get(verdict, "plain"))),
-        Column("evidence", "evidence", in_signs, wide=True),
+        Column("evidence", "evidence", typeset, wide=True),
     )
     caption = "What the paper prints, and what its equations give"
     return table(caption, columns, grouped(rows, "where"), wordy=True, by="where")
@@ -70,11 +70,11 @@ def spell_verdict(verdict: str) -> str:
 
 
 def name_with_unit(name: str, unit: str | None) -> str:
-    return in_signs(with_unit(name, "unit not given" if unit == "not given" else unit or ""))
+    return typeset(add_unit(name, "unit not given" if unit == "not given" else unit or ""))
 
 
 def compared(results: Results, key: str) -> Sequence[Row]:
-    """Return rows of the summary of `compare`; empty if it did not run, or if the walker is not the paper's."""
+    """Return rows of the summary of `compare`, or nothing if it did not run, or if the walker is not the paper's."""
     rows: Sequence[Row] = results.summary("compare").get(key, ())
     return rows
 
@@ -102,7 +102,7 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
             continue
         texts = any(isinstance(row.get(key), str) for row in rows.values())
         as_text = texts or any(f"{key}{TEXT_SUFFIX}" in row for row in rows.values())
-        written = in_signs if as_text else partial(number, digits=3 if "percent" in key else 6)
+        written = typeset if as_text else partial(number, digits=3 if "percent" in key else 6)
         source = key if texts or not as_text else f"{key}{TEXT_SUFFIX}"
         columns.append(Column(heads.get(key, key.replace("_", " ")), source, written, numeric=not texts))
     names = {symbol: f"{name}, {symbol}" for symbol, name in words.terms("paper.quantities").items()}
@@ -115,9 +115,9 @@ def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
 
 
 ERRATUM_COLUMNS = (
-    Column("where", "where", in_signs),
-    *(Column(name, name, in_signs, wide=True) for name in ("printed", "right", "evidence")),
-    Column("measured here", "measured", in_signs, wide=True),
+    Column("where", "where", typeset),
+    *(Column(name, name, typeset, wide=True) for name in ("printed", "right", "evidence")),
+    Column("measured here", "measured", typeset, wide=True),
 )
 
 
@@ -129,7 +129,7 @@ def errors(results: Results) -> Section | None:
 
 
 def paper_section(results: Results) -> Section | None:
-    """Show verdicts on the paper's values and its gravest errors; None for another scene."""
+    """Summarise the verdicts on the paper's values and its most serious errors, or return None for any other scene."""
     rows = results.claims
     if not rows:
         return None
@@ -158,7 +158,7 @@ def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
     if gravest:
         yield Paragraph(words("verdict.reasons"))
         statements = (
-            Statement(in_signs(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
+            Statement(typeset(f"{headline} ({erratum['where']}):"), words("verdict.gravest", erratum), tone="fair")
             for headline, erratum in gravest
         )
         yield Statements(tuple(statements), "columns")
@@ -173,7 +173,7 @@ RECORDED_COLUMNS = (
 
 
 def recorded(results: Results) -> Section | None:
-    """Compare the recorded walk with both models; None if no walk was recorded."""
+    """Compare the recorded walk with both models, or return None if no walk was recorded."""
     stored = results.summary("compare").get("recorded")
     if stored is None:
         return None

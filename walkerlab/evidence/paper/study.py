@@ -1,4 +1,4 @@
-"""Measurements on the paper's own walker and slope, for its errata; independent of the config."""
+"""Measurements on the paper's own walker and slope, for its errata. They do not depend on the config."""
 
 import math
 from collections.abc import Mapping
@@ -46,7 +46,7 @@ class PaperStudy:
 
 
 def study_the_paper() -> PaperStudy:
-    """Make all measurements on the paper's own walker and slope; takes milliseconds once compiled."""
+    """Make all measurements on the paper's own walker and slope, which takes milliseconds once compiled."""
     wrong, right = printed.walker_of_the_paper(AS_PRINTED), printed.walker_of_the_paper(CORRECTED)
     x_p = printed.fixed_point_as_printed()
     as_printed, corrected = settle(wrong), settle(right)

@@ -1,4 +1,4 @@
-"""Stage `tune`: repeat the paper's parameter adjustment for any walker; report its need, size and causes."""
+"""Stage `tune`: repeat the paper's parameter adjustment for any walker, and report its need, size and causes."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -54,11 +54,11 @@ from walkerlab.scene.contact import (
     tolerances_of,
 )
 from walkerlab.scene.rigid import rigid_walker, state_names
-from walkerlab.scene.scaled import for_a_map, starts_of
+from walkerlab.scene.scaled import scale_for_map, starts_of
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
-AS_IT_STANDS = (1.0, 1.0)  # factors that leave the velocities of the rigid start unchanged
+UNCHANGED_START = (1.0, 1.0)  # factors that leave the velocities of the rigid start unchanged
 # walks with knees or rolling feet take several times longer to compute, so their map and margins are coarser
 COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
 SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
@@ -67,7 +67,10 @@ WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengt
 
 
 def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Adjust the start; possibly no start walks. Raises NoAnswer if the pads need a gait that does not exist."""
+    """Adjust the start, which fails if no start walks.
+
+    Raises NoAnswer if the pads need a gait that does not exist.
+    """
     rigid_step, rigid_state = rigid_start(config, inputs)
     rigid_gait = inputs["fixedpoint"].summary  # gait of the rigid model; the start may be far from it
     gait = contact_gait(config, rigid_step, as_state(rigid_gait["state"]))
@@ -118,8 +121,8 @@ class TuneRun:
         if self.pins_foot:
             self.take("hinged", self.rigid_state)
         self.take("released", self.rigid_state)
-        self.as_it_stands = self.starts.walk(*AS_IT_STANDS)
-        quick = for_a_map(self.starts, self.as_it_stands.evaluations)
+        self.as_it_stands = self.starts.walk(*UNCHANGED_START)
+        quick = scale_for_map(self.starts, self.as_it_stands.evaluations)
         rows = in_order([partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs)
         cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
         self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
@@ -136,10 +139,12 @@ class TuneRun:
             self.paper = adams_walk(self.rigid, self.walk, self.scene.walker, terrain)
 
     def adjusted(self, quick: scaled_starts.ScaledStarts) -> scaled_starts.Adjustment | None:
-        """Return the smallest change of the velocities with which the contact model walks; None if it never walks."""
+        """Return the smallest change of the velocities with which the contact model walks, or None if it
+        never walks.
+        """
         cells = self.contact_map
         if self.as_it_stands.walks:
-            return scaled_starts.Adjustment(*AS_IT_STANDS, self.as_it_stands)
+            return scaled_starts.Adjustment(*UNCHANGED_START, self.as_it_stands)
         if not cells.walking.size:
             return None
         swing, stance = (float(np.ptp(factors)) / (factors.size - 1) for factors in (cells.swing, cells.stance))
@@ -147,7 +152,7 @@ class TuneRun:
 
     @property
     def gait_factors(self) -> tuple[float, float] | None:
-        """Position of the gait on the map, from the end of the adjusted walk; None if it cannot be determined.
+        """Position of the gait on the map, from the end of the adjusted walk, or None if it cannot be determined.
 
         The factors are velocities of the last step, once the rear foot has lifted, divided by those of the rigid start.
         """
@@ -247,7 +252,7 @@ def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
 
 
 def percent(value: float, reference: float, base: float) -> float | None:
-    """Return the increase in magnitude over `reference`, in percent of `base`; None for a base of zero."""
+    """Return the increase in magnitude over `reference`, in percent of `base`, or None for a base of zero."""
     return 100.0 * (abs(value) - abs(reference)) / abs(base) if base else None
 
 
@@ -282,17 +287,17 @@ def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
     """Return descriptions and units of a gait's coordinates on its section."""
     walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
 
-    def of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
+    def coordinates_of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
         roles = ["stance" if body in walker.legs[STANCE_FOOT] else "swing" for body in bodies]
         bare = [names[body].rstrip(" 0123456789") for body in bodies]
         return [(f"{quantity} of the {role} {name}", unit) for role, name in zip(roles, bare, strict=True)]
 
     return [
         ("height of the centre of mass over the slope", "m"),
-        *of("angle", "rad", angled_bodies(walker, STANCE_FOOT)),
+        *coordinates_of("angle", "rad", angled_bodies(walker, STANCE_FOOT)),
         ("velocity of the centre of mass along the slope", "m/s"),
         ("velocity of the centre of mass normal to the slope", "m/s"),
-        *of("angular velocity", "rad/s", turning_bodies(walker, STANCE_FOOT)),
+        *coordinates_of("angular velocity", "rad/s", turning_bodies(walker, STANCE_FOOT)),
     ]
 
 
@@ -346,7 +351,7 @@ def groups(tune: TuneRun) -> dict[str, Group]:
 
 
 def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Variable]:
-    """Return angles and velocities of the legs; empty if the walk has no samples."""
+    """Return angles and velocities of the legs, or none if the walk has no samples."""
     if walk.samples is None:
         return {}
     angle, velocity = leg_motion(walk.samples.states, walker)

@@ -87,7 +87,7 @@ def limit_findings(
     walk: RigidWalkResult,
     progress: Progress,
 ) -> LimitFindings | None:
-    """Take the contact to the rigid limit; None if the rigid walk has no samples or no step.
+    """Take the contact to the rigid limit, or return None if the rigid walk has no samples or no step.
 
     rigid_gait  summary of `fixedpoint`
     walk        walk of the rigid model from the start

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 def compass(config: RigidConfig, equations: Equations) -> RigidWalker:
-    """Return a config's passive compass as a walker of Appendix A; raise ValueError for another walker."""
+    """Return a config's passive compass as a walker of Appendix A.
+
+    Raises ValueError for another walker.
+    """
     walker = config.walker
     if not isinstance(walker, CompassWalker) or walker.torso is not None:
         raise ValueError(f"Appendix A does not describe walkers of type {walker.type}")

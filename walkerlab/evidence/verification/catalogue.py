@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 from walkerlab.config.fields import Block
 from walkerlab.config.overlay import paper_config_with
 from walkerlab.config.reader import read
-from walkerlab.config.schema import Config, state_of, with_state
+from walkerlab.config.schema import Config, replace_state, state_of
 from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.tree import plain
 from walkerlab.config.walkers import has_knees
@@ -48,7 +48,10 @@ def read_catalogue(path: Path) -> Any:
 
 
 def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
-    """Return a catalogue's cases (default: the package's), then a config's; raises ConfigError if two share a name."""
+    """Return a catalogue's cases (default: the package's), then a config's.
+
+    Raises ConfigError if two share a name.
+    """
     catalogue = package_cases() if catalogue is None else catalogue
     shared = {case.name for case in catalogue} & {case.name for case in own}
     if shared:
@@ -57,7 +60,10 @@ def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> t
 
 
 def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """Return the cases as a tuple; raises ConfigError if two share a name."""
+    """Return the cases as a tuple.
+
+    Raises ConfigError if two share a name.
+    """
     names = [case.name for case in cases]
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
@@ -66,7 +72,10 @@ def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:
 
 
 def config_of(case: Case) -> Config:
-    """Apply a case's changes to the paper's config; raises ConfigError if the result is invalid."""
+    """Apply a case's changes to the paper's config.
+
+    Raises ConfigError if the result is invalid.
+    """
     return paper_config_with(case.config, f"case {case.name}")
 
 
@@ -98,7 +107,7 @@ def features(config: Config) -> set[str]:
 
 
 def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
-    """Apply a case's changes to a scene; a new slope also turns the start's angles, so that both feet stand on it."""
+    """Apply a case's changes to a scene. A new slope also turns the start's angles, so that both feet stand on it."""
     start, slope = changes.get("start", 1.0), changes.get("slope", 1.0) * config.slope_rad
     values = dict(changes.get("set", {}))
     values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}
@@ -107,13 +116,13 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
         state, rotation = state_of(config.start), config.slope_rad - slope
         n = len(state) // 2
         turned = (*(x + rotation for x in state[:n]), *(start * x for x in state[n:]))
-        values |= {"slope_rad": slope, "start": with_state(config.start, turned)}
+        values |= {"slope_rad": slope, "start": replace_state(config.start, turned)}
     for path, value in values.items():
-        config = with_key(config, path, value)
+        config = replace_key(config, path, value)
     return config
 
 
-def with_key(block: B, path: str, value: Any) -> B:
+def replace_key(block: B, path: str, value: Any) -> B:
     """Return a copy of a block with the value at a dotted path replaced."""
     name, _, tail = path.partition(".")
-    return block.model_copy(update={name: with_key(getattr(block, name), tail, value) if tail else value})
+    return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from walkerlab.config import reads
-from walkerlab.extensions import INTERFACE, Extension, later
+from walkerlab.extensions import INTERFACE, Extension, lazy_function
 from walkerlab.pipeline.plan.stage import DRAWINGS, Stage, gait_for_start_or_pads
 from walkerlab.scene.studies import is_studied
 
@@ -51,7 +51,7 @@ STAGES = (
         "stability", "walkerlab.evidence.verification.stability",
         "Verify extreme cases and problems with known answers.",
         cases_config, known_problems_and_start, depends_on=paper_walks, needed_by=("report",), checks=check_cases,
-        does_without=later("walkerlab.evidence.verification.omissions:verification_omissions"),
+        does_without=lazy_function("walkerlab.evidence.verification.omissions:verification_omissions"),
     ),
     Stage(
         "stability-maps", "walkerlab.evidence.verification.stability_maps",

@@ -1,4 +1,4 @@
-"""Judgement of cases; walks are repeated with a ten times tighter tolerance, another method and a scaled twin."""
+"""Judgement of cases. Each walk is repeated with a ten times tighter tolerance, another method and a scaled twin."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -13,7 +13,14 @@ from walkerlab.evidence.verification.catalogue import config_of
 from walkerlab.evidence.verification.ordinary import Choice, choices
 from walkerlab.evidence.verification.scaling import scaled, to_twin
 from walkerlab.evidence.verification.starts import ContactStart, JudgedWalk, Start, case_tolerances, prepare_start
-from walkerlab.evidence.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured, finite, promised
+from walkerlab.evidence.verification.verdict import (
+    BUDGET_USED,
+    CaseResult,
+    Measure,
+    NotMeasured,
+    allowed_difference,
+    finite,
+)
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS, Method, method_named
 from walkerlab.pipeline.run.workers import in_order
@@ -48,14 +55,14 @@ class CaseCell:
 
 
 def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult | Choice, ...]]:
-    """Yield results in case order. One case per model runs first, to compile; the others start by decreasing budget."""
+    """Yield results in case order. One case per model runs first, to compile. The others start by decreasing budget."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
     return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
 
 
 def judge(case: Case, config: Config) -> CaseResult:
-    """Walk a case and judge it; walks of more than `SAMPLED_STEPS` steps are not sampled."""
+    """Walk a case and judge it. Walks of more than `SAMPLED_STEPS` steps are not sampled."""
     about = case.name, case.family, case.model, case.reason, case.expected
     start = prepare_start(config, case)
     if start is None:
@@ -73,7 +80,7 @@ def judge(case: Case, config: Config) -> CaseResult:
     remarks: list[str] = []
     second = Second("", None, f"the walk itself ended as {walk.outcome.label}")
     if walk.outcome.answered:
-        short = start.again(case)
+        short = start.repeated_case(case)
         second = second_walk(
             methods.method,
             case.budget,
@@ -109,7 +116,9 @@ def repeat_walks(start: Start, config: Config, case: Case, second: Second) -> li
 
 
 def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case, rtol: float) -> list[Measure]:
-    """Compare the touch times of two walks, or their end times if one has no touch; empty if an end time is missing."""
+    """Compare the touch times of two walks, or their end times if one has no touch, or return an empty list if an end
+    time is missing.
+    """
     steps = min(first.touches.size, second.touches.size, case.compared_steps)
     if steps:
         difference = float(np.max(np.abs(first.touches[:steps] - second.touches[:steps])))
@@ -117,7 +126,7 @@ def time_difference(what: str, first: JudgedWalk, second: JudgedWalk, case: Case
         return []
     else:
         difference = abs(first.end - second.end)
-    limit = promised(case, rtol, first.accepted + second.accepted)
+    limit = allowed_difference(case, rtol, first.accepted + second.accepted)
     return [Measure(f"difference in time from {what}, in pendulum times", finite(difference), limit)]
 
 
@@ -128,7 +137,7 @@ def other_methods(configured: str) -> tuple[Method, ...]:
 
 
 def second_walk(configured: str, budget: int, walk: Callable[[Method, int], JudgedWalk]) -> Second:
-    """Walk with other methods until one has an answer; `budget` limits right-hand sides (libraries may get fewer)."""
+    """Walk with other methods until one has an answer. `budget` limits right-hand sides (libraries may get fewer)."""
     tried: list[str] = []
     for method in other_methods(configured):
         result = walk(method, budget if method.compiled else min(budget, LIBRARY_BUDGET))

@@ -63,7 +63,7 @@ def rig(
     feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
     slope: float = 0.0,
 ) -> ContactWalker:
-    """Build a walker that acts as one rigid body; `feet`: its point feet (m from its centre of mass).
+    """Build a walker that acts as one rigid body. `feet` holds its point feet (m from its centre of mass).
 
     The idle second body is hinged at the centre of mass and has the same inertia but no mass.
     """
@@ -83,7 +83,10 @@ def rig_state(position: Position, velocity: Position, angle: float = 0.0, rate: 
 def run_until(
     walker: ContactWalker, start: State, duration_s: float, rtol: float = 1e-9, atol: float = 1e-12
 ) -> ParticleRun:
-    """Simulate for `duration_s`, with evenly spaced samples; raises ArithmeticError if the run ends early."""
+    """Simulate for `duration_s`, with evenly spaced samples.
+
+    Raises ArithmeticError if the run ends early.
+    """
     frame = Frame(-UNBOUNDED_M, 2.0 * duration_s / LONGEST_FLIGHT, True)
     ground = JudgedGround(checkerboard(UNBOUNDED_M, (0.0, 0.0)), frame)
     walk_state = new_walk_state(walker, ground, 1, 1, start)
@@ -130,7 +133,7 @@ def solve_problem(
     limit: float,
     why: str,
 ) -> Known:
-    """Solve a problem with the contact code (`run`) and by its reference; a failed run never meets the limit."""
+    """Solve a problem with the contact code (`run`) and by its reference. A failed run never meets the limit."""
     started = time.perf_counter()
     reference = reference_by()
     try:

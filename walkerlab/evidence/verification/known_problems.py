@@ -1,4 +1,6 @@
-"""Stage `known-problems`: problems with known answers, solved with the contact code; independent of the scene."""
+"""Stage `known-problems`: problems with known answers, solved with the contact code. They do not depend on
+the scene.
+"""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -11,7 +13,7 @@ from walkerlab.pipeline.store.content import Content
 
 
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Solve every problem. Wrong answers are stored like right ones; the stage `stability` reports them."""
+    """Solve every problem. Wrong answers are stored like right ones, and the stage `stability` reports them."""
     rows = []
     for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
         result = problem()

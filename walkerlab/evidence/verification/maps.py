@@ -77,7 +77,8 @@ def stiction_cell(stiffness: float, stiction_velocity: float) -> Numbers:
 
 
 def step_column(stiffness: float, steps_s: tuple[float, ...]) -> Numbers:
-    """Walk two steps at one stiffness by semi-implicit Euler with each step size (s); compare with a tight reference.
+    """Walk two steps at one stiffness by semi-implicit Euler with each step size (s), and compare them with a tight
+    reference.
 
     Returns, for each step size, the verdict's index in `VERDICT_NAMES` and the error, in the units of `stiction_cell`.
     """

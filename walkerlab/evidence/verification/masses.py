@@ -31,7 +31,9 @@ class Masses:
         self.inertia = np.array([body.inertia_kg_m2 for body in assembly.bodies])
 
     def moving(self, psi: Floats, rate: Floats) -> tuple[Floats, Floats]:
-        """Return positions and velocities (..., masses, 2) from the reference point; psi, rate: (..., bodies)."""
+        """Return positions and velocities (..., masses, 2) from the reference point. `psi` and `rate` are (...,
+        bodies).
+        """
         arms = rotate(self.levers, psi[..., None, :])
         swept = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * rate[..., None, :, None]
         return arms.sum(axis=-2), swept.sum(axis=-2)
@@ -45,7 +47,7 @@ def rotate(d: Floats, psi: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Moving:
-    """Motion of a walker's masses and bodies at an instant; the origin is on the ground under the stance foot."""
+    """Motion of a walker's masses and bodies at an instant. The origin is on the ground under the stance foot."""
 
     mass: Floats  # (masses,) kg
     place: Floats  # (masses, 2) m
@@ -60,8 +62,10 @@ class Moving:
         """Kinetic energy (J)."""
         return float(0.5 * self.mass @ (self.velocity**2).sum(axis=1) + 0.5 * self.inertia @ self.rate**2)
 
-    def about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
-        """Return the angular momentum (kg m^2/s) about a point; `on_masses`, `on_bodies`: weights of their terms."""
+    def momentum_about(self, point: Floats, on_masses: Floats, on_bodies: Floats) -> float:
+        """Return the angular momentum (kg m^2/s) about a point. `on_masses` and `on_bodies` are the weights of their
+        terms.
+        """
         arm = self.place - point
         orbital = self.mass * (arm[:, 0] * self.velocity[:, 1] - arm[:, 1] * self.velocity[:, 0])
         return float(on_masses @ orbital + on_bodies @ (self.inertia * self.rate))
@@ -71,7 +75,7 @@ class RigidMasses:
     """Momenta and energy of a walker in states of the rigid model, computed from its point masses."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
-        """Measure levers from the centre of the stance foot's arc; slope in rad."""
+        """Measure levers from the centre of the stance foot's arc. The slope is in rad."""
         foot, trailing, hip = assembly.feet[STANCE], assembly.feet[SWING], find_hip(assembly)
         root = Anchor(foot.body, foot.centre_m)
         self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
@@ -97,7 +101,7 @@ class RigidMasses:
         return [self.pose(state) for state in states]
 
     def share_of(self, leg: int) -> Floats:
-        """Return the share (bodies,) of each body that belongs to a leg; coupled bodies belong to it in part."""
+        """Return the share (bodies,) of each body that belongs to a leg. Coupled bodies belong to it in part."""
         names, of_leg = [body.name for body in self.assembly.bodies], self.assembly.legs[leg]
         share = np.array([1.0 if name in of_leg else 0.0 for name in names])
         for coupling in self.assembly.couplings:
@@ -115,11 +119,11 @@ class RigidMasses:
         """
         share = self.shares[SWING if new else STANCE]
         foothold = np.zeros(2) if new else moving.contact
-        walker_momentum = moving.about(foothold, np.ones(len(self.owner)), np.ones(share.size))
-        return walker_momentum, moving.about(moving.hip, share[self.owner], share)
+        walker_momentum = moving.momentum_about(foothold, np.ones(len(self.owner)), np.ones(share.size))
+        return walker_momentum, moving.momentum_about(moving.hip, share[self.owner], share)
 
     def momentum_change(self, before: Sequence[Moving], after: Sequence[Moving], push_off: float = 0.0) -> float:
-        """Return the largest relative change of the conserved momenta over heel strikes; push_off in N s."""
+        """Return the largest relative change of the conserved momenta over heel strikes. `push_off` is in N s."""
         change, size = 0.0, 1e-300
         for old, new in zip(before, after, strict=True):
             at_start, at_end = np.array(self.momenta(old, new=False)), np.array(self.momenta(new, new=True))
@@ -135,7 +139,7 @@ def moment_of(push_off: float, moving: Moving) -> float:
 
 
 def energy_won(before: Sequence[Moving], after: Sequence[Moving]) -> float:
-    """Return the largest gain of kinetic energy (J) in a heel strike; 0 if all of them lose energy."""
+    """Return the largest gain of kinetic energy (J) in a heel strike, or 0 if all of them lose energy."""
     return max(0.0, *(new.kinetic - old.kinetic for old, new in zip(before, after, strict=True)))
 
 

@@ -15,7 +15,7 @@ from walkerlab.config.reads import RigidConfig, WalksConfig
 from walkerlab.config.stability import Case
 from walkerlab.evidence.verification.masses import Masses
 from walkerlab.evidence.verification.scaling import pendulum_time
-from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasured, finite, promised
+from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasured, allowed_difference, finite
 from walkerlab.physics.ground.friction import steepest_change
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import sample_feet
@@ -59,7 +59,7 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
     # step errors add up without growing, because the balance holds along the computed path: no factor MAGNIFIED
-    limit = promised(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
+    limit = allowed_difference(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
     return Measure(MEASURE, finite(balance.residual), limit)
 
 
@@ -78,7 +78,7 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
         pushed = (walk.touch_time_s[:, None] + pulse).ravel()
         grid = np.union1d(grid, pushed[pushed < walk.end_time_s])
     for _ in range(MAX_PASSES):
-        samples = scene.walk(start, steps, tolerances, with_middles(grid)).samples
+        samples = scene.walk(start, steps, tolerances, add_midpoints(grid)).samples
         assert samples is not None, "the walk is sampled"
         rates = impulse_rate(samples, scene, config, walk.touch_time_s) / scale
         change = unsettled(samples.time_s, rates)
@@ -96,20 +96,24 @@ def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, cas
     return Balance(float(differences.max()), float(change.sum()), push / max(1, accepted) ** 0.5, accepted)
 
 
-def with_middles(grid: Floats) -> Floats:
+def add_midpoints(grid: Floats) -> Floats:
     """Return the ends and midpoints of intervals in ascending order."""
     return np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])]))
 
 
 def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
-    """Return the ends of intervals after splitting those marked in `wanting` into four; times: ends and midpoints."""
+    """Return the ends of intervals after splitting those marked in `wanting` into four. `times` holds ends and
+    midpoints.
+    """
     first, middle, last = times[:-1:2], times[1::2], times[2::2]
     halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
     return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
 
 
 def impulse(times: Floats, rate: Floats) -> Floats:
-    """Integrate a rate (times, components) by Simpson's rule up to each interval's end; returns (ends, components)."""
+    """Integrate a rate (times, components) by Simpson's rule up to the end of each interval. Returns (ends,
+    components).
+    """
     widths = np.diff(times[::2])[:, None]
     pieces = widths / 6.0 * (rate[:-1:2] + 4.0 * rate[1::2] + rate[2::2])
     return np.concatenate([np.zeros((1, rate.shape[1])), np.cumsum(pieces, axis=0)])

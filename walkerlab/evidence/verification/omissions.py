@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
-    """List the omitted parts of the verification; empty for the paper's compass."""
+    """List the omitted parts of the verification, or return () for the paper's compass."""
     if is_studied(config):
         return ()
     return (

@@ -98,7 +98,7 @@ class Arrival:
     units: Floats  # unit of each component of the state
 
     def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
-        """Judge a method by its end state y (None if it was not reached); count: number of right-hand sides."""
+        """Judge a method by its end state y (None if it was not reached) and the `count` of right-hand sides."""
         if y is None:
             return Choice(self.case, method, "gives up", None, count, wall_s)
         error = finite(float(np.max(np.abs((y - self.state) / self.units))))
@@ -120,7 +120,7 @@ def natural_units(config: RigidConfig) -> Floats:
 
 
 @contextmanager
-def silenced() -> Iterator[None]:
+def suppress_warnings() -> Iterator[None]:
     """Suppress the libraries' warnings, and the exceptions with which they give up."""
     with (
         warnings.catch_warnings(),
@@ -135,7 +135,7 @@ def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, 
     """Walk a rigid scene with SciPy's solve_ivp at default settings, with an event function for heel strikes."""
     began = time.perf_counter()
     y, count = None, MAX_ORDINARY_EVALUATIONS
-    with silenced():
+    with suppress_warnings():
         y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, MAX_ORDINARY_EVALUATIONS, method)
     return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)
 
@@ -150,7 +150,7 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
     right_hand_side = counting_rhs(counts, system, start.size)
     began = time.perf_counter()
     y = None
-    with silenced():
+    with suppress_warnings():
         solution = solve_ivp(right_hand_side, (0.0, arrival.time_s), start, method=method)
         if solution.success:
             y = solution.y[:, -1]

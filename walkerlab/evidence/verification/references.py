@@ -17,7 +17,7 @@ def linear_bounce_period(mass: float, stiffness: float, drop: float, gravity: fl
 
 
 def impact_force(depth: float, rate: float, law: tuple[float, float, float, float]) -> float:
-    """Return the force (N) of ADAMS's IMPACT law, as written in the manual; law: (k, e, c_max, d_max), SI."""
+    """Return the force (N) of ADAMS's IMPACT law, as written in the manual. `law` is (k, e, c_max, d_max), SI."""
     k, e, c_max, d_max = law
     if depth <= 0.0:
         return 0.0
@@ -72,7 +72,9 @@ def wheel_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0)
 
 
 def wheel_upright_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:
-    """Return the angular speed (rad/s) when a spoke is normal to the slope; energy is conserved after the impact."""
+    """Return the angular speed (rad/s) when a spoke is normal to the slope, since energy is conserved after
+    the impact.
+    """
     half = math.pi / spokes
     climbed = 2.0 * gravity * (math.cos(slope) - math.cos(half - slope)) / (1.0 + inertia)
     return math.sqrt(wheel_speed(spokes, slope, gravity, inertia) ** 2 - climbed)

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from walkerlab.config.fields import Block, annotation_of
 from walkerlab.config.reads import RigidConfig
-from walkerlab.config.schema import Config, state_of, with_state
+from walkerlab.config.schema import Config, replace_state, state_of
 from walkerlab.physics.orbits.similarity import Units
 
 B = TypeVar("B", bound=Block)
@@ -50,7 +50,7 @@ def scaled(config: Config, by: Units) -> Config:
     }
     if not isinstance(config.start, str):
         state, n = state_of(config.start), len(config.start) // 2
-        changes["start"] = with_state(config.start, (*state[:n], *(rate / by.time for rate in state[n:])))
+        changes["start"] = replace_state(config.start, (*state[:n], *(rate / by.time for rate in state[n:])))
     if config.contact is not None:
         si, pitch = config.contact.in_si(), config.contact.pad_pitch
         ground = {

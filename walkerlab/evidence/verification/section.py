@@ -8,7 +8,7 @@ from typing import Any
 from walkerlab.evidence.verification.verdict import BUDGET_USED
 from walkerlab.outcome import outcome_of
 from walkerlab.views.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section, Statement, Statements
-from walkerlab.views.report.numbers import number, whole
+from walkerlab.views.report.numbers import format_integer, number
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.views.report.words import words
@@ -21,13 +21,13 @@ Rows = Sequence[Row]
 
 @stage_section("stability")
 def section(results: Results, summary: Row) -> Section | None:
-    """Build the section; None if the stage did not run."""
+    """Build the section, or return None if the stage did not run."""
     cases, problems = summary["cases"], summary["known"]
     unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
     unmeasured = [
         {**row, "why": f"{measure['measure']}: {measure['why']}"} for row in cases for measure in row["not_measured"]
     ]
-    note = words("stability.cases", by_reason(unanswered), by_reason(unmeasured))
+    note = words("stability.cases", group_by_reason(unanswered), group_by_reason(unmeasured))
     planes = results.summary("stability-maps")
     blocks: tuple[PageBlock, ...] = (
         *(Paragraph(failure, "bad") for failure in failures(summary)),
@@ -64,7 +64,7 @@ def failures(summary: Row) -> list[str]:
 
 
 def worst_measure(row: Row) -> float | None:
-    """Return the largest ratio of a measure to its limit; use of the budget does not count."""
+    """Return the largest ratio of a measure to its limit, not counting the use of the budget."""
     measures = [measure for measure in row["measures"] if measure["limit"] > 0.0 and measure["measure"] != BUDGET_USED]
     return max((measure["value"] / measure["limit"] for measure in measures), default=None)
 
@@ -72,16 +72,16 @@ def worst_measure(row: Row) -> float | None:
 CASE_COLUMNS = (
     Column("case", "name"),
     Column("ended as", ending),
-    Column("steps", "steps", whole, numeric=True),
+    Column("steps", "steps", format_integer, numeric=True),
     Column("other method", "second_method", lambda name: name or "none"),
     Column("worst measure / limit", worst_measure, partial(number, digits=2), numeric=True),
-    Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
+    Column("right-hand sides", "rhs_evaluations", format_integer, numeric=True),
     measured("time", "wall_s", partial(number, digits=3), prefix="m"),
     Column("why expected", "reason", wide=True),
 )
 
 
-def by_reason(cases: Rows) -> str:
+def group_by_reason(cases: Rows) -> str:
     return "; ".join(f"{why} ({', '.join(row['name'] for row in rows)})" for why, rows in grouped(cases, "why").items())
 
 

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any, TypeGuard
 
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
-from walkerlab.config.schema import Config, with_state
+from walkerlab.config.schema import Config, replace_state
 from walkerlab.evidence.verification.catalogue import all_cases, scene_cases
 from walkerlab.evidence.verification.judge import CaseCell, run_cells
 from walkerlab.evidence.verification.omissions import verification_omissions
@@ -30,7 +30,7 @@ def run(
     Raises ConfigError if two cases share a name.
     """
     if has_scene_cases(config):
-        variations = scene_cases(with_numbers(config, inputs))
+        variations = scene_cases(resolve_scene(config, inputs))
         all_cases(config.stability.cases, [case for case, _ in variations])
         cells = [*(CaseCell(*case) for case in variations), *map(CaseCell, config.stability.cases)]
     else:
@@ -51,11 +51,12 @@ def has_scene_cases(config: CompassCasesConfig | SceneCasesConfig) -> TypeGuard[
     return not is_studied(config)
 
 
-def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
+def resolve_scene(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     """Return the scene with a numeric start and pad pitch, which all its cases share."""
     step, start = rigid_start(config, inputs)
     scene = Config().model_copy(
-        update={key: getattr(config, key) for key in keys_of(WalksConfig)} | {"start": with_state(config.start, start)}
+        update={key: getattr(config, key) for key in keys_of(WalksConfig)}
+        | {"start": replace_state(config.start, start)}
     )
     contact = config.contact
     if contact is None or contact.terrain != "checkerboard":
@@ -67,7 +68,7 @@ def with_numbers(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
 def summarise(
     cases: Sequence[CaseResult], problems: Sequence[Mapping[str, Any]], ordinary: Sequence[Choice]
 ) -> dict[str, Any]:
-    """Build the summary; it contains `no_answer` if a case or problem failed.
+    """Build the summary. It contains `no_answer` if a case or problem failed.
 
     problems  results of the known problems, as stored by their stage
     """

@@ -33,7 +33,7 @@ REGAIN_TOLERANCE = 1e-3  # fraction of the allowed residual by which quadrature 
 
 @dataclass(frozen=True)
 class JudgedWalk:
-    """Walk to be judged, in either model; times are in units of the walker's pendulum time.
+    """Walk to be judged, in either model. Times are in units of the walker's pendulum time.
 
     end         end time; None in the rigid model, whose walks end at a heel strike
     residual_J  residual of the energy balance or, in the rigid model without springs, energy drift within a swing
@@ -59,7 +59,7 @@ class CaseStart:
     start: State
     energy: float  # J, m g L plus kinetic and stored energy at the start; the scale of residuals
 
-    def again(self, case: Case) -> Case:
+    def repeated_case(self, case: Case) -> Case:
         """Return the case for a repeated walk: with all its steps, because outcomes are compared, too."""
         return case
 
@@ -69,12 +69,12 @@ class RigidStart(CaseStart):
     residual_name: ClassVar[str] = "energy drift within a swing"
     walker: RigidModel
 
-    def again(self, case: Case) -> Case:
+    def repeated_case(self, case: Case) -> Case:
         """Return the case for a repeated walk, with only the steps whose times are compared."""
         return case.model_copy(update={"steps": min(case.steps, max(case.compared_steps, 1))})
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:  # noqa: ARG002
-        """Walk a case; only heel strikes are judged, so nothing is sampled."""
+        """Walk a case. Only heel strikes are judged, so nothing is sampled."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
         touches, work = walk.touch_time_s / pendulum_time(self.config), walk.work
@@ -115,7 +115,9 @@ class ContactStart(CaseStart):
         return JudgedWalk(walk.outcome, touches, end, walk.energy_balance_residual_J, *cost, numbers, walk)
 
     def measures(self, walk: JudgedWalk, case: Case) -> list[Measure]:
-        """Measure the energy that friction and damping seem to return; empty if the walk was not sampled."""
+        """Measure the energy that friction and damping seem to return, or return an empty list if the walk was not
+        sampled.
+        """
         record: ContactWalkResult = walk.record
         if record.samples is None or record.samples.dissipated_J.shape[0] < 2:
             return []
@@ -134,7 +136,7 @@ Start = RigidStart | ContactStart
 
 
 def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerances:
-    """Return the config's method and tolerances with the case's budget; `tighter` multiplies both tolerances."""
+    """Return the config's method and tolerances with the case's budget. `tighter` multiplies both tolerances."""
     solver = start.config.solver
     settings = solver.rigid if isinstance(start, RigidStart) else solver.contact
     return Tolerances(settings.method, tighter * settings.rtol, tighter * settings.atol, case.budget)
@@ -142,12 +144,12 @@ def case_tolerances(start: Start, case: Case, tighter: float = 1.0) -> Tolerance
 
 @cache
 def gait_of(walker: RigidModel, seed: int) -> RigidGait | None:
-    """Find a walker's gait; cached, because most cases of a catalogue differ only in the ground."""
+    """Find the gait of a walker. It is cached, because most cases of a catalogue differ only in the ground."""
     return find_gaits(walker, seed).gait
 
 
 def prepare_start(config: WalksConfig, case: Case) -> Start | None:
-    """Prepare the start of a case; returns None if the start or the pad pitch needs a gait that does not exist."""
+    """Prepare the start of a case, or return None if the start or the pad pitch needs a gait that does not exist."""
     walker = rigid_walker(config)
     if isinstance(config.start, str):
         gait = gait_of(walker, config.seed)

@@ -60,7 +60,7 @@ class CaseResult:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Descriptions of all faults; empty if the case passed."""
+        """Descriptions of all faults, or return () if the case passed."""
         failed = [] if self.outcome in self.expected else [f"ended as {self.outcome}, not {' or '.join(self.expected)}"]
         return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
 
@@ -74,7 +74,7 @@ def finite(value: float) -> float:
     return float(value) if math.isfinite(value) else 1e300
 
 
-def promised(case: Case, rtol: float, steps: int) -> float:
+def allowed_difference(case: Case, rtol: float, steps: int) -> float:
     """Return the largest expected difference between the times of two walks, in pendulum times.
 
     rtol   the larger relative tolerance of the two walks

@@ -136,7 +136,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
     """Return the run of an artifact and the config stored in it; None if there is no such file."""
     if path.suffix != SUFFIX or not is_file(path):
         return None
-    folder = RunFolder.at(path.parent)
+    folder = RunFolder.open_folder(path.parent)
     try:
         stored = artifact.read(path)
     except Damaged as error:

@@ -105,7 +105,7 @@ class FolderResults:
         origin, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
         path = self.run.artifact(step.stage.name)
-        stored = artifact.write(path, answer, step.identity, origin.until_now())
+        stored = artifact.write(path, answer, step.identity, origin.finish())
         checkpoint.forget()
         return stored
 

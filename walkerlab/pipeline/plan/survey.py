@@ -40,7 +40,7 @@ class RunSummary:
 def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
     """Iterate over the runs in a folder in order of their names, skipping folders without results."""
     for path in sorted(runs_dir.glob("*/")):
-        folder = RunFolder.at(path)
+        folder = RunFolder.open_folder(path)
         stages = tuple(name for name in graph.names if folder.artifact(name).is_file())
         sweeps = tuple(sorted(file.name for file in path.glob(f"{SWEEP}*.h5")))
         if not stages and not sweeps:

@@ -150,7 +150,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
-    from walkerlab.scene.scaled import for_a_map, starts_of
+    from walkerlab.scene.scaled import scale_for_map, starts_of
 
     gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps
     step_length_m, state = float(gait["step_length_m"]), as_state(gait["state"])
@@ -158,7 +158,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     scene = replace(scene_on_pads(config, step_length_m, state, answer), pinned=False)
     starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
-    return ContactQuestion(scene, rigid, for_a_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
+    return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 
 
 def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
@@ -168,16 +168,16 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
         for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
     }
 
-    def over(values: Any, text: str) -> Variable:
+    def grid_variable(values: Any, text: str) -> Variable:
         return Variable(np.ascontiguousarray(values).reshape(window.cells), dims, "1", text)
 
     settled = np.where(ends.attractor == UNREACHED, 0, ends.steps)
     variables |= {
-        "outcome": over(ends.outcome, "how the walk ended; codes in attribute outcomes"),
-        "attractor": over(ends.attractor, "index of the attractor that was reached; -1: none"),
-        "steps": over(ends.steps, "steps taken"),
-        "steps_to_settle": over(settled, "steps until the attractor was reached; 0: none was"),
-        "walking": over(walking, "fraction of the cell that walks; edge cells: from their subcells"),
+        "outcome": grid_variable(ends.outcome, "how the walk ended; codes in attribute outcomes"),
+        "attractor": grid_variable(ends.attractor, "index of the attractor that was reached; -1: none"),
+        "steps": grid_variable(ends.steps, "steps taken"),
+        "steps_to_settle": grid_variable(settled, "steps until the attractor was reached; 0: none was"),
+        "walking": grid_variable(walking, "fraction of the cell that walks; edge cells: from their subcells"),
     }
     held_values = {f"at_{name}": value for name, value in zip(COORDINATES, window.rest, strict=True)}
     return Group(variables, {"outcomes": OUTCOMES, "model": settings.model, **held_values})
@@ -216,7 +216,9 @@ def gaussian(window: Window) -> Floats:
 
 
 def margin_of(config: RigidConfig, window: Window, ends: WalkEnds, gait: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell; empty if no cell fails."""
+    """Return the distance (rad, sqrt(g/L)) from a stable gait to the nearest failing cell, or nothing if no
+    cell fails.
+    """
     # the distance is accurate to the size of a cell
     failing = np.flatnonzero(ends.outcome != Outcome.WALKED)
     if not gait["stable"] or not failing.size:
@@ -266,7 +268,7 @@ class RigidQuestion:
 
 @dataclass(frozen=True, eq=False)
 class ContactQuestion:
-    """Contact model whose walks are classified; at the start the stance foot just touches and rolls without slip."""
+    """Contact model whose walks are classified. At the start the stance foot just touches and rolls without slip."""
 
     scene: ContactScene
     rigid: RigidModel
@@ -278,7 +280,7 @@ class ContactQuestion:
     aperiodic: ClassVar[bool] = False  # only its gait is considered as an attractor
 
     def attractor_rows(self) -> list[dict[str, Any]]:
-        """Describe the attractor by the period and length of its step; empty if the model has no gait."""
+        """Describe the attractor by the period and length of its step, or return nothing if the model has no gait."""
         own = self.starts.gait
         return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
 
@@ -288,7 +290,7 @@ class ContactQuestion:
         return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
-        """Walk from section coordinates z (3), SI; return outcome, attractor and number of steps."""
+        """Walk from section coordinates z (3), SI, and return outcome, attractor and number of steps."""
         state = state_on_section(self.rigid, z)
         walk = self.starts.walk_from(start_state(self.scene, state))
         settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
@@ -305,13 +307,13 @@ Question = RigidQuestion | ContactQuestion
 def units_of(
     name: str, cells: Sequence[int], at_once: int, walks: int, run: Callable[[Sequence[int]], list[float]]
 ) -> list[WorkUnit]:
-    """Divide cells into work units of `at_once` cells, named by their first cells; each cell takes `walks` walks."""
+    """Divide cells into work units of `at_once` cells, named by their first cells. Each cell takes `walks` walks."""
     groups = (cells[first : first + at_once] for first in range(0, len(cells), at_once))
     return [WorkUnit(f"{name} {group[0]}", walks * len(group), partial(run, group)) for group in groups]
 
 
 def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
-    """Walk from the centres of cells; return their outcomes, attractors and step counts as one flat list."""
+    """Walk from the centres of cells, and return their outcomes, attractors and step counts as one flat list."""
     ends = question.walk_to_ends(window.starts(np.array(cells)))
     return [float(number) for number in (*ends.outcome, *ends.attractor, *ends.steps)]
 

@@ -30,7 +30,7 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.families import contact_map, model_differs, rigid_map, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.walk_outcomes import ground_causes, without_pads
+from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds, and a function that returns a config's step map over the parameter."""
@@ -210,7 +210,7 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
         return [{"model": family.model, **row} for family in families for row in of_model(family)]
 
-    def by_model(of_model: Callable[[Family], Any]) -> dict[str, Any]:
+    def values_by_model(of_model: Callable[[Family], Any]) -> dict[str, Any]:
         return {family.model: value for family in families if (value := of_model(family)) is not None}
 
     return {
@@ -220,11 +220,11 @@ def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -
         "to": config.continuation.most,
         "branches": rows(branch_rows),
         "bifurcations": rows(bifurcation_rows),
-        "first_doubling": by_model(lambda family: first_doubling(family.branches)),
+        "first_doubling": values_by_model(lambda family: first_doubling(family.branches)),
         "lyapunov": rows(lambda family: map(asdict, family.exponents)),
         "cascades": rows(cascade_rows),
         "limits": rows(limit_rows),
-        "numerical_error": by_model(sample_again) if again else {},
+        "numerical_error": values_by_model(sample_again) if again else {},
         "endings": rows(partial(ending_rows, parameter=parameter, config=config)),
         "attractors": rows(lambda family: [attractor_summary(family)] if family.attractors.found else []),
         "curves": rows(curve_rows),
@@ -320,7 +320,7 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
                 side = side_beyond(branch, crossing, family.step_map)
                 text = (
                     f"{side} about {crossing.value:.2g} {parameter.unit} {gait} trips over pads of its own step "
-                    f"length: the pads end walks there, not the gait. Try {without_pads(config)}."
+                    f"length: the pads end walks there, not the gait. Try {ground_without_pads(config)}."
                 )
                 yield {"period": branch.period, "value": crossing.value, "outcome": "off-pad", "said": text}
 

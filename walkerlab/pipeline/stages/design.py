@@ -52,9 +52,11 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 
 
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
-    """Search for the optimum; raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
+    """Search for the optimum.
 
     checkpoint  results of the searches of an earlier run; new ones are added
+
+    Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """
     refuse(config)
     design = config.design or Design()
@@ -107,7 +109,7 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
             {"quantity": name, "from": low, "to": high, "value": best.point.numbers[name]}
             for name, (low, high) in keep.items()
         ],
-        "on_bound": on_bound(design, best.x),
+        "on_bound": keys_on_bound(design, best.x),
         "gradient_norm": best.gradient_norm,
         "evaluations": int(gaits.counts[0]),
         "without_gait": int(gaits.counts[1]),
@@ -150,7 +152,7 @@ def refuse(config: DesignConfig) -> None:
                 raise parameter.refusal(config, bound, ("design", "over"))
 
 
-def on_bound(design: Design, x: Floats) -> list[str]:
+def keys_on_bound(design: Design, x: Floats) -> list[str]:
     """Return the keys whose optimum lies on a bound."""
     pairs = zip(design.over.items(), x.tolist(), strict=True)
     return [
@@ -159,7 +161,7 @@ def on_bound(design: Design, x: Floats) -> list[str]:
 
 
 class Gaits:
-    """Gait and gradients as functions of the parameters; each search for a gait starts at the last one found."""
+    """Gait and gradients as functions of the parameters. Each search for a gait starts at the last one found."""
 
     def __init__(
         self,
@@ -183,7 +185,7 @@ class Gaits:
         self.z = find_model_gait(design.model, config, gait, progress.note).z
 
     def gait_at(self, x: Floats) -> Point | None:
-        """Return the gait at parameter values (parameters,); None if no gait is found or the config rejects them."""
+        """Return the gait at parameter values (parameters,), or None if no gait is found or the config rejects them."""
         self.counts[0] += 1
         self.progress.advance()
         changed = config_with(self.config, self.parameters, x.tolist())
@@ -198,12 +200,14 @@ class Gaits:
         """Find the gait of a config near the last gait, or by a search from scratch."""
         subject = ModelUnderTest(self.model, config, self.z, self.length)
         standpoint = subject.at()
-        match = self.near(standpoint, self.z)
+        match = self.gait_near(standpoint, self.z)
         # the parameters may be too far from those of the last gait for Newton's method, so search from scratch
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait
-            match = match if gait is None else self.near(standpoint, section_coordinates(walker, gait.state)) or match
+            match = (
+                match if gait is None else self.gait_near(standpoint, section_coordinates(walker, gait.state)) or match
+            )
         if match is None:
             return None
         standpoint, numbers = match
@@ -220,8 +224,10 @@ class Gaits:
         gradients = {name: np.array([of_key[name] for of_key in by_key]) for name in (*self.wanted, *self.largest)}
         return Point(numbers, gradients, apart)
 
-    def near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
-        """Find the gait near z (d,) and its quantities; None if there is no gait or a quantity is undefined."""
+    def gait_near(self, standpoint_before: GaitOnMap, z: Floats) -> tuple[GaitOnMap, dict[str, float]] | None:
+        """Find the gait near z (d,) and its quantities, or return None if there is no gait or a quantity is
+        undefined.
+        """
         cycle = gait_near(standpoint_before.step_map, z, standpoint_before.p, SOLVED)
         if isinstance(cycle, NotConverged):
             return None
@@ -247,7 +253,7 @@ class Gaits:
         for off in (-gap, gap):
             changed = parameter.config_at(subject.config, parameter.value_in(subject.config) + off)
             beside = None if changed is None else replace(subject, config=changed)
-            match = None if beside is None else self.near(beside.at(), subject.z)
+            match = None if beside is None else self.gait_near(beside.at(), subject.z)
             if beside is not None and match is not None:
                 places[off] = self.largest_disturbances(replace(beside, z=match[0].z), self.largest)
         first, last = min(places), max(places)
@@ -257,7 +263,7 @@ class Gaits:
         }
 
     def robustness_at(self, x: Floats) -> dict[str, float]:
-        """Return the quantities of `ROBUSTNESS` at parameter values with a gait; empty if the gait is unstable."""
+        """Return the quantities of `ROBUSTNESS` at parameter values with a gait, or nothing if the gait is unstable."""
         config = config_with(self.config, self.parameters, x.tolist())
         assert config is not None, "a walker with a gait is valid"
         subject = ModelUnderTest(self.model, config, self.sections[x.tobytes()], self.length)

@@ -33,7 +33,7 @@ MOTIONS_OF_BRANCH, LONGEST = 12, 4  # number of gaits per branch whose walks are
 STRIDE = 2  # number of steps after which the legs have their initial roles again
 TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
-EVERY = 3  # every third sample between heel strikes is stored
+SAMPLE_STRIDE = 3  # every third sample between heel strikes is stored
 
 MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
@@ -53,7 +53,7 @@ ATTRACTORS = {
     "periods_s": Label("s", "durations of steps on the attractor", ("visit",), name="step_period"),
     "angles": replace(STANCE, dims=("visit",)),
 }
-SETTLED: Final = "steps after which walks repeat themselves; 0: never, -1: no walk continues"
+PERIOD_TEXT: Final = "steps after which walks repeat themselves; 0: never, -1: no walk continues"
 MARKS = {
     "after": Label("1", "index of the point before the bifurcation; -1: none", name="mark_after"),
     "kind": replace(KIND, name="mark_kind"),
@@ -74,7 +74,7 @@ def groups(
     value = {"value": Label(parameter.unit, parameter.key)}
     stored: dict[str, Group] = {}
 
-    def over(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
+    def coordinates(plane: BifurcationCurve | Regions, *dims: str) -> dict[str, Variable]:
         """Return the coordinates of both parameters."""
         axes = zip(("value", "second"), (plane.first, plane.second), (parameter, second), dims, strict=True)
         return {
@@ -92,10 +92,12 @@ def groups(
             continue
         own: dict[str, Group] = {}
         for number, curve in enumerate(family.curves):
-            own[f"curve_{number}"] = Group(over(curve, "point", "point"), {"kind": curve.kind, "period": curve.period})
+            own[f"curve_{number}"] = Group(
+                coordinates(curve, "point", "point"), {"kind": curve.kind, "period": curve.period}
+            )
         if family.regions is not None:
-            periods = Variable(family.regions.period, ("first", "second"), "1", SETTLED)
-            own["regions"] = Group({**over(family.regions, "first", "second"), "period": periods})
+            periods = Variable(family.regions.period, ("first", "second"), "1", PERIOD_TEXT)
+            own["regions"] = Group({**coordinates(family.regions, "first", "second"), "period": periods})
         for number, branch in enumerate(family.branches):
             marks = [*birth_of(branch, family.branches), *marks_on(branch)]
             own[f"branch_{number}"] = branch_group(branch, marks, family.step_map.monitors, value)
@@ -181,7 +183,7 @@ def motions(branches: Sequence[GaitBranch], config: ContactConfig, parameter: Pa
 
 
 def motion(point: Cycle, period: int, config: ContactConfig, parameter: Parameter) -> Iterator[Group]:
-    """Walk a gait and yield its group as `simulate` stores it; yield nothing if the config rejects the value."""
+    """Simulate a gait and yield its samples in the layout of `simulate`, or nothing if the config rejects the value."""
     changed = parameter.config_at(config, point.value)
     if changed is None:
         return
@@ -194,6 +196,6 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
     if walk.steps < steps or walk.samples is None:
         return
     changes = np.flatnonzero(np.diff(walk.samples.step))
-    selected = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, EVERY), changes, changes + 1)))
+    selected = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, SAMPLE_STRIDE), changes, changes + 1)))
     samples_group = trajectory_group(scene, walk, only_at(walk.samples, selected))
     yield replace(samples_group, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})

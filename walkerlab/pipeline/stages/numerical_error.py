@@ -39,7 +39,7 @@ def numerical_error(first: Summary, tolerances: Tolerances, walk: Callable[[Tole
 
 
 def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
-    """Return tighter tolerances, or another method if they cannot be tightened, with more budget; and a description."""
+    """Return tighter tolerances, or another method if they cannot be tightened, with more budget and a description."""
     tolerances = replace(tolerances, budget=min(MORE_WORK * tolerances.budget, ENDLESS))
     for factor, by in TIGHTER.items():
         rtol = tolerances.rtol / factor
@@ -70,7 +70,9 @@ def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
 
 
 def steps_later(first: Summary, again: Summary) -> int | None:
-    """Return how many steps later a repeated walk takes the steps that both repeat in the end; None if they do not."""
+    """Return how many steps later a repeated walk takes the steps that both repeat in the end, or None if
+    they do not.
+    """
     period = first.get("repeats_after") or 0
     if not period or again.get("repeats_after") != period:
         return None
@@ -79,7 +81,7 @@ def steps_later(first: Summary, again: Summary) -> int | None:
 
 
 def step_changes(first: Values, again: Values, period: int, later: int | None) -> Floats:
-    """Return the largest change of the values (steps,) up to each step; NaN where a walk has no value.
+    """Return the largest change of the values (steps,) up to each step, or NaN where a walk has no value.
 
     period  steps after which the first walk repeats in the end, or 0
     later   how many steps later the second walk takes the same steps, or None if it does not repeat

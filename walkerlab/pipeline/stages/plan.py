@@ -25,7 +25,10 @@ ERROR_DIMENSIONS: Final = ("measurement", "steps", "parameter")
 
 
 def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Predict the errors of several ways to measure a walk; raises ConfigError for an invalid request."""
+    """Predict the errors of several ways to measure a walk.
+
+    Raises ConfigError for an invalid request.
+    """
     refuse(config)
     block, plan = cast("Identify", config.identify), config.plan or Plan()
     progress.start("plan")

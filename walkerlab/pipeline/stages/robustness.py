@@ -49,10 +49,10 @@ WALKS_AT_ONCE: Final = 25
 STEPS_DRAWN: Final = 8
 MAX_STEPS: Final = {RIGID: 2_000_000, CONTACT: 40_000}
 """Maximum total number of steps of all walks on ground of one roughness, by model."""
-GIVEN: Final = ("normal_impulse_N_s", "min_normal_force_N")
+PUSH_REACTIONS: Final = ("normal_impulse_N_s", "min_normal_force_N")
 """Names of the two values that `RigidMap.ground_after_push` returns: ground reactions during and after a push."""
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
-OF: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
+INDICATOR_UNITS: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "model that walks")}
 NONE_BESIDE: Final = Gradient(None, None, "neighbouring walks end early, or the config rejects their parameters")
 LABELS: Final[dict[str, dict[str, Label]]] = {
@@ -74,8 +74,8 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
             f"{way}_{name}": Label(unit, f"{what} of the largest push {way}; negative where the ground would pull")
             for way in ("forward", "backward")
             for name, unit, what in (
-                (GIVEN[0], "N s", "normal impulse of the ground at the instant"),
-                (GIVEN[1], "N", "minimum of the ground's normal force in the steps after the instant"),
+                (PUSH_REACTIONS[0], "N s", "normal impulse of the ground at the instant"),
+                (PUSH_REACTIONS[1], "N", "minimum of the ground's normal force in the steps after the instant"),
             )
         },
     },
@@ -103,12 +103,14 @@ def run(
     checkpoint: Checkpoint,
     jobs: int = 1,
 ) -> Content:
-    """Study each model; raises NoAnswer with partial results for an unstable gait, which has no sensitivity norm.
+    """Study each model.
 
     checkpoint  disturbances and walks that an earlier run computed
     jobs        maximum number of processes
 
     Raises ConfigError for an invalid request.
+
+    Raises NoAnswer with partial results for an unstable gait, which has no sensitivity norm.
     """
     refuse(config)
     answer: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
@@ -125,7 +127,7 @@ def run(
             unstable.append(subject.model)
             continue
         answer["gait_sensitivity_norm"] += norms(subject.model, gait)
-        rough_walks, label = [*rough(subject, config)], f"robustness: {subject.model} model"
+        rough_walks, label = [*rough_ground_units(subject, config)], f"robustness: {subject.model} model"
         units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
         # the computation of the gait's quantities has compiled all kernels
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
@@ -135,7 +137,7 @@ def run(
         answer["largest_push"].append({**model, "forward_N_s": forward, "backward_N_s": backward, **target})
         pushes = answer["largest_push"][-1]
         for way, reactions in (("forward", ahead), ("backward", behind)):
-            pushes |= zip((f"{way}_{name}" for name in GIVEN), reactions or (None, None), strict=True)
+            pushes |= zip((f"{way}_{name}" for name in PUSH_REACTIONS), reactions or (None, None), strict=True)
         every = np.array([count for batch in walks for count in batch])
         steps[subject.model] = every.reshape(-1, config.robustness.walks)
         answer["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
@@ -187,7 +189,7 @@ def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
         if answer is None:
             continue
         to_pure = gait.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
-        for k, (indicator, unit) in enumerate(OF.items()):
+        for k, (indicator, unit) in enumerate(INDICATOR_UNITS.items()):
             yield {
                 "model": model,
                 "disturbance": disturbance,
@@ -208,14 +210,16 @@ def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUn
 
 
 def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
-    """Return the largest survived disturbance of one sign; for the rigid model's hip push also ground reactions."""
+    """Return the largest survived disturbance of one sign. For a hip push in the rigid model, also return ground
+    reactions.
+    """
     size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
     if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
         return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
     return [size]
 
 
-def rough(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
+def rough_ground_units(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """Yield work units, each a batch of walks on rough ground."""
     block, most = config.robustness, cap(subject.model, config)
     for roughness in block.roughness_m:
@@ -277,7 +281,7 @@ def sensitivities(
     progress: Progress,
     jobs: int,
 ) -> Rows:
-    """Return rows of derivatives in order of decreasing relative effect; parameters of value 0 come last."""
+    """Return rows of derivatives in order of decreasing relative effect. Parameters of value 0 come last."""
     keys = numbers_read(subject, requested)
     label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
     results = in_order([partial(gradients_of, subject, key) for key in keys], jobs)

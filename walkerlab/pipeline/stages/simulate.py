@@ -17,9 +17,11 @@ from walkerlab.scene.rigid import rigid_scene
 
 
 def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Walk `config.strides` strides; raises NoAnswer if the integrator fails.
+    """Walk `config.strides` strides.
 
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
+
+    Raises NoAnswer if the integrator fails.
     """
     scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)

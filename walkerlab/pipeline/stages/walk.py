@@ -125,7 +125,7 @@ def content_of_walk(
     """
     result = walk(tolerances, True)
     if result.samples is not None:
-        result = replace(result, samples=thinned(result.samples, result.touch_time_s, progress))
+        result = replace(result, samples=thin_samples(result.samples, result.touch_time_s, progress))
     stored, answer = groups(result), summary(result)
     if not result.outcome.answered:
         why = f"{stage}: {result.outcome.label} after {result.steps} steps, {result.end_time_s:.4g} s"
@@ -135,7 +135,7 @@ def content_of_walk(
     return Content(stored, answer)
 
 
-def thinned(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
+def thin_samples(samples: Any, ends: NDArray[np.float64], progress: Progress) -> Any:
     """Return the samples to store: all samples of an ordinary walk, fewer of a long one.
 
     samples  a NamedTuple of arrays whose first axis is time, `time_s` among them

@@ -36,11 +36,11 @@ ROOT_ATTRIBUTES = frozenset(one.name for one in (*fields(Identity), *fields(Prov
 
 
 class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure of this program
-    """Error for a file that is not a trustworthy artifact; the message gives the reason."""
+    """Error for a file that is not a trustworthy artifact. The message gives the reason."""
 
 
 class OtherLayout(Damaged):
-    """Error for an artifact of another version of this program; it needs no warning."""
+    """Error for an artifact of another version of this program. It needs no warning."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,7 +151,9 @@ def read(path: Path) -> Stored:
 
 
 def check(path: Path, key: str | None = None, stage: str | None = None) -> Verdict:
-    """Check that the file at `path` is intact and belongs to `key` and `stage`, if these are given; never raises."""
+    """Check that the file at `path` is intact and belongs to `key` and `stage`, if these are given. This
+    never raises.
+    """
     try:
         artifact = read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -182,7 +184,10 @@ def root_attributes(content: Content, identity: Identity, provenance: Provenance
 
 
 def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -> Stored:
-    """Build an artifact from a file's parts; raises Damaged if its digest or key does not match."""
+    """Build an artifact from the parts of a file.
+
+    Raises Damaged if its digest or key does not match.
+    """
     if root.get("schema_version") not in READABLE:
         raise OtherLayout(f"its layout is version {root.get('schema_version')}, this program's is {SCHEMA_VERSION}")
     own = {name: value for name, value in root.items() if name not in ROOT_ATTRIBUTES}

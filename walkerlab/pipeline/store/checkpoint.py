@@ -19,7 +19,7 @@ class Checkpoint:
     """Numbers computed by the completed work units of one result, by name of the unit."""
 
     def __init__(self, path: Path | None, key: str) -> None:
-        """Resume from the journal at `path` if its key matches; otherwise start over with the first unit.
+        """Resume from the journal at `path` if its key matches, otherwise start over with the first unit.
 
         path  path of the journal; None to keep the numbers only in memory
         """
@@ -38,7 +38,10 @@ class Checkpoint:
                 self._intact += len(text)
 
     def keep(self, name: str, numbers: Numbers) -> None:
-        """Add the numbers of a unit; raises StorageError if they cannot be stored."""
+        """Add the numbers of a unit.
+
+        Raises StorageError if they cannot be stored.
+        """
         self.kept[name] = numbers
         if self.path is None:
             return
@@ -53,7 +56,10 @@ class Checkpoint:
             self._intact = file.tell()
 
     def forget(self) -> None:
-        """Remove all units; raises StorageError if the journal cannot be removed."""
+        """Remove all units.
+
+        Raises StorageError if the journal cannot be removed.
+        """
         self.kept, self._intact = {}, 0
         if self.path is not None:
             with storing(self.path):
@@ -61,6 +67,6 @@ class Checkpoint:
 
 
 def line(value: object) -> bytes:
-    """Encode a value as a line with its checksum; numbers are restored exactly."""
+    """Encode a value as a line with its checksum. Numbers are restored exactly."""
     text = json.dumps(value, allow_nan=False).encode()
     return b"%08x %s\n" % (zlib.crc32(text), text)

@@ -1,4 +1,4 @@
-"""Find and remove this program's files in a run folder; other files stay."""
+"""Find and remove this program's files in a run folder. Other files stay."""
 
 import contextlib
 from collections.abc import Iterable
@@ -32,10 +32,10 @@ def files_of(folder: RunFolder, stages: Iterable[str]) -> list[Path]:
 
 
 def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
-    """Return the run that a result, drawing or record belongs to; None for the user's own files."""
+    """Return the run that a result, drawing or record belongs to, or None for the user's own files."""
     resolved = path.resolve()
     for place in (resolved.parent, resolved.parent.parent):
-        folder = RunFolder.at(place)
+        folder = RunFolder.open_folder(place)
         if folder.record() is None and not any(place.glob("*.h5")):
             continue
         is_state = resolved.parent == place and (resolved.suffix in STATE_ENDINGS or resolved.name in STATE_FILES)
@@ -45,7 +45,7 @@ def owner_of(path: Path, stages: Iterable[str]) -> RunFolder | None:
 
 
 def remove(folder: RunFolder, files: Iterable[Path]) -> None:
-    """Remove files of a run folder, its record and its empty subfolders; call it under the lock.
+    """Remove files of a run folder, its record and its empty subfolders. Call this under the lock.
 
     Raises StorageError if a file cannot be removed.
     """
@@ -58,7 +58,7 @@ def remove(folder: RunFolder, files: Iterable[Path]) -> None:
 
 
 def remove_if_empty(folder: RunFolder) -> None:
-    """Remove a run folder that holds only its lock; call it after releasing the lock."""
+    """Remove a run folder that holds only its lock. Call this after releasing the lock."""
     lock = folder.path / LOCK
     if list(folder.path.iterdir()) == [lock]:
         with contextlib.suppress(OSError):

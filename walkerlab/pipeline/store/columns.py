@@ -1,4 +1,4 @@
-"""Labelled arrays from rows of results; names, units and meanings come from the labels of their fields."""
+"""Labelled arrays from rows of results. Names, units and meanings come from the labels of their fields."""
 
 from collections.abc import Mapping, Sequence
 from operator import getitem
@@ -28,7 +28,7 @@ def values_by_column(row: Any, labels: Mapping[str, Label]) -> dict[str, Any]:
 
 
 def column(values: Sequence[Any], label: Label, dim: str) -> Variable:
-    """Build a variable with one value per row; None becomes a gap or the label's `absent` value."""
+    """Build a variable with one value per row. None becomes a gap or the `absent` value of the label."""
     if not any(value is None for value in values):
         return labelled(values, label, dim)
     absent = np.nan if label.absent is None else label.absent

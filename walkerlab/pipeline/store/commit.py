@@ -15,7 +15,9 @@ SHIPPED = ("walkerlab", "configs")
 
 
 def commit_of_checkout(root: Path) -> str | None:
-    """Return the commit of a source tree, with '-dirty' if its package files changed; None outside a git checkout."""
+    """Return the commit of a source tree, with '-dirty' if its package files changed, or None outside a git
+    checkout.
+    """
     # look only at the package's own repository: its environment may lie inside another checkout
     if not (root / ".git").exists():
         return None
@@ -26,7 +28,7 @@ def commit_of_checkout(root: Path) -> str | None:
 
 
 def commit_of_installation(package: Path) -> str | None:
-    """Return the commit that an installed package was built from; None if unknown or not installed."""
+    """Return the commit that an installed package was built from, or None if unknown or not installed."""
     try:
         installed = importlib.metadata.distribution(package.name)
     except importlib.metadata.PackageNotFoundError:
@@ -37,7 +39,7 @@ def commit_of_installation(package: Path) -> str | None:
 
 
 def commit_of_package(package: Path) -> str | None:
-    """Return the commit that the package in a folder runs from or was built from; None if unknown."""
+    """Return the commit that the package in a folder runs from or was built from, or None if unknown."""
     return commit_of_checkout(package.parent) or commit_of_installation(package)
 
 
@@ -48,7 +50,7 @@ def commit_of_source(root: Path) -> str | None:
 
 
 def git(root: Path, *arguments: str) -> str | None:
-    """Return the output of a git command; None if it fails."""
+    """Return the output of a git command, or None if it fails."""
     try:
         done = subprocess.run(
             ["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=10, check=True

@@ -1,4 +1,4 @@
-"""Content of results: labelled arrays in groups, and a summary; independent of files and HDF5."""
+"""Content of results: labelled arrays in groups, and a summary. They do not depend on files or HDF5."""
 
 import hashlib
 import math
@@ -27,7 +27,10 @@ TIMING = re.compile(r"(.*_)?wall_s", re.DOTALL)
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """Labelled array; raises ValueError or TypeError for values that cannot be stored faithfully."""
+    """Labelled array.
+
+    Raises ValueError or TypeError for values that cannot be stored faithfully.
+    """
 
     values: NDArray[Any]  # float, integer, bool or text; copied, widened to 64 bits and frozen; refused if not finite
     # name of each axis; a variable with the name of its only dimension is the coordinate of that dimension
@@ -55,7 +58,7 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Variables that share dimensions, with attributes; one dataset for xarray."""
+    """Variables that share dimensions, with attributes: one dataset for xarray."""
 
     variables: Mapping[str, Variable]
     attrs: Mapping[str, Attribute] = field(default_factory=dict)
@@ -77,7 +80,10 @@ class Group:
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Length of each dimension; raises ValueError if two variables disagree."""
+        """Length of each dimension.
+
+        Raises ValueError if two variables disagree.
+        """
         sizes: dict[str, int] = {}
         for name, variable in self.variables.items():
             for dim, size in zip(variable.dims, variable.values.shape, strict=True):
@@ -125,7 +131,7 @@ class Content:
 
     @property
     def no_answer(self) -> NoAnswer | None:
-        """Reason why the stage has no answer, with advice; None if it has one."""
+        """Reason why the stage has no answer, with advice, or None if it has one."""
         why = self.summary.get("no_answer", {})
         return None if self.complete else NoAnswer(why.get("message", "no answer"), why.get("advice", ""))
 
@@ -149,7 +155,7 @@ class Digest:
 
     def __init__(self, summary: Mapping[str, Any], timed: tuple[str, ...]) -> None:
         self._sha256 = hashlib.sha256()
-        self._take(canonical_json([untimed(summary, timed), timed]).encode())
+        self._take(canonical_json([remove_timings(summary, timed), timed]).encode())
 
     def enter(self, path: str, attrs: Mapping[str, Attribute]) -> None:
         self._take(canonical_json([path, dict(attrs)]).encode())
@@ -175,7 +181,10 @@ class Digest:
 
 
 def canonical(values: ArrayLike) -> NDArray[Any]:
-    """Return a read-only copy as float64, int64, bool or an object array of str; raises TypeError for other types."""
+    """Return a read-only copy as float64, int64, bool or an object array of str.
+
+    Raises TypeError for other types.
+    """
     array: NDArray[Any] = np.asarray(values)
     result: NDArray[Any]
     kind = array.dtype.kind
@@ -205,7 +214,10 @@ def check_name(name: str) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to JSON types; raises ValueError for a non-finite number, TypeError for any other type."""
+    """Convert a value to JSON types.
+
+    Raises ValueError for a non-finite number, TypeError for any other type.
+    """
     if isinstance(value, float):
         if not math.isfinite(value):
             raise ValueError(f"not a finite number: {value}")
@@ -225,12 +237,12 @@ def plain(value: Any) -> Any:
     raise TypeError(f"not a JSON value: {value!r}")
 
 
-def untimed(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
+def remove_timings(summary: Mapping[str, Any], timed: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the summary without timings at any depth."""
 
     def inner(value: Any) -> Any:
         if isinstance(value, Mapping):
-            return untimed(value)
+            return remove_timings(value)
         return [inner(item) for item in value] if isinstance(value, list) else value
 
     return {key: inner(value) for key, value in summary.items() if not (key in timed or TIMING.fullmatch(key))}

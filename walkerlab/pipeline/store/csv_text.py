@@ -12,7 +12,7 @@ NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
-    """Format rows as CSV below a header; a missing value becomes an empty cell."""
+    """Format rows as CSV below a header. A missing value becomes an empty cell."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(map(csv_cell, heads))
@@ -21,7 +21,7 @@ def csv_text(heads: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
 
 
 def csv_cell(value: Any) -> Any:
-    """Convert a value to a CSV cell; text that a spreadsheet would evaluate gets a leading apostrophe."""
+    """Convert a value to a CSV cell. Text that a spreadsheet would evaluate gets a leading apostrophe."""
     if isinstance(value, str) and FORMULA.match(value) and not NUMERAL.fullmatch(value):
         return f"'{value}"
     return "" if value is None else value

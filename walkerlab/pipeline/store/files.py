@@ -40,7 +40,7 @@ def storing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def drawing_into(folder: Path) -> Iterator[None]:
-    """Convert errors of storing files in `folder` to StorageError; other errors of the `with` block pass."""
+    """Convert errors of storing files in `folder` to StorageError. Other errors of the `with` block pass."""
     try:
         yield
     except OSError as error:
@@ -66,7 +66,8 @@ def write_atomically(path: Path, *parts: bytes) -> None:
 
 
 def write_numbered(path: Path, text: str) -> Path:
-    """Write a text under a path or, if another text is there, under the next free `name-2`, `name-3`, ...; return it.
+    """Write a text under a path or, if another text is there, under the next free `name-2`, `name-3`, ..., and return
+    it.
 
     A file that holds the same text is kept. Raises StorageError if the file cannot be written.
     """
@@ -100,7 +101,7 @@ def write_through(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a `with` block a temporary file that replaces `path` at its end; after a failure `path` is unchanged.
+    """Give a `with` block a temporary file that replaces `path` at its end. After a failure `path` is unchanged.
 
     Raises StorageError if the file cannot be written.
     """
@@ -126,7 +127,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def refuse_full_disk(path: Path, size: int) -> None:
-    """Raise OSError if the disk has no room for `size` bytes; tries this with a file that is removed afterwards."""
+    """Raise OSError if the disk has no room for `size` bytes, which is tried with a temporary file."""
     with path.open("xb") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -136,13 +137,19 @@ def refuse_full_disk(path: Path, size: int) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder and its parents; raises StorageError if that fails."""
+    """Create a folder and its parents.
+
+    Raises StorageError if that fails.
+    """
     with storing(path):
         path.mkdir(parents=True, exist_ok=True)
 
 
 def read_bounded(path: Path, limit: int) -> bytes:
-    """Read a regular file of at most `limit` bytes; raises ValueError for other files, OSError if unreadable."""
+    """Read a regular file of at most `limit` bytes.
+
+    Raises ValueError for other files, OSError if unreadable.
+    """
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
@@ -155,7 +162,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
 
 
 def file_digest(path: Path) -> str | None:
-    """Return the sha256 of a file; None if it cannot be read, or is a pipe or device, which might never end."""
+    """Return the sha256 of a file, or None if it cannot be read, or is a pipe or device, which might never end."""
     try:
         if not path.is_file():
             return None
@@ -166,7 +173,7 @@ def file_digest(path: Path) -> str | None:
 
 
 def remove_leftovers(folder: Path) -> list[Path]:
-    """Remove temporary files of dead writers in a folder and below; call it only under the lock."""
+    """Remove temporary files of dead writers in a folder and below. Call this only under the lock."""
     leftovers = sorted(path for path in folder.rglob(TEMPORARY) if path.is_file())
     for path in leftovers:
         with storing(path):

@@ -8,11 +8,11 @@ from walkerlab.pipeline.store.content import Group
 Array = NDArray[np.float64]
 
 UNEVEN = "foothold_height_m"  # name of the variable with the foothold heights, stored only on uneven ground
-FAR = 1e6  # m; the first level begins this far behind the first foothold, outside any drawing
+FAR_EDGE_M = 1e6  # m; the first level begins this far behind the first foothold, outside any drawing
 
 
 def ground_levels(steps: Group) -> tuple[Array, Array] | None:
-    """Return where each ground level begins along the slope, and its height (m); levels meet midway between footholds.
+    """Return where each ground level begins along the slope, and its height (m). Levels meet midway between footholds.
 
     steps  stored group of the walk's steps
 
@@ -21,4 +21,4 @@ def ground_levels(steps: Group) -> tuple[Array, Array] | None:
     if UNEVEN not in steps.variables:
         return None
     along = np.append(0.0, steps["touch_along_m"])
-    return np.append(-FAR, 0.5 * (along[:-1] + along[1:])), np.append(0.0, steps[UNEVEN])
+    return np.append(-FAR_EDGE_M, 0.5 * (along[:-1] + along[1:])), np.append(0.0, steps[UNEVEN])

@@ -90,7 +90,7 @@ class VariablesOnDisk(Mapping[str, Variable]):
 
 
 def write_variables(target: Any, variables: Iterable[tuple[str, Variable]]) -> None:
-    """Write variables one by one, coordinates first; a dimension without a coordinate is stored as a bare length."""
+    """Write variables one by one, coordinates first. A dimension without a coordinate is stored as a bare length."""
     for name, variable in variables:
         dataset = write_variable(target, name, variable)
         if variable.dims == (name,):
@@ -135,7 +135,7 @@ def encoded(values: NDArray[Any]) -> NDArray[np.bytes_]:
 
 
 def write_attributes(holder: Any, attributes: Mapping[str, Attribute]) -> None:
-    """Write attributes in order; text is UTF-8 of fixed length, as in every netCDF file."""
+    """Write attributes in order. Text is UTF-8 of fixed length, as in every netCDF file."""
     for name, value in attributes.items():
         if isinstance(value, str):
             data = value.encode()
@@ -155,14 +155,17 @@ def parse(data: bytes) -> tuple[dict[str, Group], dict[str, Attribute]]:
 
 
 class Budget:
-    """Number of bytes that the datasets not yet read may declare; a file may not declare more than it holds."""
+    """Number of bytes that the datasets not yet read may declare. A file may not declare more than it holds."""
 
     def __init__(self, size: int) -> None:
         """Set the budget to the size of the file, in bytes."""
         self.left = size
 
     def spend(self, size: int) -> None:
-        """Subtract declared bytes; raises ValueError if the contents declare more than the file holds."""
+        """Subtract declared bytes.
+
+        Raises ValueError if the contents declare more than the file holds.
+        """
         self.left -= size
         if self.left < 0:
             raise ValueError("it declares more data than the file holds")
@@ -201,7 +204,7 @@ def names_of(members: Mapping[str, Any]) -> dict[int, str]:
 
 
 def read_variable(name: str, dataset: Any, names: Mapping[int, str], budget: Budget) -> Variable:
-    """Read one array with its labels; `names` maps the addresses of the group's members to their names."""
+    """Read one array with its labels. `names` maps the addresses of the group's members to their names."""
     values = read_values(name, dataset, budget)
     if read_text(dataset, "dtype", "") == "bool":
         values = values.astype(np.bool_)
@@ -235,7 +238,7 @@ def read_values(name: str, dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """Read the strings of a dataset; those of layout 2 have variable lengths."""
+    """Read the strings of a dataset. Those of layout 2 have variable lengths."""
     if h5py.check_string_dtype(dataset.dtype).length is None:
         return read_variable_strings(dataset, budget)
     texts = np.asarray(dataset[()])
@@ -262,7 +265,10 @@ def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_attributes(holder: Any) -> dict[str, Attribute]:
-    """Read the attributes of a group as Python types; raises ValueError for other types."""
+    """Read the attributes of a group as Python types.
+
+    Raises ValueError for other types.
+    """
     attributes: dict[str, Attribute] = {}
     for name in holder.attrs:
         declared = holder.attrs.get_id(name)
@@ -274,7 +280,7 @@ def read_attributes(holder: Any) -> dict[str, Attribute]:
 
 
 def read_text(holder: Any, name: str, default: str | None = None) -> str:
-    """Read a text attribute; return `default` if it is absent."""
+    """Read a text attribute, and return `default` if it is absent."""
     if default is not None and name not in holder.attrs:
         return default
     value = holder.attrs[name]

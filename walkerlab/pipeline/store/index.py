@@ -30,13 +30,13 @@ def index(folder: Path, files: Iterable[Path]) -> Group:
 
 
 def indexed_files(content: Content) -> dict[str, str]:
-    """Return the digest of each listed file, by path in the run folder; empty if the content has no list."""
+    """Return the digest of each listed file, by path in the run folder. It is empty if the content has no list."""
     group = content.groups.get(GROUP)
     return dict(zip(group["file"].tolist(), group["sha256"].tolist(), strict=True)) if group is not None else {}
 
 
 def broken_file(folder: Path, content: Content) -> str | None:
-    """Describe the first listed file that is missing or altered; None if all are intact."""
+    """Describe the first listed file that is missing or altered, or return None if all are intact."""
     for name, digest in indexed_files(content).items():
         current = file_digest(folder / PurePosixPath(name))
         if current is None:

@@ -27,13 +27,13 @@ class Identity:
 
     @property
     def key(self) -> str:
-        """Stage key: sha256 of all fields except the name; the order of keys does not matter."""
+        """Stage key: sha256 of all fields except the name. The order of keys does not matter."""
         parts = [self.schema_version, dict(self.config_slice), dict(self.input_keys), self.code_digest]
         return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 
 def changed_parts(old: Identity, new: Identity) -> list[str]:
-    """Describe the differences between two identities; empty if their keys are equal."""
+    """Describe the differences between two identities, or return none if their keys are equal."""
     changes = list(differences("", old.config_slice, new.config_slice))
     for name in sorted({*old.input_keys, *new.input_keys}):
         if old.input_keys.get(name) != new.input_keys.get(name):

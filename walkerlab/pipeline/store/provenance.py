@@ -1,4 +1,4 @@
-"""Provenance of results: software, machine, time and command; recorded, but not part of the key."""
+"""Provenance of results: software, machine, time and command. Recorded, but not part of the key."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Provenance:
         start, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
         return (ended - start).total_seconds()
 
-    def until_now(self) -> Provenance:
+    def finish(self) -> Provenance:
         return replace(self, ended_utc=utc_now())
 
 
@@ -90,5 +90,5 @@ def library_versions() -> dict[str, str]:
 
 
 def git_commit() -> str | None:
-    """Return the commit that this package runs from or was built from; None if unknown."""
+    """Return the commit that this package runs from or was built from, or None if unknown."""
     return commit_of_package(Path(walkerlab.__file__).parent)

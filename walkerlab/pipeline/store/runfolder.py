@@ -52,7 +52,7 @@ class RunFolder:
     changes: tuple[str, ...] = ()  # KEY=VALUE of each key in which the config differs from its source
 
     @classmethod
-    def at(cls, path: Path) -> RunFolder:
+    def open_folder(cls, path: Path) -> RunFolder:
         """Return the run in a folder, with its recorded source and changes."""
         folder = path if path.name not in ("", "..") else path.resolve()
         record = cls(folder.parent, folder.name).record()
@@ -87,7 +87,7 @@ class RunFolder:
         return self.path / f"{stage}.parts"
 
     def record(self) -> Record | None:
-        """Read the run record; None if it is missing or unreadable."""
+        """Read the run record, or return None if it is missing or unreadable."""
         try:
             entry = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
             run, changes = str(entry["run"]), entry.get("changes")
@@ -97,11 +97,14 @@ class RunFolder:
             return None
 
     def write_record(self, record: Record) -> None:
-        """Write the run record; raises StorageError if that fails."""
+        """Write the run record.
+
+        Raises StorageError if that fails.
+        """
         write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
     def worker(self) -> Holder | None:
-        """Return the process that works in the folder; None if there is none, or if its command is unknown."""
+        """Return the process that works in the folder, or None if there is none, or if its command is unknown."""
         try:
             worker = Holder(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
         except (OSError, ValueError, TypeError, RecursionError):

@@ -24,7 +24,7 @@ SHOWN_CHANGES = 3
 
 
 def config_text(folder: RunFolder) -> str | None:
-    """Return the resolved config of a run as YAML; None if neither its record nor a readable result contains it."""
+    """Return the resolved config of a run as YAML, or None if neither its record nor a readable result contains it."""
     record = folder.record()
     if record is not None:
         return record.config
@@ -39,7 +39,7 @@ def stored_in(folder: RunFolder) -> list[str]:
 
 
 def config_of(folder: RunFolder) -> Config | None:
-    """Return the config of a run; None if it is unknown or this version's schema rejects it."""
+    """Return the config of a run, or None if it is unknown or this version's schema rejects it."""
     try:
         tree = read_text(config_text(folder) or "", "stored config")
         return validate_tree(tree) if isinstance(tree, BlockNode) else None
@@ -62,18 +62,21 @@ def read_all(folder: RunFolder, stages: Iterable[str]) -> tuple[dict[str, Stored
 
 
 def find_run(text: str, runs_dir: Path) -> RunFolder | None:
-    """Find a run by its name in the folder of all runs, or by its path; None if it does not exist."""
+    """Find a run by its name in the folder of all runs, or by its path, or return None if it does not exist."""
     path = Path(text)
     is_name = path.name == text and text != ".."
     places = (runs_dir / path, path) if is_name else (path,)
     # the system refuses a path that is too long
     with contextlib.suppress(OSError):
-        return next((RunFolder.at(place) for place in places if place.is_dir()), None)
+        return next((RunFolder.open_folder(place) for place in places if place.is_dir()), None)
     return None
 
 
 def run_named(text: str, runs_dir: Path) -> RunFolder:
-    """Find a run by its name in the folder of all runs, or by its path; raises ConfigError if it does not exist."""
+    """Find a run by its name in the folder of all runs, or by its path.
+
+    Raises ConfigError if it does not exist.
+    """
     run = find_run(text, runs_dir)
     if run is not None:
         return run
@@ -86,7 +89,7 @@ def run_named(text: str, runs_dir: Path) -> RunFolder:
 
 
 def claim(folder: RunFolder, config: Config) -> None:
-    """Record in a folder which config its results belong to; call it under the lock, before any result is written.
+    """Record in a folder which config its results belong to, and call it under the lock, before any result is written.
 
     Raises ConfigError as `refuse_another_config` does.
     """

@@ -23,7 +23,7 @@ from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged, OtherLayout
 from walkerlab.pipeline.store.columns import rows_group
-from walkerlab.pipeline.store.content import Content, untimed
+from walkerlab.pipeline.store.content import Content, remove_timings
 from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.provenance import Provenance
 from walkerlab.pipeline.store.runfolder import RunFolder
@@ -32,7 +32,7 @@ Status = Literal["answered", "no-answer", "failed"]
 Labels = Mapping[str, tuple[str, str]]
 
 FOLDER: Final = "sweep-chunks"
-NOT_OF_THE_POINT: Final = ("left_out", "no_answer")
+OMITTED_KEYS: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
 """Number of caches of stage inputs (see `memory_for`) that a process keeps."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
@@ -63,14 +63,16 @@ class Chunk:
 
 @lru_cache(maxsize=MEMORIES)
 def memory_for(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
-    """Return this process's cache of stage inputs, which is kept between chunks; arguments as in `compute_point`."""
+    """Return the cache of stage inputs of this process, which is kept between chunks. Arguments are as in
+    `compute_point`.
+    """
     return MemoryResults(graph)
 
 
 def compute_point(
     config: Config, key: str, graph: Graph, target: str, again: bool, forced: str = "", expected: str | None = None
 ) -> Chunk:
-    """Compute one point in this process; an error becomes its result.
+    """Compute one point in this process. An error becomes its result.
 
     key       stage key of the point's result
     again     whether to repeat its walk to measure the numerical error
@@ -81,7 +83,7 @@ def compute_point(
     try:
         if expected is not None:
             refuse_other_versions(expected)
-        config = without_outputs(config, target, graph)
+        config = omit_outputs(config, target, graph)
         answer = answer_in_memory(config, target, memory, again=again or STRIDES not in graph[target].options)
     except WalkerlabError as error:
         return Chunk((PointResult(key, "failed", error.message),), {})
@@ -99,13 +101,15 @@ def join_points(points: Sequence[tuple[Chunk, float]]) -> Chunk:
 
 def chunk_of(key: str, answer: Content) -> Chunk:
     """Convert a stage's answer to a chunk of one point."""
-    numbers = json.dumps(by_name(untimed(answer.summary, answer.timed)), allow_nan=False, separators=(",", ":"))
+    numbers = json.dumps(
+        flatten_summary(remove_timings(answer.summary, answer.timed)), allow_nan=False, separators=(",", ":")
+    )
     status: Status = "answered" if answer.no_answer is None else "no-answer"
     reason = "" if answer.no_answer is None else answer.no_answer.message
     return Chunk((PointResult(key, status, reason, numbers),), labels_in(answer))
 
 
-def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
+def flatten_summary(summary: Mapping[str, Any]) -> dict[str, Any]:
     """Flatten a summary to numbers, strings and lists of numbers with dotted names, such as `dissipated_J.friction`."""
     flat: dict[str, Any] = {}
 
@@ -124,7 +128,7 @@ def by_name(summary: Mapping[str, Any]) -> dict[str, Any]:
                 take(name, {str(number): item for number, item in enumerate(value)})
 
     for key, value in summary.items():
-        if key not in NOT_OF_THE_POINT:
+        if key not in OMITTED_KEYS:
             take(UNFIT.sub("_", key), value)
     return flat
 
@@ -136,7 +140,7 @@ def is_regular(value: list[Any]) -> bool:
     return len(lists) == len(value) and len({len(item) for item in lists}) == 1 and all(map(is_regular, lists))
 
 
-def without_outputs(config: Config, target: str, graph: Graph) -> Config:
+def omit_outputs(config: Config, target: str, graph: Graph) -> Config:
     """Return the config without time series of the target's walk, unless another stage needs them."""
     asking = [stage.name for stage in graph.needed_for(target, config) if "outputs" in stage.reads(config)]
     return config.model_copy(update={"outputs": ()}) if asking == [target] else config
@@ -152,7 +156,10 @@ def labels_in(content: Content) -> dict[str, tuple[str, str]]:
 
 
 def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provenance: Provenance) -> None:
-    """Store a chunk without its failed points; raises StorageError if that fails."""
+    """Store a chunk without its failed points.
+
+    Raises StorageError if that fails.
+    """
     rows = [row for row in chunk.rows if row.status != "failed"]
     if not rows:
         return
@@ -163,7 +170,7 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)
     path = folder.path / FOLDER / name
     path.parent.mkdir(exist_ok=True)
-    artifact.write(path, content, identity, provenance.until_now())
+    artifact.write(path, content, identity, provenance.finish())
 
 
 def stored_chunks(

@@ -1,4 +1,4 @@
-"""Engines that compute chunks; each provides a concurrent.futures executor."""
+"""Engines that compute chunks. Each provides a concurrent.futures executor."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class SweepEngine:
 
     @contextlib.contextmanager
     def start_early(self, order: Order) -> Iterator[SweepEngine]:
-        """Yield the engine for one sweep; local workers start now and import modules while the points are prepared."""
+        """Yield the engine for one sweep. Local workers start now and import modules while the points are prepared."""
         if self.opened is not local:
             yield self
             return
@@ -136,7 +136,7 @@ class DaskWorkers:
         self._seen_at = time.monotonic()  # when there was a worker
 
     def wait(self, job: Any) -> None:
-        """Wait until a job has ended; start the workers again if there has been none for a while."""
+        """Wait until a job has ended, and start the workers again if there has been none for a while."""
         while not job.done():
             with contextlib.suppress(TimeoutError):
                 extra("distributed", "dask").wait(job, timeout=LISTING_S)
@@ -152,7 +152,7 @@ class DaskWorkers:
 
 @contextlib.contextmanager
 def slurm(order: Order) -> Iterator[JobExecutor]:
-    """Submit a Slurm job for each chunk; `cluster=local` runs the jobs on this machine, for trials."""
+    """Submit a Slurm job for each chunk. `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", order)
     options: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in order.options.items()}
@@ -166,7 +166,7 @@ def slurm(order: Order) -> Iterator[JobExecutor]:
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
     queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
-    submit = functools.partial(job_runner.submit, until_told)
+    submit = functools.partial(job_runner.submit, run_until_signalled)
     executor = JobExecutor(submit, order.workers or 16, None if queue is None else queue.wait)
     with environment_of_workers():
         try:
@@ -178,8 +178,8 @@ def slurm(order: Order) -> Iterator[JobExecutor]:
                         job.cancel(check=False)
 
 
-def until_told(fn: Callable[..., Any], *args: Any) -> Any:
-    """Run a function in a job; a signal that announces the job's end raises JobEndsError in it."""
+def run_until_signalled(fn: Callable[..., Any], *args: Any) -> Any:
+    """Run a function in a job. A signal that announces the end of the job raises JobEndsError in it."""
     announcement = os.environ.get("SUBMITIT_PREEMPT_SIGNAL", "USR2")
     numbers = (signal.Signals[f"SIG{announcement}"], signal.SIGTERM)
     for number in numbers:
@@ -192,17 +192,22 @@ def until_told(fn: Callable[..., Any], *args: Any) -> Any:
 
 
 class SlurmQueue:
-    """States of this user's Slurm jobs, from the queue; submitit asks only the accounting, which few clusters keep."""
+    """States of this user's Slurm jobs, from the queue, because submitit asks only the accounting, which few clusters
+    keep.
+    """
 
     def __init__(self, time_limit: str) -> None:
-        """Start without asking; `time_limit` is that of the jobs, min."""
+        """Start without asking. `time_limit` is that of the jobs (min)."""
         self.time_limit = time_limit
         self._lock = threading.Lock()
         self._states: dict[str, str] = {}
         self._listed_at = self._answered_at = time.monotonic() - LISTING_S
 
     def wait(self, job: Any) -> None:
-        """Wait until a job has stored its result; raises JobEndedError if it ended without one."""
+        """Wait until a job has stored its result.
+
+        Raises JobEndedError if it ended without one.
+        """
         submitted = seen_alive = time.monotonic()
         while not job.paths.result_pickle.exists():
             state = self.state(job.job_id, submitted)
@@ -244,7 +249,8 @@ class SlurmQueue:
 
 
 def private_jobs_folder(run_folder: Path) -> Path:
-    """Create a folder for pickled jobs and results, or close it to other users; they are run when they are loaded.
+    """Create a folder for pickled jobs and results, or close it to other users, because pickles run code when they are
+    loaded.
 
     Raises ConfigError if other users may replace it, StorageError if it cannot be created or closed.
     """
@@ -264,7 +270,7 @@ def private_jobs_folder(run_folder: Path) -> Path:
 
 
 class JobExecutor(SizedExecutor):
-    """Executor that starts jobs of a library; a thread waits for each job."""
+    """Executor that starts jobs of a library. A thread waits for each job."""
 
     def __init__(self, start: Callable[..., Any], size: int, wait_for: Callable[[Any], None] | None = None) -> None:
         """Store the functions that start a job and wait for it.
@@ -302,7 +308,10 @@ def refuse_address(name: str, order: Order) -> None:
 
 
 def extra(module: str, name: str) -> Any:
-    """Import a library that an extra of the package installs; raises ConfigError if it is not installed."""
+    """Import a library that an extra of the package installs.
+
+    Raises ConfigError if it is not installed.
+    """
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -319,7 +328,10 @@ ENGINES: dict[str, SweepEngine] = {
 
 
 def engine_named(text: str) -> tuple[SweepEngine, str]:
-    """Return the engine and the address of NAME or NAME=ADDRESS; raises ConfigError for an unknown name."""
+    """Return the engine and the address of NAME or NAME=ADDRESS.
+
+    Raises ConfigError for an unknown name.
+    """
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: unknown engine; choose from {', '.join(ENGINES)}.")

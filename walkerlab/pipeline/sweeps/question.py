@@ -75,7 +75,7 @@ class SweptStage:
         return math.prod(self.shape)
 
     def places(self, index: int) -> tuple[int, ...]:
-        """Return the index of each parameter's value at a point; the last parameter changes fastest."""
+        """Return the index of each parameter's value at a point. The last parameter changes fastest."""
         if self.layout == "list":
             return (index,) * len(self.axes)
         import numpy as np
@@ -127,7 +127,7 @@ def build_sweep(
         return SweptStage(stage, sampled(axes, sample, seed), "list")
     for parameter in axes:
         if not parameter.values:
-            raise bad(parameter.source, f"{parameter.key}: the number of values is missing", FORMS)
+            raise parameter_error(parameter.source, f"{parameter.key}: the number of values is missing", FORMS)
     if zipped and len({len(parameter.values) for parameter in axes}) > 1:
         lengths = ", ".join(f"{parameter.key} {len(parameter.values)}" for parameter in axes)
         raise problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
@@ -135,18 +135,21 @@ def build_sweep(
 
 
 def refuse_too_many(what: str, count: int) -> None:
-    """Raise ConfigError for more than MAX_POINTS points; `what` is the option or key that requests them."""
+    """Raise ConfigError for more than MAX_POINTS points. `what` is the option or key that requests them."""
     if count > MAX_POINTS:
         raise problem_error(None, f"{what}: {count} points", f"up to {MAX_POINTS} in one sweep")
 
 
 def axis_of_text(text: str) -> tuple[str, Any, str]:
-    """Parse one `--over KEY=VALUES` into key, values and origin; raises ConfigError for any other form."""
+    """Parse one `--over KEY=VALUES` into key, values and origin.
+
+    Raises ConfigError for any other form.
+    """
     key, equals, values = text.partition("=")
     source = f"--over {text}"
     key = key.strip()
     if not equals or not all(key.split(".")):
-        raise bad(source, "is not of the form KEY=VALUES", FORMS)
+        raise parameter_error(source, "is not of the form KEY=VALUES", FORMS)
     if values.lstrip().startswith("["):
         node = read(values, source, len(key) + 2)
         assert isinstance(node, ListNode)
@@ -154,8 +157,8 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     return key, values.strip(), source
 
 
-def bad(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
-    """Build the error for an invalid parameter, option or key; its message gives `source`, not a file position."""
+def parameter_error(source: str, text: str, allowed: str = "", near: str = "") -> ConfigError:
+    """Build the error for an invalid parameter, option or key. Its message gives `source`, not a file position."""
     return problem_error(Position(source, 0, 0), text, allowed, near)
 
 
@@ -166,17 +169,20 @@ def key_fields() -> dict[str, FieldInfo]:
 
 
 def axis(key: str, values: Any, source: str) -> Axis:
-    """Build the axis of one parameter; raises ConfigError for an unknown key or invalid values."""
+    """Build the axis of one parameter.
+
+    Raises ConfigError for an unknown key or invalid values.
+    """
     fields = key_fields()
     if key not in fields and not any(key.startswith(f"{known_key}.") for known_key in fields):
         if any(known_key.startswith(f"{key}.") for known_key in fields):
-            raise bad(source, f"{key}: is a block of keys, not a value")
+            raise parameter_error(source, f"{key}: is a block of keys, not a value")
         if not key.startswith("walker."):  # walkers of other types have other keys, which are checked at each point
-            raise bad(source, f"{key}: unknown key", near=nearest(key, fields))
+            raise parameter_error(source, f"{key}: unknown key", near=nearest(key, fields))
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
         if odd is not None or not values:
-            raise bad(source, f"{key}: {odd if values else 'an empty list'}", FORMS)
+            raise parameter_error(source, f"{key}: {odd if values else 'an empty list'}", FORMS)
         refuse_too_many(key, len(values))
         return Axis(key, tuple(values), source)
     parts = str(values).split(":")
@@ -188,22 +194,22 @@ def axis(key: str, values: Any, source: str) -> Axis:
     refuse_too_many(f"{key}={values}", count)
     logarithmic = parts[3:] == ["log"]
     if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
-        raise bad(source, f"{key}: {values} is not a range of values", FORMS)
+        raise parameter_error(source, f"{key}: {values} is not a range of values", FORMS)
     if logarithmic and min(low, high) <= 0.0:
-        raise bad(source, f"{key}: {values}", "both ends above 0 for a logarithmic range")
-    return Axis(key, as_the_key_has_it(key, spaced(low, high, count, logarithmic)), source, (low, high))
+        raise parameter_error(source, f"{key}: {values}", "both ends above 0 for a logarithmic range")
+    return Axis(key, as_the_key_has_it(key, evenly_spaced(low, high, count, logarithmic)), source, (low, high))
 
 
 def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
-    """Convert whole numbers to int if the key takes integers; the schema rejects other numbers."""
+    """Convert whole numbers to int if the key takes integers. The schema rejects other numbers."""
     field = key_fields().get(key)
     if field is None or field.annotation is not int:
         return tuple(values)
     return tuple(int(value) if value.is_integer() else value for value in values)
 
 
-def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
-    """Return `count` values from `low` to `high`, both included; a single value is `low`."""
+def evenly_spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[float, ...]:
+    """Return `count` values from `low` to `high`, both included. A single value is `low`."""
     import numpy as np
 
     space = np.geomspace if logarithmic else np.linspace
@@ -211,9 +217,11 @@ def spaced(low: float, high: float, count: int, logarithmic: bool) -> tuple[floa
 
 
 def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
-    """Draw points from the intervals or lists of all parameters; raises ConfigError for an invalid sampler.
+    """Draw points from the intervals or lists of all parameters.
 
     sample  SAMPLER:N
+
+    Raises ConfigError for an invalid sampler.
     """
     name, _, number = sample.partition(":")
     if name not in SAMPLERS or not re.fullmatch("[0-9]{1,18}", number) or int(number) < 1:

@@ -24,7 +24,7 @@ from walkerlab.scene.walk_outcomes import Pads, describe_endings
 CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
 
 
-OWN: Final = {
+STATUS_TEXTS: Final = {
     "outcome": "the stage's own outcome, or else whether it has an answer",
     "status": "answered, no-answer, or failed: not computed",
     "reason": "why there is no answer",
@@ -39,13 +39,13 @@ class SweepVariable:
     """Column of sweep results: a number, a list of numbers or a string for each of `size` results."""
 
     def __init__(self, size: int, shape: tuple[int, ...], text: bool) -> None:
-        """Start with gaps only; `shape` is the shape of one value."""
+        """Start with gaps only. `shape` is the shape of one value."""
         self.kinds: set[type] = set()
         self.text = text
         self.values: NDArray[Any] = np.full((size, *shape), "" if text else np.nan, object if text else float)
 
     def put(self, places: Integers, values: Sequence[Any]) -> None:
-        """Store values at these indices; the column grows if a value has a larger shape."""
+        """Store values at these indices. The column grows if a value has a larger shape."""
         if self.text:
             # equal strings share one object, to save memory
             self.values[places] = [sys.intern(value) for value in values]
@@ -125,12 +125,12 @@ class Merge:
         """Names of the quantities that have a single number per result."""
         return [name for name, column in self.columns.items() if not column.text and column.values.ndim == 1]
 
-    def of(self, name: str) -> NDArray[Any] | None:
-        """Return a quantity's values at the points, with NaN or '' for gaps; None if no point has the quantity."""
+    def values_of(self, name: str) -> NDArray[Any] | None:
+        """Return a quantity's values at the points, with NaN or '' for gaps, or None if no point has the quantity."""
         return self.columns[name].values[self.inverse] if name in self.columns else None
 
     def content(self) -> InTurn:
-        """Return the content to store; call it only once, because storing the content removes the columns."""
+        """Return the content to store. Call this only once, because storing the content removes the columns."""
         question = self.question
         parameters = dict(coordinates(question, self.config))
         statuses = self.columns["status"].values[self.inverse]
@@ -155,11 +155,13 @@ class Merge:
         return InTurn(summary, attrs, scales, variables, size)
 
     def endings(self) -> list[dict[str, Any]]:
-        """Describe the endings of the walks and the role of the ground; empty for a stage that does not walk."""
+        """Describe the endings of the walks and the role of the ground, or return nothing for a stage that does not
+        walk.
+        """
         question, config = self.question, self.config
         outcomes = self.columns["outcome"].values[self.inverse]
-        pads, pitch = None, self.of("pitch_m")
-        off, lengths = outcomes == "off-pad", self.of("step_lengths_m")
+        pads, pitch = None, self.values_of("pitch_m")
+        off, lengths = outcomes == "off-pad", self.values_of("step_lengths_m")
         if pitch is not None and off.any():
             last = np.zeros(0) if lengths is None else last_of_each(lengths[off])
             steps = last[np.isfinite(last)]
@@ -169,9 +171,9 @@ class Merge:
         return describe_endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
 
     def numerical_error(self) -> dict[str, Any]:
-        """Return the largest errors of the repeated walks; `ended_otherwise` counts those that ended differently."""
-        errors = {key: self.of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
-        reasons, ends = self.of("numerical_error.reason"), errors["end_time_s"]
+        """Return the largest errors of the repeated walks. `ended_otherwise` counts those that ended differently."""
+        errors = {key: self.values_of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
+        reasons, ends = self.values_of("numerical_error.reason"), errors["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
         measured = 0 if ends is None else int(np.sum(np.isfinite(ends)))
         if otherwise + measured == 0:
@@ -181,14 +183,14 @@ class Merge:
         return {"numerical_error": counts | largest}
 
     def variable(self, name: str) -> Variable:
-        """Remove and return a variable over the points; without the removal two copies would exist."""
+        """Remove and return a variable over the points. Without the removal two copies would exist."""
         column = self.columns.pop(name)
         values = column.typed()[self.inverse]
         extra = values.shape[1:]
         own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
         last = name.rpartition(".")[2]
         if column.text:
-            unit, text = "", OWN.get(name, name)
+            unit, text = "", STATUS_TEXTS.get(name, name)
         elif last in STATES:
             unit, text = "rad, rad/s", last.replace("_", " ")
         elif last in self.labels:
@@ -200,7 +202,7 @@ class Merge:
 
 
 def last_of_each(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return the last number of each row (..., numbers), ignoring trailing gaps; NaN for an empty row."""
+    """Return the last number of each row (..., numbers), ignoring trailing gaps, or NaN for an empty row."""
     counts = np.isfinite(rows).sum(axis=-1, keepdims=True)
     last = np.take_along_axis(rows, np.maximum(counts - 1, 0), axis=-1)
     return np.asarray(np.where(counts > 0, last, np.nan)[..., 0])
@@ -243,7 +245,7 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 
 
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
-    """Split a variable into columns, one for each entry of a list; gaps are empty."""
+    """Split a variable into columns, one for each entry of a list. Gaps are empty."""
     values = variable.values
     points, own = values.shape[:dimensions], values.shape[dimensions:]
     rows = values.reshape((int(np.prod(points)), *own))

@@ -66,7 +66,7 @@ class Swept:
 
     @property
     def group(self) -> Group:
-        """Variables over the points; each is read from the file on access."""
+        """Variables over the points. Each is read from the file on access."""
         return GroupOnDisk(self.path)
 
     @property
@@ -75,7 +75,7 @@ class Swept:
         return int(self.summary["failed"])
 
     def error(self) -> WalkerlabError:
-        """Return the error for points that were not computed; all other points are stored."""
+        """Return the error for points that were not computed. All other points are stored."""
         message = f"{self.failed} of {len(self.question)} points were not computed"
         why = f"`reason` in {self.path} says why."
         if not self.bugs:
@@ -147,7 +147,10 @@ class SweepRun:
         return keys
 
     def foresee(self, workers: int, max_points: int) -> Foreseen:
-        """Return the plan without changing a file; raises ConfigError if the folder holds results of another config."""
+        """Return the plan without changing a file.
+
+        Raises ConfigError if the folder holds results of another config.
+        """
         refuse_another_config(self.folder, self.loaded.config)
         stored = np.zeros(len(self.places), bool)
         rows: list[PointResult] = []
@@ -194,7 +197,7 @@ class SweepRun:
             content = merge.content()
             identity = Identity("sweep", self.slice, {}, self.code_digest)
             complete = content.summary["failed"] == 0
-            artifact.write_in_turn(self.path, content, identity, origin.until_now(), complete)
+            artifact.write_in_turn(self.path, content, identity, origin.finish(), complete)
         return Swept(self.question, self.path, content.summary, reused, time.perf_counter() - started, bugs)
 
     @property
@@ -207,7 +210,7 @@ class SweepRun:
     def _compute(
         self, merge: Merge, work: SweepWork, reporter: Reporter, progress: Progress, origin: provenance.Provenance
     ) -> tuple[str, ...]:
-        """Compute the missing points; return the tracebacks of bugs, one for each place in the code."""
+        """Compute the missing points, and return the tracebacks of bugs, one for each place in the code."""
         missing = np.sort(self.first[~merge.has_row])
         if not missing.size:
             return ()
@@ -238,7 +241,7 @@ class SweepRun:
         return tuple(bugs.values())
 
     def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
-        """Iterate over the points to compute; a sample of their walks is repeated to measure the numerical error."""
+        """Iterate over the points to compute. A sample of their walks is repeated to measure the numerical error."""
         stage, graph, forced = self.question.stage, self.keys.graph, token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
@@ -270,6 +273,9 @@ def refuse_unknown_stage(name: str, graph: Graph) -> None:
 
 
 def modules_of(stage: str, config: Any, graph: Graph) -> tuple[str, ...]:
-    """Return the modules that are needed to compute a stage; raises ConfigError if it cannot be swept."""
+    """Return the modules that are needed to compute a stage.
+
+    Raises ConfigError if it cannot be swept.
+    """
     refuse_unknown_stage(stage, graph)
     return tuple(needed.module for needed in graph.needed_for(stage, config))

@@ -13,7 +13,8 @@ from walkerlab.views.cli.request import Request
 
 
 def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
-    """Delete the stages' files of one run or, with `every`, of all runs, after confirmation; remove emptied folders.
+    """Delete the stages' files of one run or, with `every`, of all runs, after confirmation, and remove emptied
+    folders.
 
     Raises typer.BadParameter if there is no terminal to ask on, LockedError (with `--no-wait`) and StorageError.
     """

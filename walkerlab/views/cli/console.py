@@ -25,7 +25,7 @@ ENOUGH_DONE, ENOUGH_S = 0.1, 3.0
 
 
 class Console:
-    """Reporter of the command line; implements `pipeline.progress.Reporter`."""
+    """Reporter of the command line, which implements `pipeline.progress.Reporter`."""
 
     def __init__(self, quiet: bool = False, verbose: bool = False, open_page: bool = False) -> None:
         self.quiet = quiet
@@ -78,7 +78,7 @@ class Console:
             self.shown = self.show(path)
 
     def show(self, page: Path | str) -> bool:
-        """Open a file or address in a browser; return whether a browser was found."""
+        """Open a file or address in a browser, and return whether a browser was found."""
         # Imported here: most commands show no page.
         import webbrowser
 
@@ -156,7 +156,7 @@ class StageLine:
         self.began = self.work_began = time.monotonic()
 
     def start(self, label: str, total: int | None = None) -> None:
-        """Begin a piece of work; `total`: number of its parts, or None if unknown."""
+        """Begin a piece of work of `total` parts, or None if their number is unknown."""
         self.label, self.total, self.done, self.progress = label, total, 0, []
         self.work_began = time.monotonic()
         self.console.detail(label if total is None else f"{label} ({total})")
@@ -184,7 +184,9 @@ class StageLine:
         return ", ".join(parts)
 
     def seconds_left(self) -> float | None:
-        """Predict the remaining time (s) from the rate so far, or from the stage's last duration; None if unknown."""
+        """Predict the remaining time (s) from the rate so far or the last duration of the stage. None if it
+        is unknown.
+        """
         computed = time.monotonic() - self.work_began
         if self.total and self.done >= ENOUGH_DONE * self.total and computed >= ENOUGH_S:
             half = bisect.bisect_left(self.progress, (self.done // 2,))

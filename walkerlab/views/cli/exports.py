@@ -19,7 +19,7 @@ from walkerlab.config.problems import suggestion
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.extensions import declared, load
-from walkerlab.labels import join_words, with_unit
+from walkerlab.labels import add_unit, join_words
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.planner import Planner
 from walkerlab.pipeline.plan.resolve import warn_of_edits
@@ -54,7 +54,10 @@ FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
 
 
 def run_to_export(run: str, request: Request) -> RunFolder:
-    """Find a run, and warn if its config file was edited since; ConfigError if there is no such run."""
+    """Find a run, and warn if its config file was edited since.
+
+    Raises ConfigError if there is no such run.
+    """
     folder = run_named(run, request.runs)
     warn_of_edits(config_of(folder), folder, request.console.warn)
     return folder
@@ -98,7 +101,10 @@ def export_from(
 
 
 def draw_walker(config: Path, target: Target, console: Console) -> Path:
-    """Draw the walker of a config with its dimensions; ConfigError for an invalid config or unknown format."""
+    """Draw the walker of a config with its dimensions.
+
+    Raises ConfigError for an invalid config or unknown format.
+    """
     # Imported here: no other export draws a walker.
     from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
@@ -141,7 +147,10 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
 
 
 def find_item(folder: RunFolder, name: str) -> Illustration | Table:
-    """Find a figure or table by name; for an unknown name, raise ConfigError with a list of the run's items."""
+    """Find a figure or table by name.
+
+    Raises ConfigError, which lists the items of the run, for an unknown name.
+    """
     # Imported here: tables of the paper's values need no drawing code.
     from walkerlab.views.figures.registry import FIGURES
 
@@ -176,7 +185,10 @@ def plan_run(folder: RunFolder) -> Planner:
 def figure(
     folder: RunFolder, illustration: Illustration, kind: str, size: tuple[float, int], console: Console
 ) -> bytes:
-    """Draw a figure as on the page; `size`: width (pt) and pixels per inch. StaleError if its results are missing."""
+    """Draw a figure as on the page. `size` holds the width (pt) and the pixels per inch.
+
+    Raises StaleError if its results are missing.
+    """
     stored = results_in(folder, illustration.stages)
     run, plot = plan_run(folder), PIPELINE["plot"]
     inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
@@ -201,7 +213,10 @@ def figure(
 
 
 def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
-    """Return a table of the paper's values, as records (csv) or as on the page (tex); ConfigError for other walkers."""
+    """Return a table of the paper's values, as records (csv) or as on the page (tex).
+
+    Raises ConfigError for other walkers.
+    """
     with results_to_show(folder, ["compare"], console.warn) as results:
         summary = the_result(results, folder, "compare").summary
     if TABLES[name] not in summary:
@@ -219,7 +234,10 @@ def table(folder: RunFolder, name: str, kind: str, console: Console) -> Table:
 
 
 def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
-    """Return a CSV file of a walk's steps for `identify --level steps`; StaleError if the walk takes no step."""
+    """Return a CSV file of a walk's steps for `identify --level steps`.
+
+    Raises StaleError if the walk takes no step.
+    """
     with results_to_show(folder, [model], console.warn) as results:
         groups = the_result(results, folder, model).groups
     if STEPS not in groups:
@@ -231,13 +249,16 @@ def steps_of_walk(folder: RunFolder, model: str, console: Console) -> bytes:
 
 
 def touch_angles(steps: Group, trajectory: Group) -> NDArray[np.float64]:
-    """Return the angle (steps,) in rad of the leg that touches down at the end of each step; leg 1 touches first."""
+    """Return the angle (steps,) in rad of the leg that touches down at the end of each step. Leg 1 touches first."""
     legs = [np.interp(steps["touch_time_s"], trajectory["time"], leg) for leg in trajectory["angle"].T]
     return np.asarray(np.where(np.arange(steps["touch_time_s"].size) % 2 == 0, *legs))
 
 
 def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> bytes:
-    """Return a walk over time as CSV (a column per variable and leg) or netCDF; StaleError if none is stored."""
+    """Return a walk over time as CSV (a column per variable and leg) or netCDF.
+
+    Raises StaleError if none is stored.
+    """
     with results_to_show(folder, [model], console.warn) as results:
         stored = the_result(results, folder, model)
     group = stored.groups.get(TRAJECTORY)
@@ -256,10 +277,10 @@ def trajectory(folder: RunFolder, model: str, kind: str, console: Console) -> by
     columns = {}
     for name, variable in sorted(group.variables.items(), key=lambda named: (named[0] != "time", named[0])):
         if variable.dims == ("time",):
-            columns[with_unit(name, variable.units)] = variable.values.tolist()
+            columns[add_unit(name, variable.units)] = variable.values.tolist()
         elif variable.dims[:1] == ("time",):
             for place, values in enumerate(variable.values.T.tolist()):
-                columns[with_unit(f"{name} {place + 1}", variable.units)] = values
+                columns[add_unit(f"{name} {place + 1}", variable.units)] = values
     return csv_text(list(columns), zip(*columns.values(), strict=True))
 
 
@@ -278,7 +299,10 @@ BOTH = "both"
 
 
 def walk_in(folder: RunFolder, model: str | None = None) -> str:
-    """Return `model` or, if None, contact-sim (simulate if only that has run); ConfigError if `model` does not walk."""
+    """Return `model` or, if None, contact-sim (simulate if only that has run).
+
+    Raises ConfigError if `model` does not walk.
+    """
     if model is not None and model not in MODEL_NAMES:
         raise ConfigError(f"--model {model} is not a stage that walks.", f"Choose from {', '.join(MODEL_NAMES)}.")
     rigid, contact = MODEL_NAMES
@@ -333,7 +357,10 @@ def gif(pictures: Iterable[Any], rate: int) -> bytes:
 
 
 def mp4(pictures: Iterable[Any], rate: int, ffmpeg: str) -> bytes:
-    """Encode the pictures as an MP4 for browsers and slides; StorageError if ffmpeg fails."""
+    """Encode the pictures as an MP4 for browsers and slides.
+
+    Raises StorageError if ffmpeg fails.
+    """
     frames = list(pictures)
     height, width, _ = frames[0].shape
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]

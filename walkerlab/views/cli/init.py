@@ -6,7 +6,7 @@ from pathlib import Path
 
 from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load, safe_name
-from walkerlab.config.problems import beyond_scope, suggestion
+from walkerlab.config.problems import explain_missing_feature, suggestion
 from walkerlab.config.reference import as_json_schema
 from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.config.writer import to_commented_yaml
@@ -17,7 +17,10 @@ SCHEMA = ".walkerlab-schema.json"
 
 
 def write_config(file: Path, walker: str) -> str:
-    """Write a walker's commented config and schema; ConfigError for an unknown type, StorageError if writing fails."""
+    """Write a walker's commented config and schema.
+
+    Raises ConfigError for an unknown type, StorageError if writing fails.
+    """
     config = load(Path(template(walker))).config
     if file.exists():
         raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")
@@ -43,7 +46,7 @@ def template(walker: str) -> str:
         types.setdefault(load(Path(name)).config.walker.type, name)
     choices = types | {name: name for name in builtin_names()}
     if walker not in choices:
-        beyond = beyond_scope(walker)
+        beyond = explain_missing_feature(walker)
         hint = f"; {beyond}." if beyond else f".{suggestion(walker, choices)}"
         raise ConfigError(f"there is no walker type {walker!r}{hint}", f"Choose from {', '.join(choices)}.")
     return choices[walker]

@@ -24,7 +24,7 @@ def write_model(
     sets: Sequence[str] = (),
     slope: str = "gravity",
 ) -> list[Path]:
-    """Write a model of a run's or config's walker, computing its gait first if necessary; return the files written.
+    """Write a model of a run's or config's walker, computing its gait first if necessary, and return the files written.
 
     sets   changes of the config, KEY=VALUE
     slope  what is tilted in a model for MuJoCo: gravity, or the geometry

@@ -16,13 +16,16 @@ SHORT = 12
 
 
 def rerun_artifact(path: Path, request: Request) -> None:
-    """Recompute an artifact in an empty folder; ConfigError if missing, StaleError if damaged or not reproduced."""
+    """Recompute an artifact in an empty folder.
+
+    Raises ConfigError if missing, StaleError if damaged or not reproduced.
+    """
     try:
         stored = read(path)
     except (FileNotFoundError, NotADirectoryError):
         raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists a run's artifacts.") from None
     except Damaged as error:
-        advice = f"`walkerlab {path.stem} -c {RunFolder.at(path.parent).quoted_path}` recomputes it."
+        advice = f"`walkerlab {path.stem} -c {RunFolder.open_folder(path.parent).quoted_path}` recomputes it."
         raise StaleError(f"{path} is damaged: {error}.", advice) from None
     stage = stored.identity.stage
     name = path.resolve().parent.name

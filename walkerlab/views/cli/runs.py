@@ -91,13 +91,16 @@ def lines(
     """Describe changed config keys, and the headline values of changed stages or, with `every`, all changed values."""
     from walkerlab.views.report.numbers import number
     from walkerlab.views.report.tables import aligned
-    from walkerlab.views.report.text import in_words
+    from walkerlab.views.report.text import format_value
 
     def as_text(value: Any) -> str:
-        return number(value, DIGITS) if isinstance(value, float) and not every else in_words(value)
+        return number(value, DIGITS) if isinstance(value, float) and not every else format_value(value)
 
     names = run_labels(folders)
-    result = ["config", *aligned([["", *names], *([key, in_words(a), in_words(b)] for key, a, b in comparison.config)])]
+    result = [
+        "config",
+        *aligned([["", *names], *([key, format_value(a), format_value(b)] for key, a, b in comparison.config)]),
+    ]
     if not comparison.config:
         result[1:] = ["  the same"]
     unlisted = 0

@@ -47,7 +47,7 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
         }
         for step in steps
     ]
-    folders = [folder] if listed is None else [RunFolder.at(path) for path in sorted(request.runs.glob("*/"))]
+    folders = [folder] if listed is None else [RunFolder.open_folder(path) for path in sorted(request.runs.glob("*/"))]
     working = {place.path: worker for place in folders if (worker := place.worker()) is not None}
     status: dict[str, Any] = {
         "run_dir": str(folder.path),
@@ -89,12 +89,12 @@ def state_of(step: Step) -> str:
 
 
 def why(step: Step) -> str:
-    """Explain a result's state; empty if the state needs no explanation."""
+    """Explain the state of a result, or return '' if it needs no explanation."""
     return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 
 def whys(steps: Sequence[Step]) -> Iterator[str]:
-    """Explain each stage's state; a repeated reason refers to the first stage that has it."""
+    """Explain each stage's state. A repeated reason refers to the first stage that has it."""
     first: dict[str, str] = {}
     for step in steps:
         reason = short_reason(why(step)) if step.action == "leave out" else why(step)
@@ -113,7 +113,10 @@ def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
 
 
 def print_stored(request: Request, stage: str) -> None:
-    """Print a stage's artifact, current or not; StaleError if it cannot be read."""
+    """Print a stage's artifact, current or not.
+
+    Raises StaleError if it cannot be read.
+    """
     path = request.folder.artifact(stage)
     step = next(step for step in survey(request.resolved, request.folder, request.graph) if step.stage.name == stage)
     if not request.folder.path.is_dir():

@@ -23,7 +23,10 @@ class Target:
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
 
     def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
-        """Return file and format (default: first of `kinds`); ConfigError for an unknown format or a protected file."""
+        """Return file and format (default: first of `kinds`).
+
+        Raises ConfigError for an unknown format or a protected file.
+        """
         a_file = self.to is not None and self.output is None and "." in self.to
         output = Path(str(self.to)) if a_file else self.output
         ending = "" if output is None else output.suffix.removeprefix(".")
@@ -50,7 +53,10 @@ class Target:
 
 
 def write_file(path: Path, data: bytes, console: Console) -> Path:
-    """Write a file, and warn if it replaces a file with different content; StorageError if writing fails."""
+    """Write a file, and warn if it replaces a file with different content.
+
+    Raises StorageError if writing fails.
+    """
     replaced = path.is_file() and path.read_bytes() != data
     try:
         write_through(path, data)

@@ -17,7 +17,7 @@ from walkerlab.pipeline.run.interrupts import PATIENCE_S
 from walkerlab.views.explore.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
-EARLY = re.compile(r"page: (.+) \(partial")
+EARLY_PAGE = re.compile(r"page: (.+) \(partial")
 """Progress line that announces a partial page."""
 JOB_PROGRAM = (
     "from walkerlab.pipeline.run.interrupts import end_with_parent; end_with_parent(); "
@@ -33,22 +33,22 @@ class Job:
         self._process: subprocess.Popen[str] | None = None
         self._runs = Path()
         self._lock = threading.Lock()
-        self._told: dict[str, Any] = {"running": False}
+        self._status: dict[str, Any] = {"running": False}
 
     def begin(self, kind: object, question: ExploredConfig) -> Answered:
-        """Start a job; status 409 while another one runs."""
+        """Start a job, or return status 409 while another one runs."""
         if kind not in KINDS:
             raise TypeError
         with self._lock:
-            if self._told["running"]:
+            if self._status["running"]:
                 return 409, {"error": {"message": "another export is running", "advice": "Wait until it has finished."}}
-            self._told = {"running": True, "kind": kind, "said": ""}
+            self._status = {"running": True, "kind": kind, "progress": ""}
         threading.Thread(target=self._make, args=(str(kind), question), daemon=True).start()
-        return 200, dict(self._told)
+        return 200, dict(self._status)
 
     def progress(self) -> dict[str, Any]:
         """Return the latest progress message and, as soon as the file exists, its address."""
-        return dict(self._told)
+        return dict(self._status)
 
     def close(self) -> None:
         """End the running job and its child processes."""
@@ -71,15 +71,18 @@ class Job:
                 folder = Path(self._command(walk, *of_config)["run_dir"])
                 file = folder / f"{walk}.gif"
                 self._command("animate", str(folder), "--model", walk, "--to", "gif", "-o", str(file))
-            self._told = {"running": False, "kind": kind, "url": self._url(file)}
+            self._status = {"running": False, "kind": kind, "url": self._url(file)}
         except (RuntimeError, OSError, KeyError, ValueError) as error:
-            self._told = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
+            self._status = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
 
     def _url(self, file: Path) -> str:
         return "/runs/" + quote(str(file.resolve().relative_to(self._runs)))
 
     def _command(self, *words: str) -> dict[str, Any]:
-        """Run a command and return its JSON output; RuntimeError with its last message if it fails."""
+        """Run a command and return its JSON output.
+
+        Raises RuntimeError with its last message if it fails.
+        """
         command = [sys.executable, "-P", "-c", JOB_PROGRAM, *words]
         lines = []
         # stdout goes to a file, since a pipe would fill while only stderr is read
@@ -90,9 +93,9 @@ class Job:
                 assert self._process.stderr is not None
                 for line in self._process.stderr:
                     lines.append(line.strip())
-                    self._told = {**self._told, "said": line.strip()}
-                    if (early := EARLY.search(line)) is not None:
-                        self._told = {**self._told, "url": self._url(Path(early[1]))}
+                    self._status = {**self._status, "progress": line.strip()}
+                    if (early := EARLY_PAGE.search(line)) is not None:
+                        self._status = {**self._status, "url": self._url(Path(early[1]))}
                 status = self._process.wait()
             output.seek(0)
             printed = output.read()

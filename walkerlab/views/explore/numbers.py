@@ -20,7 +20,7 @@ FIRST: Final = (
 """Keys shown before any search, in this order; a trailing dot means the whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
 """Blocks of which only non-zero keys are shown initially; keys of the knee's lock appear in searches only."""
-OF_OTHERS: Final = (
+HIDDEN_KEYS: Final = (
     "name", "source", "outputs", "seed", "sweep", "design", "identify", "stability", "tune", "continuation", "basin",
     "robustness",
 )  # fmt: skip
@@ -44,7 +44,7 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
     """
     for path, field in leaves(Config, held=config):
         key = ".".join(path)
-        if path[0] in OF_OTHERS or key in ("walker.type", "contact.units"):
+        if path[0] in HIDDEN_KEYS or key in ("walker.type", "contact.units"):
             continue
         value, first = value_at(config, path), value_at(start, path)
         if path == ("slope_rad",):
@@ -65,7 +65,7 @@ def rank(key: str, first: Any) -> int | None:
 
 
 def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> dict[str, Any]:
-    """Return the choices or the slider range of a key; empty if its value must be typed."""
+    """Return the choices or the slider range of a key, or neither if its value must be typed."""
     if isinstance(first, bool):
         return {"words": [True, False]}
     words = words_of(field.annotation)
@@ -98,7 +98,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
 
 
 def ordinary_size(key: str, unit: str, start: Config) -> float:
-    """Return the typical size of a quantity with this unit for the walker; 0 if unknown."""
+    """Return the typical size of a quantity with this unit for the walker, or 0 if unknown."""
     mass, leg, gravity = start.walker.total_mass_kg, start.walker.leg_length_m, start.gravity_m_s2
     speed = math.sqrt(gravity * leg)
     if key.startswith("ground."):
@@ -112,7 +112,7 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
 
 @lru_cache(maxsize=1000)  # asked again for every key whenever a slider is released
 def gaits_by(key: str, start: Config) -> Parameter | None:
-    """Return the key as a parameter along which gaits can be followed; None if no model depends on it."""
+    """Return the key as a parameter along which gaits can be followed, or None if no model depends on it."""
     try:
         return parameter_of(key, start)
     except ConfigError:

@@ -34,7 +34,7 @@ class Desk:
     """A worker process that answers only the newest waiting request."""
 
     def __init__(self, drops: bool = False) -> None:
-        """Start the worker; `drops`: whether a new request cancels the one in progress."""
+        """Start the worker. With `drops`, a new request cancels the one in progress."""
         self.drops = drops
         self.worker = self._hire()
         self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
@@ -46,7 +46,7 @@ class Desk:
         return worker
 
     def ask(self, call: Callable[[], Answered]) -> Answered:
-        """Run the call in the worker once it is free; status 409 if a newer request arrived meanwhile.
+        """Run the call in the worker once it is free, or return status 409 if a newer request arrived meanwhile.
 
         If the worker dies, a new one retries the call once, because the old one may have died while idle.
         """
@@ -84,7 +84,7 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, port: int, base: ExploredConfig) -> None:
-        """Listen on `port`; 0 picks a free one."""
+        """Listen on `port`, or on a free one if it is 0."""
         super().__init__(("127.0.0.1", port), Handler)
         self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
         self.cookie = f"walkerlab-explore-{self.server_port}"
@@ -124,7 +124,10 @@ class Server(ThreadingHTTPServer):
         self.server_close()
 
     def question(self, body: Mapping[str, Any]) -> ExploredConfig:
-        """Read the requested config from a request body; TypeError if the body is malformed."""
+        """Read the requested config from a request body.
+
+        Raises TypeError if the body is malformed.
+        """
         known = walks.WALK_STAGES.keys()
         changes, models = body.get("set", {}), body.get("models", list(known))
         if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= known:
@@ -138,14 +141,17 @@ class Server(ThreadingHTTPServer):
         return replace(question, config=config_name, sets=())
 
     def answer(self, path: str, body: Mapping[str, Any]) -> Answered:
-        """Answer a POST request; TypeError if its body is malformed."""
+        """Answer a POST request.
+
+        Raises TypeError if its body is malformed.
+        """
         question = self.question(body)
         if path == "/api/walk":
             return self.desk.ask(partial(walks.walk, question))
         if path == "/api/numbers":
             return walks.numbers(question)
         if path == "/api/along":
-            return self.background.ask(partial(walks.along, question))
+            return self.background.ask(partial(walks.follow_gaits, question))
         if path == "/api/save":
             return save(question, body.get("name"))
         if path == "/api/job":
@@ -154,7 +160,7 @@ class Server(ThreadingHTTPServer):
 
 
 def save(question: ExploredConfig, name: Any) -> Answered:
-    """Save the config in the working folder; never overwrite a file."""
+    """Save the config in the working folder, and never overwrite a file."""
     if not isinstance(name, str) or not name or Path(name).name != name:
         return failure(400, "give a file name without folders, such as mine.yaml")
     path = Path(name).with_suffix(".yaml")
@@ -210,7 +216,7 @@ class Handler(BaseHTTPRequestHandler):
             self.answer(*failure(400, f"a request is JSON: {form}; `config`, if given, must be one of the page's"))
 
     def local(self) -> bool:
-        """Return whether the request comes from this server's own page; if not, send status 403."""
+        """Whether the request comes from this server's own page. Otherwise send status 403."""
         own = f"http://{self.server.host}"
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
             return True
@@ -218,7 +224,7 @@ class Handler(BaseHTTPRequestHandler):
         return False
 
     def cookie(self) -> str:
-        """Return the token from this server's cookie; its name contains the port, so that servers do not share it."""
+        """Return the token from this server's cookie. Its name contains the port, so that servers do not share it."""
         parts = dict(part.partition("=")[::2] for part in self.headers.get("Cookie", "").split("; "))
         return parts.get(self.server.cookie, "")
 
@@ -226,7 +232,7 @@ class Handler(BaseHTTPRequestHandler):
         return self.headers.get("Authorization", "").removeprefix("Bearer ")
 
     def allowed(self, token: str) -> bool:
-        """Return whether the token is right; if not, send status 401."""
+        """Whether the token is right. If it is wrong, send status 401."""
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))

@@ -34,7 +34,7 @@ GIVE_WAY = signal.SIGUSR1
 
 
 class SupersededError(BaseException):
-    """Raised when a newer request waits; a BaseException, so that no handler mistakes it for a failure."""
+    """Raised when a newer request waits. It is a BaseException, so that no handler mistakes it for a failure."""
 
 
 class GivingWay(Silent):
@@ -82,7 +82,10 @@ class ExploredConfig:
 
     @property
     def loaded(self) -> LoadedConfig:
-        """The resolved config, with its warnings; ConfigError if it is invalid."""
+        """The resolved config, with its warnings.
+
+        Raises ConfigError if it is invalid.
+        """
         return resolve(self.config, self.all_sets, None, self.runs).loaded
 
     def refusal(self, error: WalkerlabError) -> Answered:
@@ -129,7 +132,7 @@ def walk(question: ExploredConfig) -> Answered:
             walks[stage] = answers[stage]
     if (player := motion.player(Results(config, walks), MOST_STEPS_SHOWN)) is not None:
         found["scene"] = player.scene
-        tracks = [{"meta": walker.meta, "floats": walker.track.packed()} for walker in player.walkers]
+        tracks = [{"meta": walker.meta, "floats": walker.track.pack()} for walker in player.walkers]
         found["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
     return 200, found
 
@@ -142,7 +145,7 @@ def numbers(question: ExploredConfig) -> Answered:
         return question.refusal(error)
 
 
-def along(question: ExploredConfig) -> Answered:
+def follow_gaits(question: ExploredConfig) -> Answered:
     """Follow gaits over one key: values, quantities and stability along each model's branches.
 
     The request's changes contain the block `continuation`: key, ends and points. Status 409 if a newer request came.
@@ -178,9 +181,11 @@ def curve(branch: Group) -> dict[str, list[Any]]:
 
 
 def config_text(question: ExploredConfig, name: str) -> str:
-    """Write the config as YAML that extends its starting point and lists only differences; ConfigError if invalid.
+    """Write the config as YAML that extends its starting point and lists only differences.
 
     If the starting point has another type of walker, the whole config is written.
+
+    Raises ConfigError if invalid.
     """
     start, named = config_to_extend(question.config), replace(question, changes={**question.changes, "name": name})
     base, changed = load(Path(start)).config, named.loaded.config

@@ -1,1 +1,1 @@
-"""Figures drawn from stored results, one file per subject; only this package uses matplotlib."""
+"""Figures drawn from stored results, one file per subject. Only this package uses matplotlib."""

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from walkerlab.labels import with_unit
+from walkerlab.labels import add_unit
 from walkerlab.views.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
 
 FILLS = 0.95
@@ -38,8 +38,8 @@ LONGEST: Final = 1e4
 
 
 @contextlib.contextmanager
-def styled(width: float = WIDTH) -> Iterator[None]:
-    """Apply the project's style, ignoring the user's matplotlib settings; figures are `width` inches wide."""
+def figure_style(width: float = WIDTH) -> Iterator[None]:
+    """Apply the project's style, ignoring the user's matplotlib settings. Figures are `width` inches wide."""
     size = {"figure.figsize": (width, width)}
     with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
         yield
@@ -59,7 +59,7 @@ class ShownFigure(Figure):
 
 
 def blank(height: float) -> Figure:
-    """Create a figure of the style's width; `height` (in) is for the default width and shrinks less than the width."""
+    """Create a figure of the style's width. `height` (in) is for the default width and shrinks less than the width."""
     width = matplotlib.rcParams["figure.figsize"][0]
     figure = ShownFigure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
@@ -72,7 +72,7 @@ def panels(height: float, rows: int = 1, columns: int = 1, **how: Any) -> tuple[
 
 
 def label_of(words: str, unit: str) -> str:
-    return with_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
+    return add_unit(words, re.sub(r"\^([\d.]+|e\b)", lambda power: power[1].translate(RAISED), unit))
 
 
 def label_ticks(axis: Axis) -> None:
@@ -91,7 +91,7 @@ def error_axis(axes: Axes) -> None:
 
 
 def cost_axis(axes: Axes) -> None:
-    """Make the horizontal axis logarithmic; on an empty panel, write that no run reached the end."""
+    """Make the horizontal axis logarithmic. On an empty panel, write that no run reached the end."""
     if np.isfinite(axes.dataLim.intervalx).all():
         axes.set_xscale("log")
         label_ticks(axes.xaxis)
@@ -148,7 +148,7 @@ OF_PIXELS = ("png", "tiff")
 
 
 def as_file(figure: Figure, kind: str, name: str, title: str, dpi: int = PNG_DPI) -> bytes:
-    """Return the figure as a file of one kind; `name` makes the ids in an SVG unique among figures."""
+    """Return the figure as a file of one kind. `name` makes the ids in an SVG unique among figures."""
     undated: dict[str, dict[str, Any]] = {
         "svg": {"metadata": {"Date": None, "Creator": None, "Title": title}},
         "png": {"metadata": {"Software": None, "Title": title}},
@@ -174,6 +174,6 @@ class Drawing:
 def files_of(
     figure: Figure, name: str, title: str, kinds: Sequence[str] = ("svg", "png"), dpi: int = PNG_DPI
 ) -> list[bytes]:
-    """Lay out a figure and return a file of each kind; `name` makes SVG ids unique among figures."""
+    """Lay out a figure and return a file of each kind. `name` makes SVG ids unique among figures."""
     settle(figure)
     return [as_file(figure, kind, name, title, dpi) for kind in kinds]

@@ -83,7 +83,7 @@ class Curve:
 
 
 def curve_of(group: Group, name: str) -> Curve:
-    """Read a quantity along a branch and at its bifurcations; a stretch between two points is stable if both are."""
+    """Read a quantity along a branch and at its bifurcations. A stretch between two points is stable if both are."""
     value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
     if "mark_after" not in group.variables:
         return Curve(value, quantity, stable[:-1] & stable[1:], ())
@@ -99,7 +99,9 @@ def curve_of(group: Group, name: str) -> Curve:
 
 
 def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
-    """Plot a quantity of every step, solid where stable, with bifurcations; return the kinds of the bifurcations."""
+    """Plot a quantity of every step, solid where stable, with bifurcations, and return the kinds of the
+    bifurcations.
+    """
     curve = curve_of(branch.group, name)
     width = 1.5 if branch.period == 1 else 1.0
     bounds = [0, *(int(index) + 1 for index in np.flatnonzero(np.diff(curve.stable))), curve.stable.size]
@@ -138,7 +140,7 @@ def clouds(results: Results) -> Iterator[tuple[str, Group]]:
 QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
 """Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
-LEAST: Final = 0.05
+MIN_PANEL_SPAN: Final = 0.05
 """Minimum span of panel (b) as a fraction of the full range, and of a vertical axis as a fraction of its magnitude."""
 TOLD_APART: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
@@ -188,7 +190,9 @@ def draw_branches(results: Results) -> Drawn:
 
 
 def births_in(branches: Sequence[DrawnBranch], shown: tuple[float, float]) -> list[tuple[float, int]]:
-    """List (parameter value, steps) of gaits born in folds; of gaits whose labels would overlap, only the shortest."""
+    """List (parameter value, steps) of gaits that begin at folds. If labels would overlap, only the gait of fewest
+    steps is listed.
+    """
     others = [(branch.period, curve_of(branch.group, "step_period")) for branch in branches if branch.is_other]
     folds = [
         (period, float(curve.value[place])) for period, curve in others for place, kind in curve.marks if kind == "fold"
@@ -210,14 +214,14 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
-    """Return the parameter range around the bifurcations and any attractor; None if there are no bifurcations."""
+    """Return the parameter range around the bifurcations and any attractor, or None if there are no bifurcations."""
     summary = results[STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]
     if not found:
         return None
     ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
     least, most = min(found), max(*ends, max(found))
-    room = max(ROOM * (most - least), 0.5 * (LEAST * (summary["to"] - summary["from"]) - (most - least)))
+    room = max(ROOM * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
     return max(least - room, summary["from"]), min(most + room, summary["to"])
 
 
@@ -226,7 +230,7 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     shown: list[NDArray[Any]] = [cloud[name].ravel() for _, cloud in clouds(results)]
     for branch in branches_of(results):
         curve = curve_of(branch.group, name)
-        value, quantity = (finely(values) for values in (curve.value, curve.quantity))
+        value, quantity = (interpolate(values) for values in (curve.value, curve.quantity))
         wanted = np.append(np.repeat(curve.stable, POINTS_BETWEEN), curve.stable[-1:])
         if close is not None:
             wanted &= (value >= close[0]) & (value <= close[1])
@@ -234,12 +238,12 @@ def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tu
     values = np.concatenate(shown)
     if values.size == 0:
         values = np.concatenate([branch.group[name].ravel() for branch in branches_of(results)])
-    least = LEAST * float(np.abs(values).max())
+    least = MIN_PANEL_SPAN * float(np.abs(values).max())
     room = max(ROOM * float(np.ptp(values)), 0.5 * (least - float(np.ptp(values))))
     return float(values.min()) - room, float(values.max()) + room
 
 
-def finely(along: NDArray[Any]) -> NDArray[np.float64]:
+def interpolate(along: NDArray[Any]) -> NDArray[np.float64]:
     """Interpolate values at the points of a branch, with `POINTS_BETWEEN` points per interval."""
     # Imported here: no other figure needs it.
     from scipy.interpolate import PchipInterpolator
@@ -255,7 +259,7 @@ def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
     """Return densely sampled multipliers along a branch (points, multipliers), largest first."""
     # interpolate the coefficients of their polynomial: the multipliers themselves have kinks where two of them meet
     known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
-    found = np.array([np.roots(row) for row in finely(np.array([np.poly(row).real for row in known]))])
+    found = np.array([np.roots(row) for row in interpolate(np.array([np.poly(row).real for row in known]))])
     return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)
 
 
@@ -274,7 +278,7 @@ def draw_multipliers(results: Results) -> Drawn:
     looks = {model: cycle(zip(colours, DASHES, strict=False)) for model, colours in GAITS.items()}
     key = []
     for branch in drawn:
-        value, multipliers = finely(branch.group["value"]), multipliers_of(branch)
+        value, multipliers = interpolate(branch.group["value"]), multipliers_of(branch)
         colour, dash = next(looks[branch.model])
         left.plot(multipliers.real.ravel(), multipliers.imag.ravel(), color=colour, **DOTS)
         last = multipliers[int(np.argmax(value))]

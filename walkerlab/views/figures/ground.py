@@ -25,10 +25,10 @@ from walkerlab.views.figures.walks import (
 NORMAL, FRICTION = "normal_force_N", "friction_force_N"
 FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL, FRICTION), "'forces' is not among the config's outputs")
 TOTAL: Final = "total_energy_J"
-LOST: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
+LOSS_STYLES: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
 DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
-ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOST, TOTAL), NO_ENERGIES)
+ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
 STRIDES, STEPS = 2, 40
 """Number of strides in the force figure, few enough to tell impacts apart, and of steps in the loss figure."""
 OF_SAMPLES: Final = 0.99
@@ -41,7 +41,7 @@ def draw_forces(results: Results) -> Drawn:
     """Plot normal force and friction over time (left) and against each other, with the friction cone (right)."""
     result = results[CONTACT_STAGE]
     whole = walk_of(result, CONTACT)
-    walk, every = whole.first(STRIDES), whole[NORMAL]
+    walk, every = whole.first_strides(STRIDES), whole[NORMAL]
     loads, pulls = walk[NORMAL], walk[FRICTION]
     # upper limit of the normal-force axis (N)
     top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
@@ -83,10 +83,10 @@ def draw_forces(results: Results) -> Drawn:
 
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
-    """Return the energy (J) lost in each step by cause (label, colour); the rest is attributed to the knees."""
+    """Return the energy (J) lost in each step by cause (label, colour). The rest is attributed to the knees."""
     # take the last sample before each touchdown: an impact then counts entirely towards the step that it starts
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
-    by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOST.items()}
+    by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOSS_STYLES.items()}
     given = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
     total = np.diff((given - walk[TOTAL])[rows])
     by_cause[KNEES] = total - np.sum(list(by_cause.values()), axis=0)
@@ -94,7 +94,7 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
 
 
 def draw_losses(results: Results) -> Drawn:
-    """Plot a stacked bar per step; the caption gives the mean loss (J) by cause, leaving out the first step."""
+    """Plot a stacked bar per step. The caption gives the mean loss (J) by cause, leaving out the first step."""
     found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
     figure, axes = panels(2.9)
     steps = np.arange(1, 1 + min(STEPS, next(iter(found.values())).size))

@@ -39,7 +39,7 @@ def axis_name(quantity: str) -> str:
 
 
 def draw_steps(results: Results) -> Drawn:
-    """Plot measured steps over predicted ones; the caption gives their number and the fraction inside the bands."""
+    """Plot measured steps over predicted ones. The caption gives their number and the fraction inside the bands."""
     steps = results[IDENTIFY_STAGE].groups["steps"]
     names, number = quantities(steps), 1 + steps["step"]
     figure, axes = panels(0.6 + STEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
@@ -141,7 +141,7 @@ def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str
 
 
 def draw_worth(results: Results) -> Drawn:
-    """Plot the information lost without each measured quantity; the caption names the most informative one."""
+    """Plot the information lost without each measured quantity. The caption names the most informative one."""
     shares = results[IDENTIFY_STAGE].summary["contributions"]
     names = [axis_label(name) for name in shares]
     figure, axes = panels(0.9 + 0.35 * len(names))

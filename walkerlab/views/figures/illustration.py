@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from walkerlab.pipeline.store.artifact import Identified
-from walkerlab.views.figures.canvas import Drawing, files_of, settle, styled
+from walkerlab.views.figures.canvas import Drawing, figure_style, files_of, settle
 from walkerlab.views.figures.style import POINT
 from walkerlab.views.prose import Prose, f, percent
 
@@ -32,7 +32,9 @@ class Need:
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why the requirement is not met, None if it is; `absent`: reason for each missing result, by stage."""
+        """Return why the requirement is not met, or None if it is. `absent` holds the reason for each missing result,
+        by stage.
+        """
         if self.stage not in results:
             why = absent.get(self.stage)
             return f"it needs {self.stage}" + (f": {why}" if why else "")
@@ -67,7 +69,7 @@ class Illustration:
 
     @property
     def alt_text(self) -> str:
-        """Text alternative of one or two sentences; may be empty."""
+        """Text alternative of one or two sentences, possibly empty."""
         return self.say("seen")
 
     @property
@@ -79,7 +81,9 @@ class Illustration:
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why it cannot be drawn, None if it can; `absent`: reason for each missing result, by stage."""
+        """Return why it cannot be drawn, or None if it can. `absent` holds the reason for each missing result, by
+        stage.
+        """
         reasons = (need.missing_in(results, absent) for need in self.needs)
         return next((reason for reason in reasons if reason is not None), None)
 
@@ -89,22 +93,22 @@ class Illustration:
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
     def render(self, results: Results) -> Drawing:
-        """Draw the figure and return its files and caption; equal results give equal bytes."""
-        with styled():
+        """Draw the figure and return its files and caption. Equal results give equal bytes."""
+        with figure_style():
             figure, caption_values = self.draw(results)
             svg, png = files_of(figure, self.name, self.heading)
         return Drawing(svg, png, self.say("caption", *caption_values))
 
     def figure(self, results: Results) -> Figure:
         """Draw the figure for a notebook or a script, laid out."""
-        with styled():
+        with figure_style():
             figure, _ = self.draw(results)
             settle(figure)
         return figure
 
     def as_file(self, results: Results, kind: str, width: float, dpi: int) -> bytes:
-        """Return the figure as a file of the given kind and width (pt); raster parts use `dpi`."""
-        with styled(POINT * width):
+        """Return the figure as a file of the given kind and width (pt). Raster parts use `dpi`."""
+        with figure_style(POINT * width):
             return files_of(self.draw(results)[0], self.name, self.heading, [kind], dpi)[0]
 
 

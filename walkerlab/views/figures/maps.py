@@ -37,7 +37,7 @@ def discrete(colours: Sequence[str]) -> dict[str, Any]:
 
 
 def draw_kinds(draw: Callable[..., Any], kinds: Sequence[Kind]) -> list[Artist]:
-    """Draw each cell in the colour of its kind, using `draw`; return the legend entries."""
+    """Draw each cell in the colour of its kind, using `draw`, and return the legend entries."""
     draw(np.argmax(np.array([where for _, _, where in kinds]), axis=0), **discrete([colour for colour, *_ in kinds]))
     return patches((colour, label) for colour, label, _ in kinds)
 
@@ -224,7 +224,7 @@ class OverStiffness:
         return axes.pcolormesh(*self.edges, values, **look, rasterized=True)
 
     def draw_errors(self, there: NDArray[np.bool_], ends: tuple[float, float], others: Sequence[Kind]) -> None:
-        """Shade the selected cells by error, clipped to `ends`; give cells of other kinds their fixed colours."""
+        """Shade the selected cells by error, clipped to `ends`, and give cells of other kinds their fixed colours."""
         shown = np.ma.masked_where(~there, np.clip(self.cells["error"], *ends))
         mesh = self.draw(self.right, shown, cmap="cividis", norm=LogNorm(*ends))
         self.figure.colorbar(mesh, ax=self.right, label="error", extend="both")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
-from walkerlab.views.figures.canvas import blank, files_of, styled
+from walkerlab.views.figures.canvas import blank, figure_style, files_of
 from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION, WIDTH
 
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
@@ -53,7 +53,7 @@ class Length:
 
 @dataclass(frozen=True)
 class UprightLeg:
-    """Geometry of one leg, upright with its sole at the origin; lengths in m."""
+    """Geometry of one leg in m, upright with its sole at the origin."""
 
     joints: tuple[Point, ...]  # points of the leg's line from the hip down, without the sole
     centre: Point  # centre of the sole's arc
@@ -69,7 +69,7 @@ def entry(key: str, value: float) -> str:
 
 
 def mass_labels(walker: Any, prefix: str) -> tuple[str, ...]:
-    """Return the labels of a body's mass and, if it has one, of its inertia; `prefix` begins its config keys."""
+    """Return the labels of a body's mass and, if it has one, of its inertia. `prefix` begins its config keys."""
     inertia = value_of(walker, f"{prefix}inertia_kg_m2", 0.0)
     mass = entry(f"{prefix}mass_kg", value_of(walker, f"{prefix}mass_kg"))
     return (mass, entry(f"{prefix}inertia_kg_m2", inertia)) if inertia else (mass,)
@@ -81,7 +81,7 @@ def value_of(walker: Any, key: str, *otherwise: float) -> float:
     return float(getattr(reduce(getattr, blocks, walker), last, *otherwise))
 
 
-def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
+def measure_leg(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     """Return the geometry of one upright leg, with its dimensions and masses."""
     radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
     hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
@@ -118,16 +118,16 @@ def upright(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
 
 
 def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
-    """Draw the walker's dimensions as a file of one kind (svg, pdf, png); equal walkers and names give equal bytes."""
+    """Draw the walker's dimensions as a file of one kind (svg, pdf, png). Equal walkers and names give equal bytes."""
     title = f"Dimensions of a walker of type {walker.type}"
-    with styled():
+    with figure_style():
         figure = draw_parts(walker) if isinstance(walker, PartsWalker) else draw_upright(walker)
         return files_of(figure, name, title, [kind])[0]
 
 
 def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """Draw one upright leg on the ground with its dimensions, and the second leg faintly behind it."""
-    leg = upright(walker)
+    leg = measure_leg(walker)
     length, centre = leg.joints[0][1], leg.centre
     # the leg's line ends where it meets the arc of the sole
     line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from walkerlab.views.figures.canvas import panels, settle, styled
+from walkerlab.views.figures.canvas import figure_style, panels, settle
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 
 def draw_multipliers(multipliers: Sequence[complex]) -> Figure:
     """Draw a gait's multipliers and the unit circle, inside which all multipliers of a stable gait lie."""
-    with styled(4.0):
+    with figure_style(4.0):
         figure, axes = panels(4.0)
         axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=GREY))
         axes.axhline(color=GREY, linewidth=0.5)

@@ -16,7 +16,7 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
 from walkerlab.views.figures.families import DASHES, MODELS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, sticks_of, surrounding
+from walkerlab.views.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, frame_view, sticks_of
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 Values = NDArray[np.float64]
@@ -49,9 +49,11 @@ BELOW, BESIDE = 1.7, 0.4
 
 
 def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:
-    """Return the illustration of a robustness sweep that varies one parameter or compares drives; otherwise None."""
+    """Return the illustration of a robustness sweep that varies one parameter or compares drives, or None
+    for others.
+    """
     if can_be_drawn(group, parameters):
-        return paper_figure(17, (), partial(over_one_parameter, group, parameters[0]))
+        return paper_figure(17, (), partial(plot_over_parameter, group, parameters[0]))
     driven = actuations(group, parameters)
     return None if driven is None else Illustration("push-off-or-hip", (), partial(push_off_or_hip, group, driven))
 
@@ -62,8 +64,8 @@ def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
     return len(parameters) == 1 and all(name in group.variables for name in names)
 
 
-def over_one_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
-    """Plot figure 17; the caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
+def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
+    """Plot figure 17. The caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
     x, said, unit = group[parameter].astype(float), axis_label(parameter), group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
@@ -83,7 +85,7 @@ def over_one_parameter(group: Group, parameter: str, _results: Results) -> Drawn
 
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:
-    """Return, for each drive, the points at which it acts alone; None if the sweep does not compare drives."""
+    """Return, for each drive, the points at which it acts alone, or None if the sweep does not compare drives."""
     if not set(parameters) <= ACTUATIONS.keys() or len(parameters) < 2 or ACTUATION_PANELS[0][1] not in group.variables:
         return None
     if any(group.variables[name].dims != group.variables["outcome"].dims for name in parameters):
@@ -112,13 +114,13 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
     return figure, ({ACTUATIONS[name][0]: (speed[at], norm[at], cost[at]) for name, at in least.items()},)
 
 
-def on_rough_ground(results: Results) -> Drawn:
-    """Plot figure 18; the caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
+def plot_rough_ground(results: Results) -> Drawn:
+    """Plot figure 18. The caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
     result = results[STAGE]
     sticks, steps = sticks_of(result, "rough_walk/"), result["rough_steps"]
-    across = sticks.in_plane(sticks.landings)[:, 0]
+    across = sticks.project(sticks.landings)[:, 0]
     seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)
-    left, bottom, right, top = surrounding(sticks.in_plane(seen).reshape(-1, 2), sticks.leg_length)
+    left, bottom, right, top = frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
     figure = blank(1.6 + 2.0 * BELOW)
     tall = (figure.get_figwidth() - BESIDE) * (top - bottom) / (right - left)
     figure.set_figheight(figure.get_figheight() + tall)
@@ -162,6 +164,6 @@ FIGURE_18 = paper_figure(
         Need(STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
         Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
     ),
-    on_rough_ground,
+    plot_rough_ground,
 )
 FIGURES: Final[tuple[Any, ...]] = (FIGURE_18,)

@@ -25,9 +25,11 @@ def run(
     left_out: Sequence[LeftOut] = (),
     early: Content | None = None,
 ) -> Content:
-    """Draw all figures whose results are available into the run's folder; StorageError if one cannot be stored.
+    """Draw all figures whose results are available into the run's folder.
 
     early  figures that this run has drawn already, once all that they show was there
+
+    Raises StorageError if one cannot be stored.
     """
     finished = {} if early is None else {entry["svg"]: entry for entry in early.summary["figures"]}
     make_folder(folder / FOLDER)
@@ -69,7 +71,9 @@ def draw(
 
 
 def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
-    """Draw the figures that need only `stage`, redrawing existing ones if `anew`; return the paths of all SVG files."""
+    """Draw the figures that need only `stage`, redrawing existing ones if `anew`, and return the paths of all SVG
+    files.
+    """
     make_folder(folder / FOLDER)
     results = {stage: artifact.read(folder / f"{stage}.h5")}
     figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]

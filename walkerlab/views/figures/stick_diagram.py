@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.pipeline.store.footholds import FAR, ground_levels
-from walkerlab.views.figures.canvas import add_legend, blank, entry, styled
+from walkerlab.pipeline.store.footholds import FAR_EDGE_M, ground_levels
+from walkerlab.views.figures.canvas import add_legend, blank, entry, figure_style
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
 from walkerlab.views.figures.walks import (
@@ -38,7 +38,7 @@ from walkerlab.views.figures.walks import (
 
 CYCLE = 2
 """Steps per gait cycle."""
-BETWEEN = 5
+POSTURES_BETWEEN = 5
 """Number of postures drawn between two heel strikes."""
 FAINT, FULL = 0.8, 2.2
 """Line widths (pt) of legs between heel strikes and at them."""
@@ -61,7 +61,7 @@ NO_STEPS = Group(
 
 @dataclass(frozen=True, eq=False)
 class Sticks:
-    """Joint positions of a walker; lengths in m along the slope (downhill) and normal to it."""
+    """Joint positions of a walker in m, along the slope (downhill) and normal to it."""
 
     time: Array  # (samples,) s
     hip: Array  # (samples, 2)
@@ -77,7 +77,7 @@ class Sticks:
     ending: str = ""  # outcome of a walk that failed, such as fell; otherwise empty
 
     def pushing(self, time: float) -> int | None:
-        """Return the leg whose push-off is shown at a time (s); None if no push-off is shown."""
+        """Return the leg whose push-off is shown at a time (s), or None if no push-off is shown."""
         step = int(np.searchsorted(self.strikes, time, side="right")) - 1
         late = step < 0 or time - self.strikes[step] > SEEN_S
         return None if late or not self.pushes else 1 - step % 2
@@ -113,7 +113,7 @@ class Sticks:
         around = np.cos(angles)[:, None] * down[:, None] + np.sin(angles)[:, None] * ahead[:, None]
         return np.asarray(centre[:, None] + self.radius * around)
 
-    def in_plane(self, points: Array) -> Array:
+    def project(self, points: Array) -> Array:
         """Convert points in the slope's frame (..., 2) to horizontal and vertical position (m)."""
         s, c = math.sin(self.slope), math.cos(self.slope)
         along, normal = points[..., 0], points[..., 1]
@@ -122,15 +122,15 @@ class Sticks:
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the indices of the first cycle's samples at its start and heel strikes, and of samples in between."""
         strikes = np.concatenate(([self.time[0]], self.strikes[:CYCLE]))
-        between = [np.linspace(a, b, BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
+        between = [np.linspace(a, b, POSTURES_BETWEEN + 2)[1:-1] for a, b in pairwise(strikes)]
         if strikes.size <= CYCLE:
-            between.append(np.linspace(strikes[-1], self.time[-1], BETWEEN + 2)[1:])
+            between.append(np.linspace(strikes[-1], self.time[-1], POSTURES_BETWEEN + 2)[1:])
         at_strikes = np.abs(self.time[:, None] - strikes).argmin(axis=0)
         return at_strikes, np.abs(self.time[:, None] - np.concatenate(between)).argmin(axis=0)
 
 
 def sticks_of(result: Identified, under: str = "") -> Sticks:
-    """Read the joint positions of a stored walk; `under` is the prefix of its groups."""
+    """Read the joint positions of a stored walk. `under` is the prefix of its groups."""
     asked = result.identity.config_slice
     trajectory, walker = result[f"{under}trajectory"], asked["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
@@ -154,7 +154,7 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
     heights, outline = np.zeros(landings.size), None
     if levels is not None:
         begins, heights = levels
-        outline = np.column_stack((np.append(begins, begins[-1] + FAR).repeat(2)[1:-1], heights.repeat(2)))
+        outline = np.column_stack((np.append(begins, begins[-1] + FAR_EDGE_M).repeat(2)[1:-1], heights.repeat(2)))
     landings = np.column_stack((landings, heights))
     return Sticks(
         trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radius, head, outline,
@@ -167,12 +167,12 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     at_strikes, between = sticks.postures()
     rows = np.concatenate((at_strikes, between))
     seen = np.concatenate((sticks.hip[rows, None], sticks.top[rows, None], sticks.feet[rows]), axis=1)
-    left, bottom, right, top = surrounding(sticks.in_plane(seen).reshape(-1, 2), sticks.leg_length)
+    left, bottom, right, top = frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
     widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
     left, right = left - widen, right + widen
     figure = blank(0.0)
     across = figure.get_figwidth() - BESIDE
-    lowest = sticks.in_plane(seen)[..., 1].min()
+    lowest = sticks.project(seen)[..., 1].min()
     bottom = min(bottom, lowest - UNDER * (right - left) / across)
     figure.set_figheight(ABOVE + across * (top - bottom) / (right - left))
     axes = figure.add_subplot()
@@ -180,12 +180,12 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     draw_postures(axes, sticks, between, FAINT)
     draw_postures(axes, sticks, at_strikes, FULL)
     shown = slice(0, int(rows.max()) + 1)
-    axes.plot(*sticks.in_plane(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
+    axes.plot(*sticks.project(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
     annotate(axes, sticks, sticks.top[shown])
     return figure, axes
 
 
-def surrounding(points: Array, length: float) -> tuple[float, float, float, float]:
+def frame_view(points: Array, length: float) -> tuple[float, float, float, float]:
     """Return left, bottom, right and top (m) of a view around points (points, 2), with margins relative to `length`."""
     left, bottom = points.min(axis=0) - np.array([SIDEROOM, FOOTROOM]) * length
     right, top = points.max(axis=0) + np.array([SIDEROOM, HEADROOM]) * length
@@ -193,17 +193,17 @@ def surrounding(points: Array, length: float) -> tuple[float, float, float, floa
 
 
 def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: float) -> None:
-    """Draw legs, soles and torso at the given samples; the legs differ in colour, line style and foot marker."""
-    hip = sticks.in_plane(sticks.hip[rows])
+    """Draw legs, soles and torso at the given samples. The legs differ in colour, line style and foot marker."""
+    hip = sticks.project(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
-        lines, order = sticks.in_plane(sticks.leg(leg)[rows]), look.order + width
+        lines, order = sticks.project(sticks.leg(leg)[rows]), look.order + width
         dots: dict[str, Any] = {"marker": look.marker, "markevery": [*range(1, lines.shape[1])]}
         style: dict[str, Any] = {**look.line, "linewidth": width, "zorder": order}
         axes.plot(*lines.T, **style, **dots, markersize=2.0 + width)
         if sticks.has_soles:
-            axes.plot(*sticks.in_plane(sticks.sole(leg)[rows]).T, **{**style, "linestyle": "-"})
+            axes.plot(*sticks.project(sticks.sole(leg)[rows]).T, **{**style, "linestyle": "-"})
     if sticks.head is not None:
-        torso = np.stack((hip, sticks.in_plane(sticks.head[rows])), axis=1)
+        torso = np.stack((hip, sticks.project(sticks.head[rows])), axis=1)
         axes.plot(*torso.T, color=BLACK, linewidth=width, zorder=7)
     axes.plot(*hip.T, linestyle="none", marker="o", markersize=3.0 + width, color=BLACK, zorder=8)
 
@@ -213,7 +213,7 @@ def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
     length = sticks.leg_length
     times = np.concatenate(([0.0], sticks.strikes[:CYCLE]))
     for landing, time in zip(sticks.landings[: CYCLE + 1], times, strict=True):
-        x, y = sticks.in_plane(landing - np.array([0.0, 0.03 * length]))
+        x, y = sticks.project(landing - np.array([0.0, 0.03 * length]))
         arrow = {"arrowstyle": "-|>", "color": GREY, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate(
             f"{time:.3g} s" if time else "start", (x, y), xytext=(0.0, -9.0), textcoords="offset points",
@@ -221,7 +221,7 @@ def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
         )  # fmt: skip
     height = path[:, 1].max() + 0.09 * length
     middle, half = 0.5 * (path[0, 0] + path[-1, 0]), 0.22 * length
-    tail, head = sticks.in_plane(np.array([[middle - half, height], [middle + half, height]]))
+    tail, head = sticks.project(np.array([[middle - half, height], [middle + half, height]]))
     axes.annotate("", xy=tuple(head), xytext=tuple(tail), arrowprops={"arrowstyle": "-|>", "color": BLACK})
     slope = f"walking direction, slope {sticks.slope:.4g} rad = {math.degrees(sticks.slope):.3g}°"
     axes.annotate(slope, tuple(0.5 * (head + tail)), xytext=(0.0, 7.0), textcoords="offset points", ha="center")
@@ -234,7 +234,7 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
     ends = np.array([left, right])
     top = -math.tan(sticks.slope) * ends
     if sticks.ground is not None:
-        ends, top = sticks.in_plane(sticks.ground).T
+        ends, top = sticks.project(sticks.ground).T
     axes.plot(ends, top, color=BLACK, linewidth=0.9, zorder=2.5)
     axes.fill_between(ends, top - depth, top, facecolor="white", edgecolor=GREY, hatch="////", linewidth=0.0, zorder=1)
 
@@ -258,18 +258,18 @@ PADS: Final[tuple[dict[str, Any], ...]] = tuple(
 
 
 def draw_pads(axes: Axes, sticks: Sticks, pads: Group) -> list[Artist]:
-    """Draw the visible pads of both lanes; return their legend entries."""
+    """Draw the visible pads of both lanes, and return their legend entries."""
     bottom = -PAD_HEIGHT * sticks.leg_length
     left, right = axes.get_xlim()
     for begin, end, leg in zip(pads["left_m"], pads["right_m"], pads["leg"], strict=True):
-        outline = sticks.in_plane(np.array([[begin, 0.0], [end, 0.0], [end, bottom], [begin, bottom]]))
+        outline = sticks.project(np.array([[begin, 0.0], [end, 0.0], [end, bottom], [begin, bottom]]))
         if outline[:, 0].max() > left and outline[:, 0].min() < right:
             axes.add_patch(Polygon(outline, closed=True, zorder=1.5, **PADS[int(leg) - 1]))
     return [Patch(label=f"pad of leg {leg + 1}", **look) for leg, look in enumerate(PADS)]
 
 
 def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
-    """Draw the pads or, without pads, the ground; return the legend entries."""
+    """Draw the pads or, without pads, the ground, and return the legend entries."""
     if pads is not None:
         return draw_pads(axes, sticks, pads)
     draw_slope(axes, sticks)
@@ -331,7 +331,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
     if times <= 1.0:
         return
     relief = sticks.ground * [1.0, times] - [0.0, RELIEF_UNDER * sticks.leg_length]
-    axes.plot(*sticks.in_plane(relief).T, color=VERMILLION, linewidth=0.9)
+    axes.plot(*sticks.project(relief).T, color=VERMILLION, linewidth=0.9)
     corner: dict[str, Any] = {"transform": axes.transAxes, "va": "top", "ha": "right"}
     axes.text(0.99, 0.97, f"below: ground heights × {times:g}", color=VERMILLION, **corner)
 
@@ -346,7 +346,7 @@ def moving_lines(sticks: Sticks, at: Array) -> list[Array]:
     # interpolate linearly; both sides of a heel strike are samples, so no interval spans one
     flat = [line.reshape(line.shape[0], -1) for line in lines]
     places = [np.stack([np.interp(at, sticks.time, column) for column in line.T], axis=1) for line in flat]
-    return [sticks.in_plane(place.reshape(at.size, -1, 2)) for place in places]
+    return [sticks.project(place.reshape(at.size, -1, 2)) for place in places]
 
 
 def pictures(
@@ -362,11 +362,11 @@ def pictures(
     looks = [*looks, *soles, {"color": BLACK}][: len(lines)]
     behind = [] if other is None else moving_lines(other, at)
     shown = np.concatenate([line.reshape(-1, 2) for line in (*lines, *behind)])
-    with styled():
+    with figure_style():
         figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        left, bottom, right, top = surrounding(shown, sticks.leg_length)
+        left, bottom, right, top = frame_view(shown, sticks.leg_length)
         axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
         draw_ground(axes, sticks, pads)
         draw_relief(axes, sticks)

@@ -51,10 +51,10 @@ def choose(group: Group, parameters: Sequence[str]) -> list[str]:
 
 def is_number(group: Group, name: str) -> bool:
     """Whether a variable has one number for each point of the sweep."""
-    return name in group.variables and by_point(group, name) and group[name].dtype.kind in "fib"
+    return name in group.variables and is_pointwise(group, name) and group[name].dtype.kind in "fib"
 
 
-def by_point(group: Group, name: str) -> bool:
+def is_pointwise(group: Group, name: str) -> bool:
     """Whether a variable has a value for each point of the sweep, as the outcome has."""
     return group.variables[name].dims == group.variables["outcome"].dims
 
@@ -68,14 +68,14 @@ def illustration(
 
 
 def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against: str, _results: Results) -> Drawn:
-    """Plot a sweep; the caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
+    """Plot a sweep. The caption gives quantities, parameters, outcomes, and the meaning of gaps and lines."""
     dimensions = group["outcome"].ndim
     # with few values of one parameter, a line is drawn for each
     a_map = dimensions == 2 and not against and min(group["outcome"].shape) > MAX_LINES
     if against:
         figure = one_over_another(group, names, against)
     elif dimensions != 2:
-        figure = scattered(group, parameters, names)
+        figure = plot_scatter(group, parameters, names)
     else:
         figure = (maps if a_map else lines)(group, parameters, names)
     outcomes = zip(*np.unique(group["outcome"].astype(str), return_counts=True), strict=True)
@@ -86,7 +86,9 @@ def draw(group: Group, parameters: Sequence[str], names: Sequence[str], against:
 
 
 def one_over_another(group: Group, names: Sequence[str], against: str) -> Figure:
-    """Plot each quantity over the quantity `against`, a row each; join the points in order if one parameter varies."""
+    """Plot each quantity over the quantity `against`, a row each, and join the points in order if one
+    parameter varies.
+    """
     x, few = spread(group, against)
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=True):
@@ -110,8 +112,8 @@ def label(group: Group, name: str) -> str:
     return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
 
 
-def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot a row per quantity and a column per parameter; join the points if one parameter varies monotonically."""
+def plot_scatter(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
+    """Plot a row per quantity and a column per parameter, and join the points if one parameter varies monotonically."""
     shown = list(parameters)[:MAX_PANELS]
     rows, columns = len(names), len(shown)
     figure, axes = panels(0.5 + SWEEP_PANEL_HEIGHT * rows, rows, columns, sharex="col", sharey="row", squeeze=False)
@@ -130,7 +132,7 @@ def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> 
         axes[-1][column].set_xlabel(label(group, parameter))
     for panel, name in zip(axes[:, 0], names, strict=True):
         panel.set_ylabel(label(group, name))
-    if key := marked(group, names):
+    if key := legend_entries(group, names):
         add_legend(figure, key)
     return figure
 
@@ -138,7 +140,7 @@ def scattered(group: Group, parameters: Sequence[str], names: Sequence[str]) -> 
 def spread(group: Group, parameter: str) -> tuple[NDArray[Any], NDArray[np.int_]]:
     """Return a parameter's value at every point of the sweep, as a flat array, and the indices of those to plot."""
     values = numbers(group, parameter)
-    if not by_point(group, parameter):
+    if not is_pointwise(group, parameter):
         dims = group.variables["outcome"].dims
         along = [-1 if name == parameter else 1 for name in dims]
         values = np.broadcast_to(values.reshape(along), group["outcome"].shape)
@@ -154,7 +156,7 @@ def finish_panel(axes: Axes, group: Group, parameter: str, name: str, missing: N
     set_scale(axes, group, parameter, "x")
 
 
-def marked(group: Group, names: Sequence[str]) -> list[Artist]:
+def legend_entries(group: Group, names: Sequence[str]) -> list[Artist]:
     """Return the legend entries of the stability bound and of the marks for points without an answer."""
     gaps = any(np.isnan(group[name].astype(float)).any() for name in names)
     stability = [entry(STABILITY_BOUND, color=GREY, linewidth=0.8)] if RADIUS in names else []
@@ -162,7 +164,7 @@ def marked(group: Group, names: Sequence[str]) -> list[Artist]:
 
 
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot each quantity over the parameter with more values; each value of the other parameter gets a line."""
+    """Plot each quantity over the parameter with more values. Each value of the other parameter gets a line."""
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
     x, values = numbers(group, across), group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
@@ -181,7 +183,7 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     for value, look in zip(values, looks, strict=True):
         said = f"{value:.6g}" if isinstance(value, float) else str(value)
         key.append(entry(f"{axis_label(few)} {said}{f' {unit}' if unit not in ('', '1') else ''}", **look))
-    add_legend(figure, [*key, *marked(group, names)])
+    add_legend(figure, [*key, *legend_entries(group, names)])
     return figure
 
 
@@ -195,7 +197,7 @@ def set_scale(axes: Axes, group: Group, parameter: str, which: str) -> None:
 
 
 def maps(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
-    """Plot a map for each quantity, two per row; the second parameter runs upward."""
+    """Plot a map for each quantity, two per row. The second parameter runs upward."""
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
     figure, axes = panels(0.4 + MAP_HEIGHT * rows, rows, columns, squeeze=False)

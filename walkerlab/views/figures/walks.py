@@ -1,4 +1,4 @@
-"""Figures of both models' walks: 5, 7 and 10 (over time), 9 (limit cycles); and two runs overlaid."""
+"""Figures of both models' walks: 5, 7 and 10 (over time), 9 (limit cycles), and two runs overlaid."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from walkerlab.pipeline.headlines import claims
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.views.figures.canvas import add_legend, entry, files_of, label_of, panels, styled
+from walkerlab.views.figures.canvas import add_legend, entry, figure_style, files_of, label_of, panels
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, RECORDED, RIGID, Look
 
@@ -46,13 +46,13 @@ STRIKE_WIDTH = 0.6
 
 
 def claims_in(results: Results) -> Sequence[Mapping[str, Any]]:
-    """Return the values claimed by a study for this scene; empty for other scenes."""
+    """Return the values claimed by a study for this scene, or nothing for other scenes."""
     return claims(results[COMPARE_STAGE].summary) if COMPARE_STAGE in results else ()
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnWalk:
-    """A walk to plot over time; `time`: (samples,) s."""
+    """A walk to plot over time. `time` is (samples,) in s."""
 
     look: Look  # style of its model
     outcome: str  # how the walk ended
@@ -72,7 +72,7 @@ class DrawnWalk:
     def label(self, words: str, name: str) -> str:
         return label_of(words, self.samples.variables[name].units)
 
-    def first(self, strides: int) -> DrawnWalk:
+    def first_strides(self, strides: int) -> DrawnWalk:
         strikes = self.strikes[: 2 * strides]
         if strikes.size == self.strikes.size:
             return self
@@ -88,7 +88,7 @@ def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
 
 
 def walk_of(result: Content, look: Look) -> DrawnWalk:
-    """Return a stored walk in the style of its model; a recorded walk is labelled with its own name."""
+    """Return a stored walk in the style of its model. A recorded walk is labelled with its own name."""
     times = touch_times(result.groups.get(STEPS, Group({})))
     recorded = look is RECORDED
     look = replace(RECORDED, label=str(result.summary["name"])) if recorded else look
@@ -96,13 +96,13 @@ def walk_of(result: Content, look: Look) -> DrawnWalk:
 
 
 def touch_times(steps: Group) -> Array:
-    """Return the times of the heel strikes (s); empty if no step was completed."""
+    """Return the times of the heel strikes (s), or nothing if no step was completed."""
     return steps[TOUCHES] if TOUCHES in steps.variables else np.zeros(0)
 
 
 def first_strides(walks: list[DrawnWalk], strides: int = PAPER_STRIDES) -> tuple[list[DrawnWalk], str]:
     """Return the walks' first strides, and ' (the first 5 strides)' for the caption if any walk is longer."""
-    cut = [walk.first(strides) for walk in walks]
+    cut = [walk.first_strides(strides) for walk in walks]
     return cut, "" if all(map(is_, cut, walks)) else f" (the first {strides} strides)"
 
 
@@ -122,7 +122,7 @@ def time_axes(rows: int, row_height: float, walks: list[DrawnWalk]) -> tuple[Fig
     return figure, axes
 
 
-def in_time(
+def plot_over_time(
     walks: list[DrawnWalk], row_height: float, rows: Sequence[tuple[str, str, int | None, str]]
 ) -> tuple[Figure, list[Axes]]:
     """Plot variables of walks over time, a row for each (variable, axis label, leg or None, title)."""
@@ -170,7 +170,7 @@ def draw_adjusted(results: Results) -> Drawn:
     walks, extent = first_strides(whole)
     links = ("link 1", "link 2") if named else ("the first swing leg", "the first stance leg")
     titles = [f"({'ab'[leg]}) angular velocity of {link}" for leg, link in enumerate(links)]
-    figure, _ = in_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
+    figure, _ = plot_over_time(walks, 1.9, [("velocity", "velocity", leg, title) for leg, title in enumerate(titles)])
     legend(figure, walks)
     return figure, (result.summary["adjustment"], extent, named)
 
@@ -187,7 +187,7 @@ def draw_states(results: Results) -> Drawn:
     """Plot each leg's angle and angular velocity, a row each, shaded while the leg is in stance."""
     walks, extent = first_strides(walks_with(results, STATES))
     first = walks[0]
-    figure, axes = in_time(walks, 1.55, STATES_IN_TIME)
+    figure, axes = plot_over_time(walks, 1.55, STATES_IN_TIME)
     for panel, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
         edges = np.diff((first["stance_leg"] == leg + 1).astype(int), prepend=0, append=0)
         for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
@@ -207,7 +207,7 @@ ARROW_LENGTH = 0.06
 
 
 def draw_cycles(results: Results) -> Drawn:
-    """Plot a phase plane for each leg on equal scales; the caption gives the strides shown and how the walks ended."""
+    """Plot a phase plane for each leg on equal scales. The caption gives the strides shown and how the walks ended."""
     walks, extent = first_strides(walks_with(results, STATES), CYCLES)
     figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
     for leg, panel in enumerate(axes):
@@ -265,15 +265,15 @@ ENERGIES_IN_TIME = (
 SMALLEST_SPAN = 0.005
 """Minimum span of the mechanical-energy axis relative to the energy: a constant must look constant."""
 MARGIN = 0.08
-FEW = 0.005
+TRIMMED_SHARE = 0.005
 """Fraction of the samples at each end of the range that do not set the scale, because they lie inside impacts."""
 
 
 def draw_energies(results: Results) -> Drawn:
     """Plot kinetic, potential and mechanical energy over time, a row each."""
     walks, extent = first_strides(walks_with(results, ENERGIES))
-    figure, axes = in_time(walks, 1.75, ENERGIES_IN_TIME)
-    ends = np.array([np.quantile(walk["mechanical_J"], (FEW, 1.0 - FEW)) for walk in walks])
+    figure, axes = plot_over_time(walks, 1.75, ENERGIES_IN_TIME)
+    ends = np.array([np.quantile(walk["mechanical_J"], (TRIMMED_SHARE, 1.0 - TRIMMED_SHARE)) for walk in walks])
     bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
     lacking = max(0.0, SMALLEST_SPAN * max(abs(bottom), abs(top)) - (top - bottom))
     room = 0.5 * lacking + MARGIN * (top - bottom)
@@ -304,7 +304,7 @@ RUN_LOOKS: Final[tuple[dict[str, Any], ...]] = (
 def draw_runs(
     first: Mapping[str, Content], second: Mapping[str, Content], names: tuple[str, str]
 ) -> list[bytes] | None:
-    """Draw two runs' walks overlaid, as SVG and PNG; None if they share no sampled walk."""
+    """Draw two runs' walks overlaid, as SVG and PNG, or return None if they share no sampled walk."""
     both = [
         (stage, [run[stage].groups["trajectory"] for run in (first, second)])
         for stage in (RIGID_STAGE, CONTACT_STAGE)
@@ -312,7 +312,7 @@ def draw_runs(
     ]
     if not both:
         return None
-    with styled():
+    with figure_style():
         return files_of(draw_overlay(both, names), "diff", f"{names[0]} and {names[1]}")
 
 

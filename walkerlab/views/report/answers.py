@@ -11,14 +11,14 @@ from typing import Any
 
 from markupsafe import escape
 
-from walkerlab.extensions import declared, later
+from walkerlab.extensions import declared, lazy_function
 from walkerlab.labels import join_words, unit_by_name
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.report import gaits
 from walkerlab.views.report.numbers import count, decimals_left, fixed, length, number, quantity
 from walkerlab.views.report.outcomes import MODEL_NAMES, WALKED_LABEL, describe_error
 from walkerlab.views.report.outcomes import walks as walk_text
-from walkerlab.views.report.tables import Cell, Column, Table, in_lines, measured, side_by_side, table
+from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table, table_lines
 from walkerlab.views.report.text import describe_summary, paragraph
 from walkerlab.views.report.words import words
 
@@ -33,14 +33,14 @@ MAX_CYCLE = 12
 
 
 def answer(stage: str, summary: Summary) -> list[str]:
-    """Return lines that summarise a stage's result; for a stage that is not in `ANSWERS`, list the summary's keys."""
+    """Return lines that summarise a stage's result. For a stage that is not in `ANSWERS`, list the summary's keys."""
     if not summary:
         return []
     return lay_out(ANSWERS[stage](summary)) if stage in ANSWERS else list(describe_summary(summary, short=True))
 
 
 def answer_html(stage: str, summary: Summary) -> str:
-    """Return the answer as HTML; for a stage that is not in `ANSWERS`, its lines as they are."""
+    """Return the answer as HTML. For a stage that is not in `ANSWERS`, the lines are kept as they are."""
     # Imported here: terminals need no templates.
     from walkerlab.views.report.page import environment, to_markup
 
@@ -57,7 +57,7 @@ def answer_html(stage: str, summary: Summary) -> str:
 
 
 def further_tables(stage: str, summary: Summary) -> list[str]:
-    """Return lines that complete an answer, as `--verbose` shows them; empty if the answer is complete."""
+    """Return lines that complete an answer, as `--verbose` shows them, or none if the answer is complete."""
     if stage != "robustness" or not summary:
         return []
     from walkerlab.views.report.sections import robustness
@@ -70,7 +70,7 @@ def lay_out(blocks: Iterable[str | Table]) -> list[str]:
     after_table = False
     for block in blocks:
         is_table = isinstance(block, Table)
-        block_lines = in_lines(block) if isinstance(block, Table) else paragraph(block)
+        block_lines = table_lines(block) if isinstance(block, Table) else paragraph(block)
         if block_lines:
             lines += [""] if lines and (is_table or after_table) else []
             lines += block_lines
@@ -106,7 +106,7 @@ def walk_row(title: str, key: str, digits: int = 4) -> Column:
 
 
 def energy_lost(dissipated: Mapping[str, float]) -> str:
-    """List a walk's energy losses by cause; empty if nothing was lost."""
+    """List the energy losses of a walk by cause, or return '' if nothing was lost."""
     losses = {name: quantity(lost, "J", 3) for name, lost in dissipated.items() if lost}
     return join_words(f"{lost} {CHANNELS.get(name, name)}" for name, lost in losses.items())
 
@@ -148,7 +148,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
 
 
 def each_step(summary: Summary) -> dict[str, Summary]:
-    """Format the quantities of the steps shown, by step number; '…' stands for the middle of a long walk."""
+    """Format the quantities of the steps shown, by step number. '…' stands for the middle of a long walk."""
     from walkerlab.views.report.sections.walks import format_step
 
     every = {key: values for key in STEP_HEADS if (values := summary.get(key))}
@@ -225,7 +225,7 @@ def accuracy(summary: Summary) -> list[str | Table]:
 
 
 def continuation(summary: Summary) -> list[str | Table]:
-    """Summarise the families and list every bifurcation; `walkerlab show` lists branches and exponents."""
+    """Summarise the families and list every bifurcation. `walkerlab show` lists branches and exponents."""
     from walkerlab.views.report.sections import families
 
     branches = count(len(summary["branches"]), "branch", "branches")
@@ -276,7 +276,7 @@ def measurements_to_make(summary: Summary) -> list[str | Table]:
 
 
 def engines(summary: Summary) -> list[str | Table]:
-    """Report the conclusions for each scene; `walkerlab show` lists every run."""
+    """Report the conclusions for each scene. `walkerlab show` lists every run."""
     conclusions = [
         f"{scene}, {experiment}: {text}"
         for scene, concluded in summary["conclusions"].items()
@@ -310,7 +310,7 @@ ANSWERS: dict[str, Answer] = {
     "engines": engines,
     "plot": plot,
     "report": report,
-    **{stage: later(code) for stage, code in declared("answers").items()},
+    **{stage: lazy_function(code) for stage, code in declared("answers").items()},
 }
 
 

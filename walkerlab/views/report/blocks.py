@@ -1,4 +1,4 @@
-"""Building blocks of a section. Texts are plain; the templates turn them into HTML."""
+"""Building blocks of a section. Texts are plain, and the templates turn them into HTML."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAIN, PAPER_PAGE, CASES, COSTS = "report.html", "report-paper.html", "report-sta
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Running text; its tone marks a statement or a placeholder for a pending result."""
+    """Running text. Its tone marks a statement or a placeholder for a pending result."""
 
     text: str
     tone: Tone | Literal["waiting"] = "plain"
@@ -71,7 +71,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Figures in columns; a click enlarges one."""
+    """Figures in columns. A click enlarges one."""
 
     pictures: tuple[Picture, ...]
 
@@ -130,7 +130,7 @@ class Walker:
 
 @dataclass(frozen=True)
 class Player:
-    """The animated walk; shown as stills in print and without scripts."""
+    """The animated walk, shown as stills in print and without scripts."""
 
     title: str
     caption: str
@@ -152,7 +152,7 @@ class Player:
 
     @property
     def shows_forces(self) -> bool:
-        """Whether any walker has ground forces; also true without walkers, for a player that is filled later."""
+        """Whether any walker has ground forces. It is also true without walkers, for a player that is filled later."""
         return not self.walkers or any("n0" in walker.track.channels for walker in self.walkers)
 
     @property
@@ -175,7 +175,7 @@ class GaitMark:
 
 @dataclass(frozen=True)
 class Diagram:
-    """Branches of gaits over a parameter; selecting a mark loads its gait into the page's player."""
+    """Branches of gaits over a parameter. Selecting a mark loads its gait into the page's player."""
 
     WIDTH: ClassVar[int] = 720
     HEIGHT: ClassVar[int] = 340
@@ -211,6 +211,6 @@ class Section:
     def of(
         cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
     ) -> Section | None:
-        """Create a section of the blocks that are not empty; None if all are empty."""
+        """Create a section of the blocks that are not empty, or return None if all are empty."""
         filled = tuple(block for block in blocks if block)
         return cls(anchor, title, filled, finding, page) if filled else None

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from walkerlab.views.report.numbers import MINUS, NONE, drop_rounding, fixed, number, power_of_ten
-from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, in_signs
+from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, typeset
 from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
@@ -22,7 +22,7 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
     """Tabulate fixed points (coordinates `names`) and multipliers, with a column for each set of equations."""
     six = partial(fixed, decimals=6)
     multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
-    titles = [in_signs(f"{'' if place else 'multipliers '}lambda_{place + 1}") for place in multipliers]
+    titles = [typeset(f"{'' if place else 'multipliers '}lambda_{place + 1}") for place in multipliers]
     lines = [
         *(Column(coordinate(name), partial(state_at, place), six) for place, name in enumerate(names)),
         measured("step period T", "period_s", six),
@@ -59,7 +59,7 @@ WORK_ROUNDING = 1e-12
 
 
 def works(written: Callable[[Any], str]) -> Iterator[Column]:
-    """Yield a column for each source of work; values at rounding level are omitted."""
+    """Yield a column for each source of work. Values at rounding level are omitted."""
     for name, source in WORK_SOURCES.items():
 
         def source_work(record: Mapping[str, Any], name: str = name) -> float | None:
@@ -95,7 +95,7 @@ def symbol(name: str) -> str:
 
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
-    """Format one multiplier of a gait; a dash if the gait has fewer multipliers."""
+    """Format one multiplier of a gait, or a dash if the gait has fewer multipliers."""
     multipliers = gait["multipliers"]
     return complex_number(*multipliers[place]) if place < len(multipliers) else NONE
 

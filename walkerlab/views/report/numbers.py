@@ -18,7 +18,7 @@ MAX_DECIMALS, DEFAULT_DECIMALS = 6, 4
 
 
 def number(value: float | None, digits: int = 5) -> str:
-    """Format a number with `digits` significant digits, without trailing zeros; a dash for None."""
+    """Format a number with `digits` significant digits, without trailing zeros, or a dash for None."""
     if value is None or not math.isfinite(value):
         return NONE
     if value != 0 and not PLAIN_FROM <= abs(value) < PLAIN_BELOW:
@@ -28,7 +28,7 @@ def number(value: float | None, digits: int = 5) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Format a number with a fixed number of decimals, for columns; a dash for None."""
+    """Format a number with a fixed number of decimals, for columns, or a dash for None."""
     if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{decimals}f}"
@@ -62,7 +62,7 @@ def drop_rounding(value_m: float) -> float:
 
 
 def length(value_m: float | None, digits: int = 4) -> str:
-    """Format a length in m, mm or µm, whichever reads best; 0 m below `MIN_LENGTH_M`."""
+    """Format a length in m, mm or µm, whichever reads best, and as 0 m below `MIN_LENGTH_M`."""
     if value_m is None or not math.isfinite(value_m):
         return NONE
     value_m = drop_rounding(value_m)
@@ -74,13 +74,13 @@ def length(value_m: float | None, digits: int = 4) -> str:
     return quantity(1e6 * value_m, "µm", digits)
 
 
-def whole(value: int | None) -> str:
-    """Format an integer with thousands separators, as in 27,087; a dash for None."""
+def format_integer(value: int | None) -> str:
+    """Format an integer with thousands separators, as in 27,087, or a dash for None."""
     return NONE if value is None else f"{value:,}"
 
 
 def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
-    """Format a range as 'minimum to maximum' with its unit; equal ends as one value."""
+    """Format a range as 'minimum to maximum' with its unit, or equal ends as one value."""
     ordered = sorted(values)
     if not ordered:
         return NONE

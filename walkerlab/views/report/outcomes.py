@@ -16,7 +16,7 @@ WALKED_LABEL = Outcome.WALKED.label
 
 
 def ends(outcome: str) -> str:
-    """Describe how a walk ends; an outcome unknown to this version keeps its name."""
+    """Describe how a walk ends. An outcome unknown to this version keeps its name."""
     ending = outcome_of(outcome)
     return f"ends as {outcome}" if ending is None else OUTCOME_TEXTS[ending].does
 

@@ -24,7 +24,7 @@ CODE_SPAN = re.compile(r"`([^`]*)`")
 
 @dataclass(frozen=True)
 class Page:
-    """One HTML file of the report; its texts are plain text."""
+    """One HTML file of the report. Its texts are plain text."""
 
     title: str
     sections: tuple[Section, ...]
@@ -37,7 +37,10 @@ class Page:
 
 
 def render(page: Page) -> str:
-    """Render a page as HTML; ValueError if two sections have the same anchor."""
+    """Render a page as HTML.
+
+    Raises ValueError if two sections have the same anchor.
+    """
     anchors = [section.anchor for section in page.sections]
     if len(set(anchors)) != len(anchors):
         raise ValueError(f"two sections of the report share an anchor: {anchors}")

@@ -18,14 +18,20 @@ VIEW_BOX = re.compile(rb'\bviewBox="0 0 ([\d.]+) ([\d.]+)"')
 
 
 def pictures(stored: Mapping[str, Content], folder: Path, *, numbered: bool = True) -> tuple[Picture, ...]:
-    """Embed every figure listed by `plot`, in its order; FileNotFoundError if a listed file does not exist."""
+    """Embed every figure listed by `plot`, in its order.
+
+    Raises FileNotFoundError if a listed file does not exist.
+    """
     figures = stored["plot"].summary.get("figures", []) if "plot" in stored else []
     files = fitting([(folder / figure["svg"], folder / figure["png"]) for figure in figures])
     return tuple(picture(figure, folder, file.suffix, numbered) for figure, file in zip(figures, files, strict=True))
 
 
 def picture(figure: Mapping[str, Any], folder: Path, kind: str = ".svg", numbered: bool = True) -> Picture:
-    """Embed a figure's file of this kind: SVG inline, PNG as an image; FileNotFoundError if it does not exist."""
+    """Embed a figure's file of this kind: SVG inline, PNG as an image.
+
+    Raises FileNotFoundError if it does not exist.
+    """
     svg = folder / figure["svg"]
     with svg.open("rb") as file:
         box = VIEW_BOX.search(file.read(2000))
@@ -57,7 +63,10 @@ MAX_BYTES = 1_400_000
 
 
 def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> list[Path]:
-    """Choose SVG files, or PNG for the largest until all fit in `most` bytes; FileNotFoundError if one is missing."""
+    """Choose SVG files, or PNG for the largest until all fit in `most` bytes.
+
+    Raises FileNotFoundError if one is missing.
+    """
     chosen = [svg for svg, _ in drawings]
     sizes = [svg.stat().st_size for svg in chosen]
     for index in sorted(range(len(drawings)), key=lambda index: -sizes[index]):
@@ -98,7 +107,10 @@ EXTERNAL_REFERENCE = re.compile(r"url\((?!#)|@import|expression|javascript:", re
 
 
 def inline(file: Path, alt: str) -> Markup:
-    """Inline an SVG file, described by `alt`; FileNotFoundError if it is missing, ParseError for malformed XML."""
+    """Inline an SVG file, described by `alt`.
+
+    Raises FileNotFoundError if it is missing, ParseError for malformed XML.
+    """
     root = ET.fromstring(file.read_bytes())
     values = [value for element in root.iter() for value in element.attrib.values()]
     references = [reference for value in values for reference in re.findall(r"url\(#[^)]*\)|^#.*$", value)]
@@ -109,7 +121,7 @@ def inline(file: Path, alt: str) -> Markup:
 
 
 def markup(element: ET.Element, used: set[str]) -> Markup:
-    """Copy an allowed element with its children, keeping only ids in `used`; return nothing for other elements."""
+    """Copy an allowed element with its children, keeping only ids in `used`, and return nothing for other elements."""
     name = element.tag.removeprefix(SVG)
     if name not in SVG_ELEMENTS:
         return Markup("")
@@ -123,16 +135,16 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
         local = "href" if key in (f"{XLINK}href", "href") else key
         wanted = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
         if wanted and (local != "id" or value in used) and not EXTERNAL_REFERENCE.search(value):
-            attributes += Markup(' {}="{}"').format(Markup(local), short(local, value))
+            attributes += Markup(' {}="{}"').format(Markup(local), shorten_attribute(local, value))
     return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes, inside)
 
 
 def text_content(text: str | None, name: str) -> Markup:
-    """Escape the text of a text element; return nothing for other elements."""
+    """Escape the text of a text element, and return nothing for other elements."""
     return escape(text.strip()) if text and name in ("text", "tspan") else Markup("")
 
 
-def short(name: str, value: str) -> str:
+def shorten_attribute(name: str, value: str) -> str:
     """Shorten an attribute: coordinates to a hundredth of a point, colours to CSS variables."""
     if name in ("id", "href", "clip-path"):
         return value.strip()

@@ -60,18 +60,18 @@ SECTIONS: tuple[SectionMaker, ...] = (
     *added("benchmarks"),
     adjustment.limit,
     closing.glossary,
-    closing.left_out,
+    closing.omissions_section,
     provenance.section,
 )
 
 
 def pages_of(results: Results, run: str) -> tuple[Page, ...]:
-    """Build the report and the further pages that have content; `run`: name of the run's folder."""
+    """Build the report and the further pages that have content. `run` is the name of the run's folder."""
     sections = sections_of(results)
     main = [section for section in sections if section.page == MAIN]
     further = {file: tuple(section for section in sections if section.page == file) for file in closing.TITLES}
     further = {file: sections for file, sections in further.items() if sections}
-    links = closing.further(results, further)
+    links = closing.link_pages(results, further)
     if links is not None:
         main.insert([section.anchor for section in main].index("glossary"), links)
     relation = "After" if results.departures else "Redoes"

@@ -25,17 +25,19 @@ class Results:
 
     @property
     def departures(self) -> Sequence[str] | None:
-        """Differences between this scene and the paper's; empty if both are equal, None if not compared."""
+        """Differences between this scene and that of the paper: none if both are equal, None if they were
+        not compared.
+        """
         departures: Sequence[str] | None = self.summary("compare").get("departures")
         return departures
 
     @property
     def claims(self) -> Sequence[Mapping[str, Any]]:
-        """Values claimed by a study for this scene, with verdicts; empty for other scenes."""
+        """Values claimed by a study for this scene, with verdicts. It is empty for other scenes."""
         return claims(self.summary("compare"))
 
     def summary(self, stage: str) -> Mapping[str, Any]:
-        """Return the summary of a stage's result; empty if there is no result."""
+        """Return the summary of a stage's result, or an empty one if there is no result."""
         return self.stored[stage].summary if stage in self.stored else {}
 
     def group(self, stage: str, path: str) -> Group | None:
@@ -48,7 +50,9 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """Pass a stage's summary to the decorated function; no section if the summary is empty or has no key `needed`."""
+    """Pass a stage's summary to the decorated function. There is no section if the summary is empty or lacks the key
+    `needed`.
+    """
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:
         @wraps(make)

@@ -28,7 +28,10 @@ def run(
     folder: Path,
     left_out: Sequence[LeftOut] = (),
 ) -> Content:
-    """Write the report's pages into the run's folder; StorageError if one cannot be stored."""
+    """Write the report's pages into the run's folder.
+
+    Raises StorageError if one cannot be stored.
+    """
     progress.start("report", 1)
     written, results = write_pages(config, inputs, folder, left_out)
     progress.advance()
@@ -50,7 +53,10 @@ def write_pages(
     folder: Path,
     left_out: Sequence[LeftOut] = (),
 ) -> tuple[tuple[Page, ...], Results]:
-    """Write pages of the available results, and remove pages that have no content; StorageError if that fails."""
+    """Write pages of the available results, and remove pages that have no content.
+
+    Raises StorageError if that fails.
+    """
     # also called while other stages are running, and when the command is stopped
     pending = tuple(entry for entry in left_out if entry.why in (STILL_COMPUTED, STOPPED))
     absent = tuple(entry for entry in left_out if entry not in pending)

@@ -28,7 +28,8 @@ MAX_ROWS = 200
 
 
 def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: str = "") -> tuple[Path, list[Path]]:
-    """Plot a sweep's quantities over its parameters, or over `against`; return its page, and the files of its figure.
+    """Plot a sweep's quantities over its parameters, or over `against`, and return its page and the files of its
+    figure.
 
     Raises ConfigError for an unknown quantity, StorageError if writing fails.
     """
@@ -58,7 +59,7 @@ def check_quantities(group: Group, names: Sequence[str], option: str = "--show")
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity in `names` (by option); nested ones may appear later."""
+    """Raise ConfigError for an unknown quantity in `names` (by option). Nested ones may appear later."""
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

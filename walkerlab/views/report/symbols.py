@@ -43,7 +43,7 @@ RULES = (
 """Patterns and replacements, applied in this order."""
 
 
-def in_signs(text: str) -> str:
+def typeset(text: str) -> str:
     """Convert plain letters to signs: 'dtheta_1 = -0.60 rad/s^2' becomes 'θ̇₁ = −0.60 rad/s²'."""
     for pattern, sign in RULES:
         text = pattern.sub(sign, text)

@@ -1,4 +1,4 @@
-"""Tables, described once by columns and records, for pages, terminal and CSV; for LaTeX see `tex`."""
+"""Tables, described once by columns and records, for pages, terminal and CSV. For LaTeX see `tex`."""
 
 import re
 import unicodedata
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Final, Literal
 
-from walkerlab.labels import labels_of, unit_by_name, with_unit
+from walkerlab.labels import add_unit, labels_of, unit_by_name
 from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.views.report.numbers import NONE, number
 
@@ -29,7 +29,7 @@ class Cell:
 
     @property
     def datum(self) -> Any:
-        """The cell's value in a file: the number behind the text, or the text; None if empty."""
+        """Value of the cell in a file: the number behind the text, otherwise the text, or None if it is empty."""
         if isinstance(self.value, int | float) and BARE.fullmatch(self.text):
             return self.value
         plain = self.value if isinstance(self.value, str) else self.text
@@ -73,7 +73,7 @@ class Column:
 def measured(
     words: str, key: str, written: Callable[[Any], str | Cell] = number, *, labels: type | None = None, prefix: str = ""
 ) -> Column:
-    """Return a column of numbers in a unit scaled by `prefix`; the unit comes from `labels` or the key's suffix."""
+    """Return a column of numbers in a unit scaled by `prefix`. The unit comes from `labels` or the key's suffix."""
     unit = unit_by_name(key) if labels is None else labels_of(labels)[key].unit
     factor = PREFIXES[prefix]
 
@@ -81,12 +81,12 @@ def measured(
         value = record.get(key)
         return None if value is None else factor * value
 
-    return Column(with_unit(words, f"{prefix}{unit}"), scaled if prefix else key, written, numeric=True)
+    return Column(add_unit(words, f"{prefix}{unit}"), scaled if prefix else key, written, numeric=True)
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table; the first cell of each row is its header."""
+    """A table. The first cell of each row is its header."""
 
     caption: str
     columns: tuple[Column, ...]
@@ -108,7 +108,10 @@ def table(
     note: str = "",
     by: str = "",
 ) -> Table:
-    """Build a table with a row per record; a mapping gives groups by title. ValueError for rows of the wrong length."""
+    """Build a table with a row per record. A mapping gives groups by title.
+
+    Raises ValueError for rows of the wrong length.
+    """
     groups = records if isinstance(records, Mapping) else {"": records}
     for record in chain.from_iterable(groups.values()):
         if isinstance(record, list | tuple) and len(record) != len(columns):
@@ -137,7 +140,7 @@ def side_by_side(
     numeric: bool = True,
     note: str = "",
 ) -> Table:
-    """Build a table with a column per record and a row per entry of `lines`; rows without any value are left out."""
+    """Build a table with a column per record and a row per entry of `lines`. Rows without any value are left out."""
     rows = []
     for line in lines:
         cells = {title: line.cell(record) for title, record in records.items() if line.value(record) is not None}
@@ -147,7 +150,7 @@ def side_by_side(
 
 
 def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str] = str) -> Table:
-    """Build a table of all keys of the records; cells of missing keys are empty."""
+    """Build a table of all keys of the records. Cells of missing keys are empty."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     cells = [
         [Cell("" if (value := row.get(name)) is None else written(value), value=value) for name in names]
@@ -159,8 +162,8 @@ def record_table(rows: Sequence[Mapping[str, Any]], written: Callable[[Any], str
     return table("", columns, cells)
 
 
-def flat(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
-    """Return header and rows, with any group titles in a first column; `wide` includes columns of sentences."""
+def flatten(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]]]:
+    """Return header and rows, with group titles, if any, in a first column. `wide` includes columns of sentences."""
     places = [place for place, column in enumerate(content.columns) if wide or not column.wide]
     titled = any(content.groups)
     heads = [*([content.by] if titled else []), *(content.columns[place].title for place in places)]
@@ -172,8 +175,8 @@ def flat(content: Table, wide: bool = False) -> tuple[list[str], list[list[Cell]
     return heads, rows
 
 
-def in_lines(content: Table) -> list[str]:
-    heads, rows = flat(content)
+def table_lines(content: Table) -> list[str]:
+    heads, rows = flatten(content)
     texts = [[cell.text for cell in row] for row in rows]
     return aligned([heads, *texts] if texts and any(heads) else texts)
 
@@ -192,5 +195,5 @@ def width(text: str) -> int:
 
 
 def as_csv(content: Table) -> bytes:
-    heads, rows = flat(content, wide=True)
+    heads, rows = flatten(content, wide=True)
     return csv_text(heads, ([cell.datum for cell in row] for row in rows))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from walkerlab.views.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
-from walkerlab.views.report.tables import Table, flat
+from walkerlab.views.report.tables import Table, flatten
 
 COLUMN_DIGITS: Final = 5
 """Significant digits of a column's largest number or, if its numbers differ too much, of each number."""
@@ -53,13 +53,13 @@ TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\t
 
 
 def as_tex(content: Table, columns: int = 1) -> bytes:
-    """Format a table for booktabs and siunitx, as a float if it has a caption; columns of sentences are left out.
+    """Format a table for booktabs and siunitx, as a float if it has a caption. Columns of sentences are left out.
 
     columns  journal columns that the table spans; its type is as small as they require
     """
-    titles, rows = flat(content)
+    titles, rows = flatten(content)
     data = [[row[place].datum for row in rows] for place in range(len(titles))]
-    layouts, cells = zip(*map(in_column, data), strict=True)
+    layouts, cells = zip(*map(format_column, data), strict=True)
     heads = head_rows(titles, layouts, cells)
     head, body = ([" & ".join(line) + r" \\" for line in zip(*block, strict=True)] for block in (heads, cells))
     size = type_size([[*above, *below] for above, below in zip(heads, cells, strict=True)], columns)
@@ -68,7 +68,7 @@ def as_tex(content: Table, columns: int = 1) -> bytes:
     sentences = (text if text.endswith((".", "?")) else f"{text}." for text in (content.caption, content.note) if text)
     if caption := " ".join(sentences):
         kind = "table*" if columns > 1 else "table"
-        text = [rf"\begin{{{kind}}}", r"\centering", rf"\caption{{{in_tex(caption)}}}", *text, rf"\end{{{kind}}}"]
+        text = [rf"\begin{{{kind}}}", r"\centering", rf"\caption{{{escape_tex(caption)}}}", *text, rf"\end{{{kind}}}"]
     return "\n".join([PACKAGES, WITHOUT_GRAPHICX, *text, ""]).encode()
 
 
@@ -92,16 +92,16 @@ def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Seq
     height = max(map(len, heads))
     filled = ([""] * (height - len(head)) + head for head in heads)
     return [
-        [f"{{{in_tex(line)}}}" if layout.startswith("S") and line else in_tex(line) for line in head]
+        [f"{{{escape_tex(line)}}}" if layout.startswith("S") and line else escape_tex(line) for line in head]
         for head, layout in zip(filled, layouts, strict=True)
     ]
 
 
-def in_column(data: Sequence[Any]) -> tuple[str, list[str]]:
-    """Return layout and cells of a column; a numeric column is a siunitx column, aligned at the decimal point."""
+def format_column(data: Sequence[Any]) -> tuple[str, list[str]]:
+    """Return layout and cells of a column. A numeric column is a siunitx column, aligned at the decimal point."""
     numbers = [value for value in data if is_number(value)]
     written = column_format(numbers)
-    cells = [written(value) if is_number(value) else in_tex(value) for value in data]
+    cells = [written(value) if is_number(value) else escape_tex(value) for value in data]
     decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
     # text that looks like numbers, such as printed values, makes the column numeric if it is most of the column
     if not numbers and 2 * len(decimals) <= len(cells) - cells.count(EMPTY_CELL):
@@ -124,10 +124,10 @@ def column_format(numbers: Sequence[float]) -> Callable[[float], str]:
     # equal decimals if the smallest number loses at most one digit
     if min(sizes) >= 10.0 ** (COLUMN_DIGITS - 2 - decimals) and max(sizes) < MAX_PLAIN:
         return lambda value: f"{value:z.{decimals}f}"
-    return lambda value: "0" if value == 0.0 else with_digits(value)
+    return lambda value: "0" if value == 0.0 else format_digits(value)
 
 
-def with_digits(value: float) -> str:
+def format_digits(value: float) -> str:
     mantissa, _, exponent = f"{value:#.{COLUMN_DIGITS}g}".partition("e")
     return mantissa.removesuffix(".") + (f"e{int(exponent)}" if exponent else "")
 
@@ -139,8 +139,8 @@ def room_for(cells: Sequence[str]) -> str:
     return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")
 
 
-def in_tex(value: Any) -> str:
-    """Convert a text to LaTeX: symbols and powers in maths, special characters escaped; a dash for None."""
+def escape_tex(value: Any) -> str:
+    """Convert a text to LaTeX: symbols and powers in maths, special characters escaped, and a dash for None."""
     if value is None:
         return EMPTY_CELL
     text = SIGNS.sub(lambda match: IN_MATHS[match[0]], ESCAPED_POWER.sub(r"$^{\1}$", str(value).translate(TEX)))

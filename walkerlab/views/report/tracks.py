@@ -46,12 +46,12 @@ class Track:
     def end(self) -> float:
         return float(self["t"][-1])
 
-    def until(self, time: float) -> Track:
+    def cut(self, time: float) -> Track:
         """Return the part up to a time (s)."""
         inside = self["t"] <= time + 1e-9
         return Track({name: values[inside] for name, values in self.channels.items()})
 
-    def thinned(self, gap: float) -> Track:
+    def thin(self, gap: float) -> Track:
         """Keep the first and the most loaded sample of each interval of `gap` s, and both sides of every jump."""
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)
@@ -65,13 +65,13 @@ class Track:
         chosen = sorted(samples)
         return Track({name: values[chosen] for name, values in self.channels.items()})
 
-    def packed(self) -> str:
+    def pack(self) -> str:
         """Encode all channels, in order, as little-endian float32 in base64."""
         return base64.b64encode(np.concatenate(list(self.channels.values())).astype("<f4").tobytes()).decode()
 
 
 def track_in(trajectory: Group | None) -> Track | None:
-    """Read the motion from a stored trajectory; None if it lacks joint positions."""
+    """Read the motion from a stored trajectory, or return None if it lacks joint positions."""
     if trajectory is None or "hip_along_m" not in trajectory.variables or trajectory["time"].size < 2:
         return None
     names = trajectory.variables.keys()
@@ -89,7 +89,7 @@ def track_in(trajectory: Group | None) -> Track | None:
 
 
 def slip_since_touch(time: Array, velocity: Array, touching: NDArray[np.bool_]) -> Array:
-    """Integrate how far a foot has slipped since it last touched down (m); zero in the air."""
+    """Integrate how far a foot has slipped since it last touched down (m). It is zero in the air."""
     sliding = np.where(touching, velocity, 0.0)
     way = np.concatenate(([0.0], np.cumsum(0.5 * (sliding[1:] + sliding[:-1]) * np.diff(time))))
     begins = touching & ~np.concatenate(([False], touching[:-1]))

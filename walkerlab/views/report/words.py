@@ -7,17 +7,17 @@ from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.prose import Prose, parts
 from walkerlab.views.report import numbers
 from walkerlab.views.report.outcomes import DEFAULT_CHECK, ERRORS, describe_error, ends, walks
-from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.symbols import typeset
 
 
-def in_row(text: str) -> str:
+def join_row(text: str) -> str:
     """Join the parts of 'a | b | c' as 'a, b and c'."""
     return join_words(parts(text))
 
 
 TEMPLATE_FUNCTIONS = (
-    *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.whole, numbers.span),
-    *(numbers.count, join_words, numbers.power_of_ten, in_row, in_signs, ends, walks, describe_error, len),
+    *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.format_integer, numbers.span),
+    *(numbers.count, join_words, numbers.power_of_ten, join_row, typeset, ends, walks, describe_error, len),
 )
 """Functions available to the templates."""
 TEMPLATE_CONSTANTS = {"CHANNELS": CHANNELS, "ERRORS": ERRORS, "DEFAULT_CHECK": DEFAULT_CHECK}

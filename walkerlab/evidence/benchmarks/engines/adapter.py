@@ -56,7 +56,7 @@ class Simulation(ABC):
         forces: Forces | None = None,
         own: OwnContact | None = None,
     ) -> None:
-        """Build the model at coordinates q (root freedoms, then hinges; m, rad) and velocities v.
+        """Build the model at velocities v and coordinates q (m, rad): root freedoms, then hinges.
 
         forces  external forces on the walker
         own     the engine's own ground contact, if it is used
@@ -70,19 +70,19 @@ class Simulation(ABC):
 
     @abstractmethod
     def run(self, steps: int, until_s: float, on_step: OnStep) -> None:
-        """Advance to `until_s` in at most `steps` steps; stop early if `on_step` returns False."""
+        """Advance to `until_s` in at most `steps` steps, and stop early if `on_step` returns False."""
 
     @abstractmethod
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Enable or disable the ground under a foot; has no effect without the engine's own contact."""
+        """Enable or disable the ground under a foot. This has no effect without the engine's native contact."""
 
 
 class Adapter(Protocol):
-    """A module that drives one engine; it imports the engine only when a model is built."""
+    """A module that drives one engine. It imports the engine only when a model is built."""
 
     INTEGRATORS: Mapping[str, Integrator]  # integrators by name
     CONTACTS: Mapping[str, str]  # name of the integrator for each contact model
     CANNOT_EXPRESS: tuple[str, ...]  # limitations, for the report
 
-    def tuned(self, model: str, target: EngineContact) -> OwnContact:
+    def tune(self, model: str, target: EngineContact) -> OwnContact:
         """Return the settings with which a contact model comes closest to the target."""

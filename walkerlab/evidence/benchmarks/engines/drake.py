@@ -37,7 +37,7 @@ CANNOT_EXPRESS = (
 )
 
 
-def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
+def tune(model: str, target: EngineContact) -> adapter.OwnContact:
     """Compute the settings that meet the target, from the closed forms at the top of this module."""
     from scipy.optimize import brentq
 
@@ -129,7 +129,7 @@ class DrakeRun(adapter.Simulation):
         return x[self._order], x[self._rates]
 
     def carry(self, ball: int, has_ground: bool) -> None:
-        """Allow or exclude a foot's collisions with the floor; each foot has its own filter."""
+        """Allow or exclude a foot's collisions with the floor. Each foot has its own filter."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
         if not self._feet or has_ground == (ball not in self._declared):
@@ -145,7 +145,7 @@ class DrakeRun(adapter.Simulation):
 
 
 def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) -> tuple[list[Any], list[Any], Any]:
-    """Add bodies, joints and feet; returns the joints in coordinate order and the geometries of feet and floor."""
+    """Add bodies, joints and feet. Return the joints in coordinate order and the geometries of feet and floor."""
     from pydrake.geometry import HalfSpace, Sphere
     from pydrake.math import RigidTransform
     from pydrake.multibody.plant import ContactModel
@@ -176,7 +176,9 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
 
 
 def join_to_parent(plant: Any, model: PlanarModel, link: Link, parent: Any, body: Any) -> list[Any]:
-    """Join a link to its parent by a hinge, or the base to the world with its degrees of freedom; return the joints."""
+    """Join a link to its parent by a hinge, or the base to the world with its degrees of freedom, and return the
+    joints.
+    """
     from pydrake.math import RigidTransform
     from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, PrismaticJoint, RevoluteJoint, SpatialInertia
 

@@ -70,7 +70,7 @@ def simulate(
 
 
 def make_truth(scene: EngineScene) -> Truth | None:
-    """Compute the reference of a scene; returns None if the walk ends before states can be compared."""
+    """Compute the reference of a scene, or return None if the walk ends before states can be compared."""
     walk = simulate(scene, *REFERENCES[0], OWN_TOUCHES)
     if walk.touch_time_s.size <= COMPARED_TOUCHES:
         return None
@@ -102,7 +102,7 @@ class EngineExperiment:
     def row(
         self, integrator: str, stepping: Stepping, answer: runs.WalkAnswer | TaskLost, start: float = 1.0
     ) -> EngineRow:
-        """Evaluate a run, or record why it was lost; `start`: initial velocities as a multiple of the gait's."""
+        """Evaluate a run, or record why it was lost. `start` is the initial velocities as a multiple of the gait's."""
         # under our law, the errors are those of the end state and the touch times; on the engine's own contact, it is
         # the error of the last period, and only completed walks that start from the gait have one
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
@@ -134,7 +134,9 @@ class EngineExperiment:
 def our_walk(
     scene: EngineScene, rtol: float, touches: int, until_s: float | None = None, repeats: int = 1
 ) -> runs.WalkAnswer:
-    """Time our own walk over `touches` steps, or until `until_s` in the step after them; median of `repeats`."""
+    """Time our own walk over `touches` steps, or until `until_s` in the step after them. The time is the median of
+    `repeats`.
+    """
     walls = []
     for _ in range(repeats):
         start_s = time.process_time()
@@ -154,7 +156,7 @@ def our_rows(scene: EngineScene, truth: Truth, version: str) -> Iterator[EngineR
         yield same_law.row(OUR_METHOD, Stepping(OUR_METHOD, 0.0, rtol), answer)
     own_law = EngineExperiment(scene, OURS, version, OWN_LAW)
     for factor in (1.0, *START_FACTORS):
-        answer = our_walk(scene.started(factor), ADAMS_RTOL, OWN_TOUCHES)
+        answer = our_walk(scene.scale_start(factor), ADAMS_RTOL, OWN_TOUCHES)
         yield own_law.row("impact", Stepping(OUR_METHOD, 0.0, ADAMS_RTOL), answer, factor)
 
 
@@ -179,7 +181,7 @@ class EngineOnScene:
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
         """Walk under our law or, if `own` is not None, on the engine's own contact, for at most `most` engine steps."""
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
-        scene = self.scene.started(start)
+        scene = self.scene.scale_start(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
         answer = self.process.do(task.run, RUN_TIMEOUT_S)
         experiment = EngineExperiment(self.scene, self.engine.name, self.engine.version, law, self.truth)
@@ -199,7 +201,7 @@ class EngineOnScene:
                 if late or (row.error is not None and row.error < ERROR_GOAL):
                     break
 
-    def tuned(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
+    def tune(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
         """Tune a contact model to the scene's contact and measure how close it comes."""
         name, sliding = self.engine.name, 1.5 * self.scene.ours.friction.sliding_from
         answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, RUN_TIMEOUT_S)
@@ -238,7 +240,7 @@ class EngineOnScene:
             yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in START_FACTORS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
-        """Simulate the pinned walker's passive swing with each integrator; returns results and lost runs."""
+        """Simulate the passive swing of the pinned walker with each integrator. Return results and lost runs."""
         scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
         n = len(model.chain)
         start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))

@@ -38,7 +38,7 @@ NO_ITERATION = 1e12
 EXPLICIT_METHODS = ("ExplicitEuler", "RK44")
 
 
-def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
+def tune(model: str, target: EngineContact) -> adapter.OwnContact:
     """Compute the settings that meet the target, including the slip velocity at which friction is fully developed."""
     stiffness = target.exponent * target.mass * target.gravity / target.penetration
     settings = {
@@ -108,7 +108,7 @@ class ExudynRun(adapter.Simulation):
 
 
 def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces | None) -> tuple[Any, list[int]]:
-    """Add the model's tree to the system; returns its object number and the joint index of each link."""
+    """Add the model's tree to the system. Return its object number and the joint index of each link."""
     import exudyn as exu
     from exudyn.itemInterface import ObjectKinematicTree
 
@@ -152,7 +152,7 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
 def add_contacts(
     system: Any, model: PlanarModel, tree: Any, places: list[int], own: adapter.OwnContact
 ) -> Iterator[Any]:
-    """Add contact for each foot, between a ball and a large triangle; yields the object numbers."""
+    """Add contact for each foot, between a ball and a large triangle. Yield the object numbers."""
     import exudyn as exu
     from exudyn import itemInterface
 

@@ -78,7 +78,7 @@ class RuleFollower:
         self._feet, self._bends = self.feet(q, v), self._bends_in(q, v)
 
     def feet(self, q: Floats, v: Floats) -> Feet:
-        """Return the motion of both feet; q and v must be contiguous arrays."""
+        """Return the motion of both feet from q and v, which must be contiguous arrays."""
         self._call(*self._fixed, 0.0, q, v, self._motion, self._none)
         first, second = self._motion.tolist()
         return FootMotion(*first), FootMotion(*second)
@@ -89,18 +89,18 @@ class RuleFollower:
         return self._forces
 
     def _bends_in(self, q: Floats, v: Floats) -> list[tuple[float, float]]:
-        """Return the extension (rad) of each knee and its rate (rad/s); both are zero for a locked knee."""
+        """Return the extension (rad) of each knee and its rate (rad/s). Both are zero for a locked knee."""
         return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self.scene.knee_places]
 
     def _edges_of(self, foot: int) -> tuple[float, float]:
-        """Return the edges (m) of the pad or gap under a foot; infinite on ground without pads."""
+        """Return the edges (m) of the pad or gap under a foot. They are infinite on ground without pads."""
         terrain = self.scene.ground.terrain
         if not terrain.has_pads:
             return -math.inf, math.inf
         return cell_edges(terrain, foot, int(self.walk_state.cells[foot]))
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
-        """Update the walk after an engine step; returns whether the ground under a foot may have changed."""
+        """Update the walk after an engine step. Return whether the ground under a foot may have changed."""
         before, now = self._feet, self.feet(q, v)
         if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
             self._end(Outcome.SOLVER_FAILED)
@@ -157,7 +157,9 @@ class RuleFollower:
             self._end(Outcome.WALKED)
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
-        """Return the first lock or release of a knee within a step of h (s); None if no knee locks or is released."""
+        """Return the first lock or release of a knee within a step of h (s), or None if no knee locks or is
+        released.
+        """
         walk_state, turns = self.walk_state, []
         stance = walk_state.progress.stance
         pushing_s = pulse_left(self._fixed[0], self.time_s)
@@ -183,7 +185,7 @@ class RuleFollower:
         return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Lock or release the knee in `turn`; return coordinates and velocities of the model with the new locks."""
+        """Lock or release the knee in `turn`, and return coordinates and velocities of the model with the new locks."""
         walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
         if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
             contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
@@ -191,7 +193,7 @@ class RuleFollower:
         elif self.turn is not None:
             contact_transitions.release(walk_state, 1 - int(walk_state.progress.stance))
         self.turn = None
-        scene = self.scene.with_knees_locked(walk_state.knee)
+        scene = self.scene.lock_knees(walk_state.knee)
         q, v = scene.from_base(tuple(y.tolist()))
         self._see(scene, q, v)
         return q, v

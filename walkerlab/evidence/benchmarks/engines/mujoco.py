@@ -1,4 +1,4 @@
-"""MuJoCo: soft convex contact in constraint space, tuned by `exchange/mjcf.py`; fixed steps."""
+"""MuJoCo: soft convex contact in constraint space, tuned by `exchange/mjcf.py`, at fixed steps."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ NEVER_M = -1e9  # margin of a contact that never acts
 INTEGRATOR_CODES = {"Euler": "mjINT_EULER", "RK4": "mjINT_RK4"}
 
 
-def tuned(model: str, target: EngineContact) -> adapter.OwnContact:
+def tune(model: str, target: EngineContact) -> adapter.OwnContact:
     """Compute the settings that meet the target, from the closed forms of `exchange.mjcf`."""
     return adapter.OwnContact(model, contact_settings(target))
 

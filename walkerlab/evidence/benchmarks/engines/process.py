@@ -42,7 +42,10 @@ class OwnProcess:
         self._folder.cleanup()
 
     def do(self, task: Callable[[], R], timeout_s: float) -> R | TaskLost:
-        """Run a picklable task; returns its result, or `TaskLost` if it has none; RuntimeError after `abandon`."""
+        """Run a picklable task and return its result, or `TaskLost` if it has none.
+
+        Raises RuntimeError after `abandon`.
+        """
         if self._abandoned:
             raise RuntimeError("the process was abandoned")
         if self._worker is None:
@@ -60,7 +63,7 @@ class OwnProcess:
             return TaskLost(traceback.format_exception_only(error)[0].strip()[:200])
 
     def abandon(self) -> None:
-        """Kill the running task and refuse further ones; may be called from another thread."""
+        """Kill the running task and reject further ones. Another thread may call this."""
         self._abandoned = True
         worker = self._worker
         if worker is not None:

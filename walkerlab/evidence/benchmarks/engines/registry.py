@@ -25,7 +25,7 @@ class Engine:
 
     @property
     def is_installed(self) -> bool:
-        """Whether the engine can be imported; does not import it."""
+        """Whether the engine can be imported, found without importing it."""
         return importlib.util.find_spec(self.module) is not None
 
     @property
@@ -34,7 +34,7 @@ class Engine:
 
     @property
     def version(self) -> str:
-        """Version of the installed library; "unknown" for a module without a distribution."""
+        """Version of the installed library, or "unknown" for a module without a distribution."""
         # the core comes first, because the distribution around it may be missing or have another version
         for distribution in filter(None, (self.core, self.name)):
             with contextlib.suppress(importlib.metadata.PackageNotFoundError):

@@ -38,7 +38,7 @@ class EngineRow:
 
 @dataclass(frozen=True)
 class SwingRow:
-    """Swing of the pinned walker, without ground contact; an integrator's first run has no observed order."""
+    """Swing of the pinned walker, without ground contact. An integrator's first run has no observed order."""
 
     scene: Annotated[str, Label("1", "scene")]
     engine: Annotated[str, Label("1", "engine")]

@@ -65,7 +65,7 @@ class WalkTask:
 
 
 class EngineWalk:
-    """Walk in an engine; after each lock or release of a knee it continues in a new model."""
+    """Walk in an engine, which continues in a new model after each lock or release of a knee."""
 
     def __init__(self, task: WalkTask) -> None:
         self.task, self.engine = task, PHYSICS_ENGINES[task.engine]
@@ -78,7 +78,7 @@ class EngineWalk:
         return self.time_s >= (1.0 - TIME_ROUNDING) * self.task.until_s
 
     def go(self) -> None:
-        """Walk to the end; a step in which a knee locks or is released is repeated up to that instant."""
+        """Walk to the end. A step in which a knee locks or is released is repeated up to that instant."""
         rules = self.rules
         while rules.outcome is None and not self.is_over and self.steps < self.task.most:
             self._simulate(self.task.until_s)
@@ -92,7 +92,7 @@ class EngineWalk:
                 self.q, self.v = rules.go_on(self.q, self.v)
 
     def _simulate(self, until_s: float) -> None:
-        """Simulate from the current state to `until_s`; fixed steps are shortened so that a whole number fits."""
+        """Simulate from the current state to `until_s`. Fixed steps are shortened so that a whole number fits."""
         task, rules, span = self.task, self.rules, until_s - self.time_s
         stepping = task.stepping
         if not self.engine.adapter().INTEGRATORS[stepping.integrator].adapts:
@@ -210,7 +210,7 @@ class TuningTask:
 
     @cached_property
     def own(self) -> OwnContact:
-        return PHYSICS_ENGINES[self.engine].adapter().tuned(self.contact, self.target)
+        return PHYSICS_ENGINES[self.engine].adapter().tune(self.contact, self.target)
 
     @property
     def omega(self) -> float:
@@ -225,12 +225,14 @@ class TuningTask:
         return 8.0 / slow
 
     def run(self) -> TuningAnswer:
-        depth = self.at_rest()
+        depth = self.penetration_at_rest()
         ratio = self.damping_ratio(depth)
         return TuningAnswer(self.own, depth, ratio, self.friction(depth), self.creep(depth))
 
-    def after(self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]) -> EngineMotion:
-        """Simulate the ball from `depth` (m) inside the ground; `along` times its weight pulls it along the ground.
+    def simulate_contact(
+        self, time_s: float, h: float, along: float, depth: float, velocity: tuple[float, float]
+    ) -> EngineMotion:
+        """Simulate the ball from `depth` (m) inside the ground. `along` times its weight pulls it along the ground.
 
         h  step size (s)
         """
@@ -244,14 +246,18 @@ class TuningTask:
         simulation.carry(0, True)
         return record_motion(simulation, UNLIMITED_STEPS, max(2, round(time_s / h)) * h)
 
-    def at_rest(self) -> float:
+    def penetration_at_rest(self) -> float:
         """Return the penetration (m) at rest of a ball dropped from the surface."""
-        return -float(self.after(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1])
+        return -float(
+            self.simulate_contact(self.settling_s, STEADY_STEP_FACTOR * self.step_s, 0.0, 0.0, (0.0, 0.0)).q[-1, 1]
+        )
 
     def damping_ratio(self, depth: float) -> float:
-        """Fit an oscillator to the ball's accelerations; returns its damping ratio. depth: penetration at rest (m)."""
+        """Fit an oscillator to the ball's accelerations and return its damping ratio. `depth` is the penetration at
+        rest (m).
+        """
         omega = self.omega
-        motion = self.after(self.settling_s / 4.0, self.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
+        motion = self.simulate_contact(self.settling_s / 4.0, self.step_s, 0.0, depth, (0.0, -0.02 * depth * omega))
         x, v = (motion.q[:, 1] + depth) / depth, motion.v[:, 1] / (depth * omega)
         # the mean of a step's two ends stands for its middle, whatever the engine's integration rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
@@ -260,15 +266,17 @@ class TuningTask:
         return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
 
     def friction(self, depth: float) -> float:
-        """Return the deceleration of a sliding block, divided by gravity; depth: penetration at rest (m)."""
+        """Return the deceleration of a sliding block, divided by gravity. `depth` is the penetration at rest (m)."""
         target, settled = self.target, self.settling_s
         start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
-        motion = self.after(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
+        motion = self.simulate_contact(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
         watched = -1 - len(motion.v) // 5
         fall = motion.v[watched, 0] - motion.v[-1, 0]
         return float(fall / ((motion.t[-1] - motion.t[watched]) * target.gravity))
 
     def creep(self, depth: float) -> float:
-        """Return the creep velocity (m/s) of a block standing on an incline; depth: penetration at rest (m)."""
+        """Return the creep velocity (m/s) of a block standing on an incline. `depth` is the penetration at rest (m)."""
         target, h = self.target, STEADY_STEP_FACTOR * self.step_s
-        return float(self.after(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0])
+        return float(
+            self.simulate_contact(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0]
+        )

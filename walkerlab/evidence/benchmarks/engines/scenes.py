@@ -12,7 +12,10 @@ from walkerlab.scene.parts import assembly_of
 
 
 def supported_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
-    """Return a config's scene for engines; raises ConfigError for a walker that other engines do not support."""
+    """Return a config's scene for engines.
+
+    Raises ConfigError for a walker that other engines do not support.
+    """
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(
@@ -24,4 +27,4 @@ def supported_scene(config: ContactConfig, rigid_step_length_m: float, rigid_sta
             "engines: the engine models do not support a knee's compliant stop.", "Choose walker.knee.lock: ideal."
         )
     scene = engine_scene(config, rigid_step_length_m, rigid_state)
-    return scene.with_knees_locked(knees_at_start(scene.ours, STANCE_FOOT, scene.start))
+    return scene.lock_knees(knees_at_start(scene.ours, STANCE_FOOT, scene.start))

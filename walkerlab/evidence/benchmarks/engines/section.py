@@ -18,7 +18,7 @@ Row = Mapping[str, Any]
 
 @stage_section("engines", "rows")
 def section(_results: Results, summary: Row) -> Section | None:
-    """Build the conclusions and a table for each experiment; None if the stage did not run."""
+    """Build the conclusions and a table for each experiment, or return None if the stage did not run."""
     concluded = [
         Statement(f"{scene}, {EXPERIMENT_TITLES[experiment]}", text)
         for scene, items in summary["conclusions"].items()

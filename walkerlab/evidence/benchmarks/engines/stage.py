@@ -1,4 +1,6 @@
-"""Stage `engines`: our law in other engines' integrators, then their own contact; error against run time."""
+"""Stage `engines`: error against run time with our law in other engines' integrators, then with their
+native contact.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,10 @@ class EngineFindings:
 
 
 def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, jobs: int = 1) -> Content:
-    """Measure all installed engines, `jobs` at a time; raises NoAnswer if no engine or walk exists."""
+    """Measure all installed engines, `jobs` at a time.
+
+    Raises NoAnswer if no engine or walk exists.
+    """
     engines = installed()
     findings = EngineFindings(left_out=[*missing_engines(), *pinning_left_out(config, "engines")])
     if not engines:
@@ -70,7 +75,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
 
 
 def measure_all(pairs: Sequence[EngineOnScene], jobs: int) -> Iterator[EngineFindings]:
-    """Yield each engine's results, `jobs` engines at a time; an interruption kills the running engines."""
+    """Yield each engine's results, `jobs` engines at a time. An interruption kills the running engines."""
     with ThreadPoolExecutor(max(1, jobs)) as pool:
         try:
             yield from pool.map(measure, pairs)
@@ -99,7 +104,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
             findings.left_out.append({"what": f"own contact of {name}", "why": "the ground has no friction"})
             return findings
         for contact in pair.engine.adapter().CONTACTS:
-            tuned = pair.tuned(contact, target)
+            tuned = pair.tune(contact, target)
             if isinstance(tuned, TaskLost):
                 findings.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.why})
                 continue
@@ -112,7 +117,9 @@ def measure(pair: EngineOnScene) -> EngineFindings:
 def make_content(
     findings: EngineFindings, scene: str, truth: experiments.Truth, rigid: Mapping[str, Any] | None
 ) -> Content:
-    """Build groups and summary; `rigid`: summary of `fixedpoint`, or None if neither the start nor the pads need it."""
+    """Build groups and summary. `rigid` is the summary of `fixedpoint`, or None if neither the start nor the pads need
+    it.
+    """
     rows = findings.rows
     stored = (("rows", EngineRow, rows), ("swings", SwingRow, findings.swings), ("tuning", TuningRow, findings.tuning))
     groups = {name: rows_group(table, labels_of(kind)) for name, kind, table in stored if table}
@@ -177,7 +184,7 @@ def ratios(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
 
 
 def closest(rows: Sequence[EngineRow]) -> dict[str, Any] | None:
-    """Return the contact whose finest walk comes closest to ADAMS's law; None if no walk reaches the end."""
+    """Return the contact whose finest walk comes closest to ADAMS's law, or None if no walk reaches the end."""
     finest = [series[-1] for series in series_by_name(rows, OWN_LAW).values()]
     reached = [row for row in finest if row.error is not None and row.steps == experiments.OWN_TOUCHES]
     if not reached:

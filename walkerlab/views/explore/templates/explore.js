@@ -16,16 +16,16 @@ async function ask(path, body) {
   return [answer.status, await answer.json()];
 }
 
-const question = (more = {}) => ({ ...(state.config && { config: state.config }), set: state.set, ...more });
-const called = (config = "") => [...byId("config").options].find((option) => option.value === config).text;
+const requestBody = (more = {}) => ({ ...(state.config && { config: state.config }), set: state.set, ...more });
+const labelOf = (config = "") => [...byId("config").options].find((option) => option.value === config).text;
 const models = () => Object.keys(MODELS).filter((model) => byId(model).checked);
-const changes = (set) => Object.entries(set).map(([key, value]) => `${key} ${typeof value === "string" ? value : typeof value === "number" ? digits(value, 6) : JSON.stringify(value)}`).join(", ");
+const describeChanges = (set) => Object.entries(set).map(([key, value]) => `${key} ${typeof value === "string" ? value : typeof value === "number" ? digits(value, 6) : JSON.stringify(value)}`).join(", ");
 
 // The address
 
 function fragment() {
-  const said = Object.fromEntries(Object.entries(state.set).map(([key, value]) => [key, JSON.stringify(value)]));
-  return `#${new URLSearchParams({ ...(state.config && { config: state.config }), ...said })}`;
+  const values = Object.fromEntries(Object.entries(state.set).map(([key, value]) => [key, JSON.stringify(value)]));
+  return `#${new URLSearchParams({ ...(state.config && { config: state.config }), ...values })}`;
 }
 
 function valueOf(text) {
@@ -37,8 +37,8 @@ function valueOf(text) {
 }
 
 function fromFragment() {
-  const said = [...new URLSearchParams(location.hash.slice(1))].filter(([, text]) => text);
-  const { config = "", ...set } = Object.fromEntries(said);
+  const parameters = [...new URLSearchParams(location.hash.slice(1))].filter(([, text]) => text);
+  const { config = "", ...set } = Object.fromEntries(parameters);
   const known = [...byId("config").options].some((option) => option.value === config);
   state = { config: known ? config : "", set: Object.fromEntries(Object.entries(set).map(([key, text]) => [key, valueOf(text)])) };
   byId("config").value = state.config;
@@ -52,60 +52,62 @@ function remember() {
 
 // Requests are sent one at a time; of those made while one is answered, only the last is sent.
 
-let [asking, next] = [false, false];
+let busy = false;
+let pending = false;
 
 async function walk() {
-  next = true;
-  if (asking) return;
-  asking = true;
-  while (next) {
-    next = false;
+  pending = true;
+  if (busy) return;
+  busy = true;
+  while (pending) {
+    pending = false;
     document.body.dataset.state = "asking";
-    const asked = structuredClone(question({ models: models() }));
+    const request = structuredClone(requestBody({ models: models() }));
     const began = performance.now();
-    const late = setInterval(() => {
-      say(`Computing ${changes(asked.set) || called(asked.config)} (${Math.round((performance.now() - began) / 1000)} s).`);
+    const timer = setInterval(() => {
+      say(`Computing ${describeChanges(request.set) || labelOf(request.config)} (${Math.round((performance.now() - began) / 1000)} s).`);
     }, 500);
     try {
-      const [status, answer] = await ask("/api/walk", asked).finally(() => clearInterval(late));
-      if (status === 409) next = true;
-      if (!next) show(status, answer, asked);
+      const [status, answer] = await ask("/api/walk", request).finally(() => clearInterval(timer));
+      // A newer request, perhaps of another page, has displaced this one: send it again.
+      if (status === 409) pending = true;
+      if (!pending) show(status, answer, request);
     } catch {
       document.body.dataset.state = "failed";
       say("The server does not answer. Start `walkerlab explore` again; this page keeps trying.", "bad");
       await new Promise((resolve) => setTimeout(resolve, 1000));
-      next = true;
+      pending = true;
     }
   }
-  asking = false;
+  busy = false;
 }
 
 // Text between backticks is shown as code.
 function say(text, tone = "plain") {
-  byId("said").replaceChildren(...text.split("`").map((part, place) => (place % 2 ? Object.assign(document.createElement("code"), { textContent: part }) : part)));
-  byId("said").className = `statement ${tone}`;
+  byId("message").replaceChildren(...text.split("`").map((part, index) => (index % 2 ? Object.assign(document.createElement("code"), { textContent: part }) : part)));
+  byId("message").className = `statement ${tone}`;
 }
 
 // Remove positions in a command line, which mean nothing on a page.
-const ended = (text = "") => text && (/^[a-z]+[ :]/.test(text) ? text[0].toUpperCase() : text[0]) + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
-const placeless = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
-const sentence = ({ message, advice }) => [placeless(message), advice].map(ended).join(" ").trim();
+const asSentence = (text = "") => text && (/^[a-z]+[ :]/.test(text) ? text[0].toUpperCase() : text[0]) + text.slice(1) + (/[.:]$/.test(text) ? "" : ".");
+const withoutPosition = (text) => text.replace(/^(--set .*?|\S.*?:\d+:\d+): /, "");
+const sentence = ({ message, advice }) => [withoutPosition(message), advice].map(asSentence).join(" ").trim();
 
-function show(status, answer, asked) {
-  for (const row of rows.values()) row.place.classList.remove("wrong");
+function show(status, answer, request) {
+  for (const row of rows.values()) row.root.classList.remove("wrong");
   const gait = answer.fixedpoint;
   if (status !== 200 || gait.error) {
     document.body.dataset.state = "failed";
     say(sentence(gait?.error ?? answer.error), "bad");
-    if (status === 422) rows.get(answer.error.key)?.place.classList.add("wrong");
+    if (status === 422) rows.get(answer.error.key)?.root.classList.add("wrong");
     if (status !== 200) return;
   }
-  shown = { answer, asked };
+  shown = { answer, request };
   document.body.dataset.shown = "";
-  const named = [called(asked.config), changes(asked.set)].filter(Boolean).join(" with ");
-  byId("shown").textContent = `${answer.tracks ? "Shown" : "No walk"}: ${named}`;
+  const title = [labelOf(request.config), describeChanges(request.set)].filter(Boolean).join(" with ");
+  byId("shown").textContent = `${answer.tracks ? "Shown" : "No walk"}: ${title}`;
   byId("command").textContent = answer.command;
-  reveal(!!answer.tracks);
+  showPlayer(!!answer.tracks);
   fillTable(answer);
   drawCircle(gait.multipliers ?? []);
   along.mark();
@@ -122,8 +124,8 @@ const ENDS = { walked: "walks", fell: "falls", slid: "slides" };
 const outcome = (walk) => (walk.error ? sentence(walk.error) : walk.outcome === "walked" ? `walks ${walk.steps} steps.` : `${ENDS[walk.outcome] ?? walk.outcome} in step ${walk.steps + 1}: ${walk.advice}`);
 
 // The circle and the table stay visible without a walk.
-function reveal(walks) {
-  for (const part of byId("place").querySelectorAll(".scenes, .controls, .views, .readout, .key, .player > figcaption")) part.hidden = !walks;
+function showPlayer(walks) {
+  for (const part of byId("stage").querySelectorAll(".scenes, .controls, .views, .readout, .key, .player > figcaption")) part.hidden = !walks;
 }
 
 // A steady walk repeats its last two steps: [end, start, length].
@@ -138,13 +140,13 @@ function draw() {
   const { answer } = shown;
   if (!answer.tracks) return;
   const stages = models().map((model) => MODELS[model]).filter((stage) => answer.tracks[stage]);
-  reveal(stages.length > 0);
+  showPlayer(stages.length > 0);
   if (!stages.length) return;
   const tracks = stages.map((stage) => new Track(answer.tracks[stage].meta, answer.tracks[stage].floats));
   const scene = { ...answer.scene, loop: stages.every((stage) => answer[stage].outcome === "walked") ? lastLap(tracks.at(-1)) : undefined };
   if (player) return player.change(scene, tracks);
-  byId("place").append(byId("player").content.cloneNode(true));
-  const root = byId("place").firstElementChild;
+  byId("stage").append(byId("player").content.cloneNode(true));
+  const root = byId("stage").firstElementChild;
   root.querySelector(".loop").checked = true;
   root.querySelector(".views").before(byId("results").parentElement);
   player = play(root, scene, tracks);
@@ -165,16 +167,16 @@ const ROWS = [
 ];
 
 function fillTable(answer) {
-  const cells = ROWS.map(([name, of]) => {
+  const tableRows = ROWS.map(([name, valueOfWalk]) => {
     const row = document.createElement("tr");
     row.append(Object.assign(document.createElement("th"), { scope: "row", textContent: name }));
     Object.values(MODELS).forEach((stage, index) => {
-      const value = of(answer.fixedpoint, answer[stage], index === 0);
+      const value = valueOfWalk(answer.fixedpoint, answer[stage], index === 0);
       row.append(Object.assign(document.createElement("td"), { className: "n", textContent: Number.isFinite(value) ? digits(value, 6) : "–" }));
     });
     return row;
   });
-  byId("results").tBodies[0].replaceChildren(...cells);
+  byId("results").tBodies[0].replaceChildren(...tableRows);
 }
 
 const trail = [];
@@ -190,8 +192,8 @@ function drawCircle(multipliers) {
   const axes = [{ x1: -reach, x2: reach }, { y1: -reach, y2: reach }].map((ends) => element("line", { ...ends, class: "axis", "stroke-width": 0.006 * reach }));
   const now = multipliers.map((one) => at(one, Math.hypot(...one) < 1 ? "now" : "now out"));
   svg.replaceChildren(...axes, rim, ...trail.slice(0, -1).flat().map((one) => at(one, "then")), ...now);
-  const said = multipliers.map(([real, imaginary]) => digits(real, 4) + (imaginary ? ` ${imaginary < 0 ? "−" : "+"} ${digits(Math.abs(imaginary), 4)} i` : ""));
-  svg.setAttribute("aria-label", `Multipliers in the unit circle: ${said.join(", ") || "none"}`);
+  const labels = multipliers.map(([real, imaginary]) => digits(real, 4) + (imaginary ? ` ${imaginary < 0 ? "−" : "+"} ${digits(Math.abs(imaginary), 4)} i` : ""));
+  svg.setAttribute("aria-label", `Multipliers in the unit circle: ${labels.join(", ") || "none"}`);
 }
 
 // Parameters
@@ -199,45 +201,45 @@ function drawCircle(multipliers) {
 class Row {
   constructor(number) {
     this.number = number;
-    this.place = document.createElement("div");
-    this.place.className = "turn";
+    this.root = document.createElement("div");
+    this.root.className = "turn";
     const id = `turn-${number.key}`;
     const label = Object.assign(document.createElement("label"), { htmlFor: id, title: `${number.meaning}${number.bounds ? `; ${number.bounds}` : ""}` });
     const name = Object.assign(document.createElement("span"), { textContent: number.key.replace(/^(walker|contact)\./, "").replace(/[._]/g, "$&\u200b") });
     label.append(name, " ", Object.assign(document.createElement("small"), { textContent: number.unit === "1" ? "" : number.unit.replaceAll("^2", "²") }));
-    const back = Object.assign(document.createElement("button"), { type: "button", textContent: "↺", title: `Back to ${JSON.stringify(number.start)}`, ariaLabel: `Reset ${number.key}` });
-    back.addEventListener("click", () => turn(number.key, number.start, true));
-    const inputs = number.words ? [this.choice(id)] : "from" in number ? [this.slider(id), this.typed()] : [this.typed(id)];
-    this.place.append(label, ...inputs, back);
+    const reset = Object.assign(document.createElement("button"), { type: "button", textContent: "↺", title: `Back to ${JSON.stringify(number.start)}`, ariaLabel: `Reset ${number.key}` });
+    reset.addEventListener("click", () => setParameter(number.key, number.start, true));
+    const inputs = number.words ? [this.makeChoice(id)] : "from" in number ? [this.makeSlider(id), this.makeField()] : [this.makeField(id)];
+    this.root.append(label, ...inputs, reset);
     this.put(number.value);
   }
-  choice(id) {
+  makeChoice(id) {
     this.select = Object.assign(document.createElement("select"), { id });
     for (const word of this.number.words) this.select.append(new Option(word));
-    this.select.addEventListener("change", () => turn(this.number.key, this.number.words[this.select.selectedIndex], true));
+    this.select.addEventListener("change", () => setParameter(this.number.key, this.number.words[this.select.selectedIndex], true));
     return this.select;
   }
-  slider(id) {
+  makeSlider(id) {
     this.range = Object.assign(document.createElement("input"), { type: "range", id, min: 0, max: 1000, step: "any" });
-    this.range.addEventListener("input", () => turn(this.number.key, this.fromRange(), false));
-    this.range.addEventListener("change", () => turn(this.number.key, this.fromRange(), true));
+    this.range.addEventListener("input", () => setParameter(this.number.key, this.fromRange(), false));
+    this.range.addEventListener("change", () => setParameter(this.number.key, this.fromRange(), true));
     const arrow = (event) => {
       const way = { ArrowRight: 10, ArrowUp: 10, ArrowLeft: -10, ArrowDown: -10 }[event.key];
       if (!way) return;
       event.preventDefault();
       if (event.type === "keydown") this.range.value = Number(this.range.value) + way;
-      turn(this.number.key, this.fromRange(), event.type === "keyup");
+      setParameter(this.number.key, this.fromRange(), event.type === "keyup");
     };
     for (const kind of ["keydown", "keyup"]) this.range.addEventListener(kind, arrow);
     return this.range;
   }
-  typed(id) {
+  makeField(id) {
     this.text = Object.assign(document.createElement("input"), { className: "typed", spellcheck: false, autocomplete: "off" });
     if (id) this.text.id = id;
     else Object.assign(this.text, { inputMode: "decimal", ariaLabel: `${this.number.key}, value` });
     this.text.addEventListener("change", () => {
       const text = this.text.value.trim().replace("−", "-");
-      turn(this.number.key, text ? valueOf(text) : this.number.start, true);
+      setParameter(this.number.key, text ? valueOf(text) : this.number.start, true);
     });
     return this.text;
   }
@@ -249,7 +251,7 @@ class Row {
   }
   put(value) {
     const { from, to, log, start: first } = this.number;
-    this.place.classList.toggle("changed", JSON.stringify(value) !== JSON.stringify(first));
+    this.root.classList.toggle("changed", JSON.stringify(value) !== JSON.stringify(first));
     if (this.select) return (this.select.value = String(value));
     if (this.range && typeof value === "number") this.range.value = 1000 * (log ? Math.log(value / from) / Math.log(to / from) : (value - from) / (to - from));
     this.range?.setAttribute("aria-valuetext", `${value} ${this.number.unit}`);
@@ -263,46 +265,48 @@ class Row {
   }
 }
 
-function turn(key, value, settled) {
+function setParameter(key, value, released) {
   const row = rows.get(key);
   if (JSON.stringify(value) === JSON.stringify(row.number.start)) delete state.set[key];
   else state.set[key] = value;
   row.put(value);
   if (row.number.gaits) touched = key;
   walk();
-  if (settled) remember(), settle();
+  if (released) remember(), refreshParameters();
   else along.mark();
 }
 
 // Other values may depend on the changed one. Ignore answers for values that have changed again.
-async function settle() {
-  const asked = fragment();
-  const [status, answer] = await ask("/api/numbers", question()).catch(() => [0]);
-  if (fragment() !== asked) return;
+async function refreshParameters() {
+  const requested = fragment();
+  const [status, answer] = await ask("/api/numbers", requestBody()).catch(() => [0]);
+  if (fragment() !== requested) return;
   if (status === 200) arrange(answer.numbers);
   along.draw();
 }
 
 function arrange(numbers) {
   const focused = document.activeElement?.id;
-  const asked = new Set([...rows.values()].filter((row) => row.wanted).map((row) => row.number.key));
+  const pinned = new Set([...rows.values()].filter((row) => row.pinned).map((row) => row.number.key));
   const before = rows;
   rows = new Map();
   for (const number of numbers) {
     const old = before.get(number.key);
     const same = old && old.number.start === number.start && "from" in old.number === "from" in number;
     const row = same ? Object.assign(old, { number }) : new Row(number);
-    row.wanted = asked.has(number.key) || (number.rank === null && number.key in state.set);
+    // A row chosen in the search stays, and so does a changed one without a slider of its own.
+    row.pinned = pinned.has(number.key) || (number.rank === null && number.key in state.set);
     if (!row.edited) row.put(state.set[number.key] ?? number.value);
     rows.set(number.key, row);
   }
-  const seen = [...rows.values()].filter(({ number, wanted }) => number.rank !== null || wanted);
-  seen.sort((one, other) => (one.number.rank ?? Infinity) - (other.number.rank ?? Infinity) || 0);
+  const visible = [...rows.values()].filter(({ number, pinned }) => number.rank !== null || pinned);
+  visible.sort((one, other) => (one.number.rank ?? Infinity) - (other.number.rank ?? Infinity) || 0);
   document.body.classList.toggle("rigid-only", !rows.has("contact.stiffness"));
-  const places = seen.map((row) => row.place);
-  const there = [...byId("sliders").children];
-  if (places.length !== there.length || places.some((place, index) => place !== there[index])) {
-    byId("sliders").replaceChildren(...places);
+  const elements = visible.map((row) => row.root);
+  const current = [...byId("sliders").children];
+  // Moving an element ends its drag, so leave the list alone unless it differs.
+  if (elements.length !== current.length || elements.some((one, index) => one !== current[index])) {
+    byId("sliders").replaceChildren(...elements);
     if (focused) byId(focused)?.focus();
   }
 }
@@ -310,28 +314,28 @@ function arrange(numbers) {
 function search() {
   const words = byId("search").value.toLowerCase().split(/\s+/).filter(Boolean);
   const hits = words.length ? [...rows.values()].filter(({ number }) => words.every((word) => `${number.key} ${number.meaning} ${number.unit}`.toLowerCase().includes(word))) : [];
-  byId("found").replaceChildren(...hits.map((row) => {
+  byId("matches").replaceChildren(...hits.map((row) => {
     const { key, unit, meaning, bounds } = row.number;
     const button = Object.assign(document.createElement("button"), { type: "button", textContent: `${key}${unit && unit !== "1" ? ` (${unit})` : ""}: ${meaning}${bounds ? `; ${bounds}` : ""}` });
     button.addEventListener("click", () => {
-      row.wanted = true;
+      row.pinned = true;
       arrange([...rows.values()].map(({ number }) => number));
       (row.range ?? row.select ?? row.text).focus();
     });
     return button;
   }));
-  if (words.length && !hits.length) byId("found").textContent = "No key of this walker matches these words.";
+  if (words.length && !hits.length) byId("matches").textContent = "No key of this walker matches these words.";
 }
 
 // Gaits over the parameter changed last
 
 class Along extends Plot {
-  constructor(place) {
-    super(place, ["", ""], "", true, () => {});
+  constructor(container) {
+    super(container, ["", ""], "", true, () => {});
     this.curves_of = {};
     this.cursor.addEventListener("pointerup", (event) => {
-      const [least, most] = [this.fromX(Plot.FRAME[0]), this.fromX(Plot.WIDTH - Plot.FRAME[2])];
-      if (this.series) turn(this.key, Number(this.value(clamp(this.at(event), least, most)).toPrecision(4)), true);
+      const [low, high] = [this.fromX(Plot.FRAME[0]), this.fromX(Plot.WIDTH - Plot.FRAME[2])];
+      if (this.series) setParameter(this.key, Number(this.value(clamp(this.at(event), low, high)).toPrecision(4)), true);
     });
   }
   // Values that span decades are plotted on a logarithmic axis.
@@ -357,51 +361,54 @@ class Along extends Plot {
     const row = [rows.get(touched), rows.get("slope_deg")].find((one) => one?.number.gaits);
     if (!row) return;
     const { key, from, to, log, unit } = row.number;
-    const { [key]: here, ...others } = state.set;
-    const wanted = models().filter((model) => model === "rigid" ? !key.startsWith("contact.") : rows.has("contact.stiffness"));
-    const asked = JSON.stringify([state.config, others, key, wanted]);
-    byId("over").textContent = `Along ${key}`;
-    if (asked === this.asked) return this.mark();
+    const { [key]: current, ...others } = state.set;
+    const drawn = models().filter((model) => model === "rigid" ? !key.startsWith("contact.") : rows.has("contact.stiffness"));
+    const request = JSON.stringify([state.config, others, key, drawn]);
+    byId("along-title").textContent = `Along ${key}`;
+    if (request === this.request) return this.mark();
     if (key !== this.key) {
-      this.series = this.found = null;
+      this.series = this.gaits = null;
       for (const layer of [this.curves, this.cursor]) layer.replaceChildren();
     }
-    [this.asked, this.key, this.unit, this.log] = [asked, key, unit, log && to > 50 * from];
-    this.place.classList.add("old");
-    this.said("Computing …");
-    const found = {};
-    let refused = "";
-    const finer = [["rigid", 12], ["rigid", 60], ["contact", 8], ["contact", 40]].filter(([model]) => wanted.includes(model));
-    for (const [place, [model, points]] of finer.entries()) {
+    this.request = request;
+    this.key = key;
+    this.unit = unit;
+    this.log = log && to > 50 * from;
+    this.container.classList.add("old");
+    this.showStatus("Computing …");
+    const curves = {};
+    let error = "";
+    const passes = [["rigid", 12], ["rigid", 60], ["contact", 8], ["contact", 40]].filter(([model]) => drawn.includes(model));
+    for (const [index, [model, points]] of passes.entries()) {
       const span = { over: key, from: from || 1e-9, to, points, model, periods: 1 };
       const block = Object.fromEntries(Object.entries(span).map(([name, value]) => [`continuation.${name}`, value]));
-      const [status, answer] = await ask("/api/along", question({ set: { ...state.set, ...block } })).catch(() => [0]);
-      if (this.asked !== asked) return;
-      if (status === 409) return this.said("Superseded by another page's request."), (this.asked = null);
-      if (status === 200) found[model] = answer.curves;
-      else if (status === 422) refused = sentence(answer.error);
-      this.found = Object.values(found).flat();
-      if (this.found.length) this.plot();
-      const more = place + 1 < finer.length ? ` Refining the ${finer[place + 1][0]} model's curve.` : "";
-      this.said((this.found.length ? "Solid lines are stable; click to jump there." : more ? "" : refused || "No gaits found along this parameter.") + more);
+      const [status, answer] = await ask("/api/along", requestBody({ set: { ...state.set, ...block } })).catch(() => [0]);
+      if (this.request !== request) return;
+      if (status === 409) return this.showStatus("Superseded by another page's request."), (this.request = null);
+      if (status === 200) curves[model] = answer.curves;
+      else if (status === 422) error = sentence(answer.error);
+      this.gaits = Object.values(curves).flat();
+      if (this.gaits.length) this.plot();
+      const more = index + 1 < passes.length ? ` Refining the ${passes[index + 1][0]} model's curve.` : "";
+      this.showStatus((this.gaits.length ? "Solid lines are stable; click to jump there." : more ? "" : error || "No gaits found along this parameter.") + more);
     }
   }
-  said(text) {
-    byId("along-said").textContent = text;
+  showStatus(text) {
+    byId("along-status").textContent = text;
   }
   plot() {
-    if (!this.found?.length) return;
-    this.place.classList.remove("old");
-    const what = byId("what");
+    if (!this.gaits?.length) return;
+    this.container.classList.remove("old");
+    const quantity = byId("quantity");
     this.titles = [this.unit && this.unit !== "1" ? `${this.key} (${this.unit})` : this.key, ""];
     // Gaits far from the stable ones would flatten the others into a line.
-    const near = [this.height, ...this.found.flatMap((curve) => curve[what.value].filter((_, index) => curve.stable[index]))].filter(Number.isFinite);
-    const [least, most] = near.length ? [Math.min(...near) / 1.5, Math.max(...near) * 1.5] : [0, Infinity];
-    const series = this.found.flatMap((curve) => {
+    const typical = [this.height, ...this.gaits.flatMap((curve) => curve[quantity.value].filter((_, index) => curve.stable[index]))].filter(Number.isFinite);
+    const [low, high] = typical.length ? [Math.min(...typical) / 1.5, Math.max(...typical) * 1.5] : [0, Infinity];
+    const series = this.gaits.flatMap((curve) => {
       const pieces = [];
       curve.value.forEach((x, index) => {
-        const y = curve[what.value][index];
-        if (y < least || y > most) return pieces.push(null);
+        const y = curve[quantity.value][index];
+        if (y < low || y > high) return pieces.push(null);
         const last = pieces.at(-1);
         if (last) last.x.push(this.scaled(x)), last.y.push(y);
         if (last?.stable !== curve.stable[index]) {
@@ -411,16 +418,17 @@ class Along extends Plot {
       return pieces.filter((piece) => piece);
     });
     if (!series.length) return;
-    super.draw(series, `${what.selectedOptions[0].text} of gaits over ${this.key}`);
+    super.draw(series, `${quantity.selectedOptions[0].text} of gaits over ${this.key}`);
     this.dot = element("circle", { r: 4.5 });
     this.cursor.replaceChildren(this.line, this.dot);
     this.mark();
   }
   // Quantity of the gait shown; undefined if only the contact model's curves are plotted.
   get height() {
-    const [gait, what] = [shown?.answer.fixedpoint ?? {}, byId("what").value];
-    if (!this.found?.some(({ model }) => model === "rigid")) return undefined;
-    return what === "speed_m_s" ? gait.step_length_m / gait.period_s : gait[what];
+    const gait = shown?.answer.fixedpoint ?? {};
+    const quantity = byId("quantity").value;
+    if (!this.gaits?.some(({ model }) => model === "rigid")) return undefined;
+    return quantity === "speed_m_s" ? gait.step_length_m / gait.period_s : gait[quantity];
   }
   mark() {
     if (!this.series || !shown) return;
@@ -435,12 +443,12 @@ class Along extends Plot {
 
 // Exports
 
-function leave(name, address) {
+function download(name, address) {
   Object.assign(document.createElement("a"), { download: name, href: address }).click();
 }
 
 // The canvas is transparent: fill in the page's background.
-function picture() {
+function savePicture() {
   if (!player) return;
   const { canvas } = player.walk;
   const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
@@ -448,32 +456,32 @@ function picture() {
   context.fillStyle = getComputedStyle(document.body).backgroundColor;
   context.fillRect(0, 0, copy.width, copy.height);
   context.drawImage(canvas, 0, 0);
-  leave("walk.png", copy.toDataURL("image/png"));
+  download("walk.png", copy.toDataURL("image/png"));
 }
 
-function tell(text, url) {
-  byId("made").textContent = `${text} `;
-  if (url) byId("made").append(Object.assign(document.createElement("a"), { href: `${url}?token=${token}`, textContent: "Open", target: "_blank" }));
+function showExport(text, url) {
+  byId("export-status").textContent = `${text} `;
+  if (url) byId("export-status").append(Object.assign(document.createElement("a"), { href: `${url}?token=${token}`, textContent: "Open", target: "_blank" }));
 }
 
 async function save() {
-  const [status, answer] = await ask("/api/save", question({ name: byId("name").value })).catch(() => [0]);
-  tell(status === 200 ? `Saved: ${answer.file}` : status ? sentence(answer.error) : "The server does not answer.");
+  const [status, answer] = await ask("/api/save", requestBody({ name: byId("name").value })).catch(() => [0]);
+  showExport(status === 200 ? `Saved: ${answer.file}` : status ? sentence(answer.error) : "The server does not answer.");
   const name = answer?.file?.split("/").at(-1);
   if (name && ![...byId("config").options].some((option) => option.value === name)) byId("config").append(new Option(name));
 }
 
 const LABELS = { gif: "GIF", report: "Report" };
 
-async function make(kind) {
-  let [status, answer] = await ask("/api/job", question({ kind, models: models() })).catch(() => [0]);
+async function exportAs(kind) {
+  let [status, answer] = await ask("/api/job", requestBody({ kind, models: models() })).catch(() => [0]);
   while (status === 200 && answer.running) {
-    tell(`${kind}: ${answer.said || "starting"}`, answer.url);
+    showExport(`${kind}: ${answer.progress || "starting"}`, answer.url);
     await new Promise((resolve) => setTimeout(resolve, 500));
     [status, answer] = await ask("/api/job").catch(() => [0]);
   }
-  if (status !== 200) return tell(status ? sentence(answer.error) : "The server does not answer.");
-  tell(answer.error ? sentence(answer.error) : `${LABELS[kind]} ready.`, answer.url);
+  if (status !== 200) return showExport(status ? sentence(answer.error) : "The server does not answer.");
+  showExport(answer.error ? sentence(answer.error) : `${LABELS[kind]} ready.`, answer.url);
 }
 
 // The whole page
@@ -481,8 +489,8 @@ async function make(kind) {
 async function begin() {
   fromFragment();
   remember.last = fragment();
-  let [status, answer] = await ask("/api/numbers", question()).catch(() => [0]);
-  if (status === 422) [status, answer] = await ask("/api/numbers", { ...question(), set: {} });
+  let [status, answer] = await ask("/api/numbers", requestBody()).catch(() => [0]);
+  if (status === 422) [status, answer] = await ask("/api/numbers", { ...requestBody(), set: {} });
   if (status === 200) arrange(answer.numbers);
   else say(status ? sentence(answer.error) : "The server does not answer.", "bad");
   await walk();
@@ -502,10 +510,10 @@ byId("config").addEventListener("change", () => choose(byId("config").value));
 byId("reset").addEventListener("click", () => choose(state.config));
 byId("search").addEventListener("input", search);
 byId("search").addEventListener("keydown", ({ key }) => {
-  const hits = byId("found").children;
+  const hits = byId("matches").children;
   if (key === "Enter" && hits.length === 1) hits[0].click();
 });
-byId("what").addEventListener("change", () => along.plot());
+byId("quantity").addEventListener("change", () => along.plot());
 for (const model of Object.keys(MODELS)) {
   byId(model).addEventListener("change", () => {
     if (byId(model).checked) walk();
@@ -513,10 +521,10 @@ for (const model of Object.keys(MODELS)) {
     along.draw();
   });
 }
-byId("copy").addEventListener("click", () => navigator.clipboard.writeText(byId("command").textContent).then(() => tell("Copied.")));
+byId("copy").addEventListener("click", () => navigator.clipboard.writeText(byId("command").textContent).then(() => showExport("Copied.")));
 byId("save").addEventListener("click", save);
-byId("png").addEventListener("click", picture);
-for (const kind of ["gif", "report"]) byId(kind).addEventListener("click", () => make(kind));
+byId("png").addEventListener("click", savePicture);
+for (const kind of ["gif", "report"]) byId(kind).addEventListener("click", () => exportAs(kind));
 addEventListener("popstate", begin);
 // The link must not replace the fragment, which holds the changes.
 document.querySelector(".skip").addEventListener("click", (event) => {

@@ -7,7 +7,7 @@ from typing import Any
 from walkerlab.labels import join_words
 from walkerlab.outcome import Outcome
 from walkerlab.views.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
-from walkerlab.views.report.numbers import NONE, number, power_of_ten, whole
+from walkerlab.views.report.numbers import NONE, format_integer, number, power_of_ten
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.views.report.words import words
@@ -42,7 +42,7 @@ def costs(summary: Row) -> Table:
         Column("method", "method"),
         *(Column(f"ms for {power_of_ten(level, 1)}", f"{level}", format_time, numeric=True) for level in levels),
         Column("smallest error", "smallest_error", numeric=True),
-        Column("right-hand sides", "rhs_evaluations", whole, numeric=True),
+        Column("right-hand sides", "rhs_evaluations", format_integer, numeric=True),
         Column("failed runs", "failures", wide=True),
     )
     methods = {scene: list(method_rows(summary, scene, levels)) for scene in summary["reference"]}
@@ -83,7 +83,7 @@ def failure_text(run: Row) -> str:
 
 
 def nearest_library(summary: Row, scene: str) -> Row | None:
-    """Return the run of a library that ends closest to the reference; None if no library reached the end."""
+    """Return the run of a library that ends closest to the reference, or None if no library reached the end."""
     runs = [row for row in summary["rows"] if row["scene"] == scene and row["error"] is not None]
     library_runs = [row for row in runs if row["method"].startswith(("scipy", "cvode"))]
     return min(library_runs, key=lambda row: float(row["error"]), default=None)
@@ -92,7 +92,7 @@ def nearest_library(summary: Row, scene: str) -> Row | None:
 def reference_origin(reference: Row) -> str:
     if reference["from_outside"]:
         return "heyoka, at machine precision"
-    spent = f", {whole(reference['rhs_evaluations'])} right-hand sides"
+    spent = f", {format_integer(reference['rhs_evaluations'])} right-hand sides"
     return f"ours, at {power_of_ten(reference['tolerance'], 1)}{spent}"
 
 

@@ -10,7 +10,7 @@ from walkerlab.views.report.gaits import symbol, works
 from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity
 from walkerlab.views.report.outcomes import tone
 from walkerlab.views.report.results import Results, stage_section
-from walkerlab.views.report.symbols import in_signs
+from walkerlab.views.report.symbols import typeset
 from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table
 from walkerlab.views.report.words import words
 
@@ -34,7 +34,7 @@ ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit
 
 
 def limit(results: Results) -> Section | None:
-    """Show how the contact model converges to the rigid one; None if that was not computed."""
+    """Show how the contact model converges to the rigid one, or return None if that was not computed."""
     summary = results.summary("tune")
     reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
     pushes = results.config.push_off.impulse_N_s != 0.0
@@ -51,13 +51,15 @@ def limit(results: Results) -> Section | None:
 
 
 def starts_table(results: Results, summary: Summary) -> Table:
-    """Tabulate the start before and after the adjustment; for the paper's scene, next to its Table 2."""
+    """Tabulate the start before and after the adjustment. For the scene of the paper, its Table 2 is shown next to
+    them.
+    """
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
     caption, note, head = "The start before and after the adjustment", "", "coordinate"
     if results.claims:
         caption, head = "Table 2 again: the start before and after the adjustment", "row"
         note = "The paper's percentages are relative to the ADAMS value, which it does not state."
-    named = in_signs if results.claims else symbol
+    named = typeset if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")
     titles = words.terms("adjustment.starts", results.claims).items()
     digits = {key: 3 if "percent" in key else 6 for key, _ in titles}
@@ -75,7 +77,7 @@ LOSS_HEADS = {
 
 
 def lost_energy(channel: str, gait: Summary) -> float | Cell | None:
-    """Return the energy (J) that a gait loses in a channel; None for a knee channel without losses."""
+    """Return the energy (J) that a gait loses in a channel, or None for a knee channel without losses."""
     energy = gait["lost_J"].get(channel)
     return energy if energy or channel in ("damping", "friction") else None
 
@@ -111,7 +113,7 @@ def gait_table(summary: Summary, rigid: Summary) -> Table:
 
 
 MARGIN_COLUMNS = (
-    Column("scaled velocity", "name", in_signs),
+    Column("scaled velocity", "name", typeset),
     Column("last factor at which the start walks", "factor", number, numeric=True),
     Column("outcome beyond", "beyond", lambda outcome: outcome or "no failure in the search range"),
     Column("steps beyond", "steps_beyond", lambda steps: "" if steps is None else str(steps), numeric=True),

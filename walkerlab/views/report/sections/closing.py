@@ -19,7 +19,7 @@ TITLES = {
 """Titles of the further pages, in order."""
 
 
-def further(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
+def link_pages(results: Results, pages: Mapping[str, Sequence[Section]]) -> Section | None:
     """Link to the further pages, with the findings of their sections, and announce pending results."""
     items = []
     for file, sections in pages.items():
@@ -35,7 +35,7 @@ def glossary(results: Results) -> Section:
     return Section("glossary", "Glossary", (Terms(meanings),), "Terms used in this report.")
 
 
-def left_out(results: Results) -> Section | None:
+def omissions_section(results: Results) -> Section | None:
     parts = [LeftOut(**entry) for stored in results.stored.values() for entry in stored.summary.get("left_out", [])]
     rows = list(rows_by_reason(list(dict.fromkeys((*results.absent, *parts)))))
     columns = [Column("result"), Column("reason", wide=True), Column("saves", wide=True)]
@@ -54,6 +54,6 @@ def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]
         alike = [absent for absent in missing if absent.why == why]
         first = join_words(absent.what for absent in alike)
         yield first, why, "; ".join(dict.fromkeys(absent.saves for absent in alike if absent.saves))
-        further = join_words(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
-        if further:
-            yield further, f"needs {first}", ""
+        dependents = join_words(absent.what for absent in missing if absent.why != why and causes[absent.why] == why)
+        if dependents:
+            yield dependents, f"needs {first}", ""

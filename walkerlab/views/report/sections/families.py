@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.labels import axis_label, with_unit
+from walkerlab.labels import add_unit, axis_label
 from walkerlab.pipeline.store.content import Group
 from walkerlab.views.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
 from walkerlab.views.report.gaits import complex_number
-from walkerlab.views.report.numbers import number, whole
+from walkerlab.views.report.numbers import format_integer, number
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.tracks import sampling_gap, track_in
@@ -40,7 +40,7 @@ def bifurcations(summary: Mapping[str, Any]) -> Table:
         Column("kind", "kind"),
         Column("model", "model"),
         Column("period (steps)", "period", numeric=True),
-        Column(with_unit(parameter(summary), summary["unit"]), "value", lambda value: number(value, 9), numeric=True),
+        Column(add_unit(parameter(summary), summary["unit"]), "value", lambda value: number(value, 9), numeric=True),
         Column("critical multiplier", "multiplier", lambda parts: complex_number(*parts), numeric=True),
     )
     return table("Bifurcations, as zeros of their test functions", columns, summary["bifurcations"])
@@ -78,7 +78,9 @@ class DiagramAxis:
 
 
 def gait_diagram(results: Results) -> Diagram | None:
-    """Plot step periods over the parameter, with marks for gaits whose motion is stored; None if no motion is."""
+    """Plot step periods over the parameter, with marks for gaits whose motion is stored, or return None if no motion
+    is.
+    """
     summary = results.summary("continuation")
     branches: list[Group] = []
     while (branch := results.group("continuation", f"{DIAGRAM_MODEL}/branch_{len(branches)}")) is not None:
@@ -105,20 +107,20 @@ def gait_diagram(results: Results) -> Diagram | None:
         if track is not None:
             name = words("families.mark", int(motion.attrs["steps"]), x, unit, stable)
             strikes = motion["time"][1:][np.diff(motion["step"]) > 0].round(6)
-            walker = Walker(name, DIAGRAM_MODEL, track.thinned(gap), tuple(strikes.tolist()), (), pushes=pushes)
+            walker = Walker(name, DIAGRAM_MODEL, track.thin(gap), tuple(strikes.tolist()), (), pushes=pushes)
             marks.append(GaitMark(across.place(x), up.place(y), stable, walker, float(motion.attrs["slope_rad"])))
     over = parameter(summary)
     return Diagram(
         title=f"Gaits over {over}",
         caption=words("families.diagram"),
-        titles=(with_unit(over, unit), "duration of a step (s)"),
+        titles=(add_unit(over, unit), "duration of a step (s)"),
         curves=tuple(curve for branch in branches for curve in curves(branch, across, up)),
         ticks=(across.ticks(), up.ticks()),
-        gaits=apart(marks),
+        gaits=separate_marks(marks),
     )
 
 
-def apart(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
+def separate_marks(marks: Sequence[GaitMark]) -> tuple[GaitMark, ...]:
     """Select marks that do not overlap, preferring stable gaits."""
     chosen: list[int] = []
     for place in sorted(range(len(marks)), key=lambda place: not marks[place].stable):
@@ -142,8 +144,8 @@ def curves(
 
 
 ATTRACTOR_COLUMNS = (
-    Column("period (steps)", "period", whole, numeric=True),
-    Column("cells", "cells", whole, numeric=True),
+    Column("period (steps)", "period", format_integer, numeric=True),
+    Column("cells", "cells", format_integer, numeric=True),
     Column("steps to reach it, median", "median_steps_to_settle", lambda steps: number(steps, 3), numeric=True),
 )
 

@@ -29,7 +29,7 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 
 def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
-    """Tabulate all gaits by set of equations; a remark marks the chosen one or says why a gait is unphysical."""
+    """Tabulate all gaits by set of equations. A remark marks the chosen one or says why a gait is unphysical."""
     four, five = partial(fixed, decimals=4), partial(fixed, decimals=5)
     columns = (
         Column("gait", "gait", numeric=True),

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from walkerlab.labels import axis_label, join_words, unit_by_name, with_unit
+from walkerlab.labels import add_unit, axis_label, join_words, unit_by_name
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.views.report.numbers import fixed, number, quantity
 from walkerlab.views.report.results import Results, stage_section
@@ -66,7 +66,7 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     left_open = [
         (
             capitalised(join_words(axis_label(key) for key in keys if key in row["combination"])),
-            with_labels(row["combination"], keys),
+            label_combination(row["combination"], keys),
             row["reason"],
         )
         for row in summary["not_identifiable"]
@@ -109,7 +109,7 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     ]
     estimates = [row for row in summary["estimates"] if row["standard_error"] is not None]
     moves = sensitive_rows(summary, estimates)
-    changes = [Column(with_unit(axis_label(row["key"]), row["unit"]), row["key"], numeric=True) for row in estimates]
+    changes = [Column(add_unit(axis_label(row["key"]), row["unit"]), row["key"], numeric=True) for row in estimates]
     return [
         table("Estimates", ESTIMATE_COLUMNS, summary["estimates"]),
         table("Fit to the measurements", QUALITY_COLUMNS, quality),
@@ -143,7 +143,7 @@ def decimals_of(error: float) -> int:
     return max(0, -int(exponent) + (mantissa < "2"))
 
 
-def with_error(value: float, error: float | None, unit: str) -> str:
+def value_and_error(value: float, error: float | None, unit: str) -> str:
     """Format a value with its standard error, as in 9.8 ± 0.2 kg."""
     ending = UNITS_IN_WORDS.get(unit, f" {unit}")
     if not error:
@@ -160,7 +160,7 @@ def mass_in_words(key: str, text: str) -> str:
 
 
 def estimate_in_words(row: Mapping[str, Any]) -> str:
-    value = with_error(row["value"], row["standard_error"], row["unit"])
+    value = value_and_error(row["value"], row["standard_error"], row["unit"])
     bound = " (at its bound)" if row["at_bound"] else ""
     if row["key"].endswith("mass_kg"):
         return mass_in_words(row["key"], value.removesuffix(" kg")) + bound
@@ -177,7 +177,7 @@ def change_in_words(held: Mapping[str, Any], estimates: Sequence[Mapping[str, An
     return f"If {held['to']}, which is held fixed, was {change} larger, this would change {join_words(changes)}."
 
 
-def with_labels(combination: str, keys: Sequence[str]) -> str:
+def label_combination(combination: str, keys: Sequence[str]) -> str:
     for key in sorted(keys, key=len, reverse=True):
         combination = combination.replace(key, axis_label(key))
     return combination
@@ -186,7 +186,7 @@ def with_labels(combination: str, keys: Sequence[str]) -> str:
 def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
     """Return label and value of each prior that the walk contradicts, and the distance in standard errors."""
     return [
-        (axis_label(row["key"]), with_error(row["value"], row["standard_deviation"], row["unit"]), row["distance"])
+        (axis_label(row["key"]), value_and_error(row["value"], row["standard_deviation"], row["unit"]), row["distance"])
         for row in priors
         if row["distance"] > CONTRADICTION
     ]
@@ -196,7 +196,7 @@ def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     return capitalised(
         join_words(
             f"the {axis_label(name)}{REFERENCES.get(name, '')} is "
-            f"{with_error(row['value'], row['standard_error'], unit_by_name(name))}"
+            f"{value_and_error(row['value'], row['standard_error'], unit_by_name(name))}"
             for name, row in nuisances.items()
         )
     )
@@ -204,7 +204,7 @@ def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
 
 def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
     parts = [
-        said.format(with_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
+        said.format(value_and_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
         for name, said in GAIT_WORDS.items()
         if name in gait
     ]
@@ -212,7 +212,7 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def radius_in_words(radius: Mapping[str, float]) -> str:
-    value = with_error(radius["value"], radius["standard_error"], "1")
+    value = value_and_error(radius["value"], radius["standard_error"], "1")
     plain = fixed(radius["plain"], decimals_of(radius["standard_error"]))
     return (
         f"The steps alone, without a model, have a largest multiplier of {value} ({plain} before correction for noise)."

@@ -48,7 +48,7 @@ def section(results: Results) -> Section | None:
 
 
 def departure(results: Results) -> str:
-    """Describe where the contact model departs from the rigid one; empty if they were not compared."""
+    """Describe where the contact model departs from the rigid one, or return '' if they were not compared."""
     summary = results.summary("compare")
     if "steps" not in summary or summary["steps"]["contact"]["period_s"] is None:
         return ""

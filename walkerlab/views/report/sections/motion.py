@@ -26,12 +26,12 @@ def section(results: Results) -> Section | None:
 
 
 def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
-    """Animate the first steps of both models' walks; None if no motion was stored."""
+    """Animate the first steps of both models' walks, or return None if no motion was stored."""
     touches = [results.summary(stage).get("touch_times_s", []) for stage in MODEL_NAMES]
     # end when the slower model has taken `most` steps
     end = max((times[most - 1] for times in touches if len(times) >= most), default=math.inf)
     by_stage = {stage: track_in(results.group(stage, "trajectory")) for stage in MODEL_NAMES}
-    tracks = {stage: track.until(end) for stage, track in by_stage.items() if track is not None}
+    tracks = {stage: track.cut(end) for stage, track in by_stage.items() if track is not None}
     if not tracks:
         return None
     config, torso = results.config, results.config.walker.torso
@@ -55,7 +55,7 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
 
 
 def overlay(results: Results) -> Player | None:
-    """Animate the measured walk over the identified one; None if no angles were measured."""
+    """Animate the measured walk over the identified one, or return None if no angles were measured."""
     motions = {style: results.group("identify", f"{name}_motion") for name, style in OVERLAY_STYLES.items()}
     tracks = {style: track for style, motion in motions.items() if (track := track_in(motion)) is not None}
     about = motions["rigid"]
@@ -86,7 +86,7 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
     return Walker(
         name=MODEL_NAMES[stage],
         style=WALKER_STYLES[stage],
-        track=track.thinned(sampling_gap(results.config)),
+        track=track.thin(sampling_gap(results.config)),
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, strikes),
         ends="" if summary["outcome"] == WALKED_LABEL else ends(summary["outcome"]),
@@ -109,7 +109,7 @@ def stills(track: Track, strikes: list[float]) -> tuple[tuple[tuple[int, int], .
 
 
 def weight(tracks: dict[str, Track]) -> float:
-    """Return a typical ground force (N) to scale arrows by; 1 if forces are unknown."""
+    """Return a typical ground force (N) to scale arrows by, or 1 if forces are unknown."""
     loads = [float(np.median(track["n0"] + track["n1"])) for track in tracks.values() if "n0" in track.channels]
     return max((load for load in loads if load > 0.0), default=1.0)
 
@@ -124,7 +124,7 @@ def closeup(track: Track | None, length: float) -> float:
 
 
 def pads(results: Results) -> tuple[Pad, ...]:
-    """Return the pads that the contact model walks on; empty on a plane."""
+    """Return the pads that the contact model walks on, or () on a plane."""
     terrain = results.group(CONTACT_STAGE, "terrain")
     if terrain is None or "left_m" not in terrain.variables:
         return ()
@@ -133,7 +133,7 @@ def pads(results: Results) -> tuple[Pad, ...]:
 
 
 def ground(results: Results) -> tuple[tuple[float, float], ...]:
-    """Return the start along the slope and the height of each ground level (m); empty on even ground."""
+    """Return the start along the slope and the height of each ground level (m), or () on even ground."""
     for stage in reversed(MODEL_NAMES):
         steps = results.group(stage, "steps")
         levels = None if steps is None else ground_levels(steps)

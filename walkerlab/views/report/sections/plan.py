@@ -5,7 +5,7 @@ from typing import Any
 
 from walkerlab.labels import axis_label
 from walkerlab.views.report.blocks import Paragraph, Section
-from walkerlab.views.report.numbers import number, whole
+from walkerlab.views.report.numbers import format_integer, number
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.sections.identification import UNITS_IN_WORDS
 from walkerlab.views.report.tables import Column, Table, table
@@ -37,10 +37,10 @@ def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
     wanted = f"{axis_label(entry['key'])} to ± {number(entry['wanted'])}{unit}"
     reached = [row for row in rows if row["errors"][place]["steps_needed"]]
     if not reached:
-        return f"The {wanted}: {whole(most)} steps do not suffice."
+        return f"The {wanted}: {format_integer(most)} steps do not suffice."
     best = min(reached, key=lambda row: row["errors"][place]["steps_needed"])
     needed = best["errors"][place]["steps_needed"]
-    steps = "1 step" if needed == 1 else f"{whole(needed)} steps"
+    steps = "1 step" if needed == 1 else f"{format_integer(needed)} steps"
     return f"The {wanted}: {steps} of {best['measurement']}, {best['start']}."
 
 
@@ -65,6 +65,6 @@ def error_of(place: int) -> Any:
 def steps_of(place: int) -> Any:
     def text(row: Mapping[str, Any]) -> str:
         needed = row["errors"][place]["steps_needed"]
-        return "" if needed is None else whole(needed)
+        return "" if needed is None else format_integer(needed)
 
     return text

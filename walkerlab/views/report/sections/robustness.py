@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from walkerlab.views.report.blocks import Paragraph, Section
-from walkerlab.views.report.numbers import length, number, whole
+from walkerlab.views.report.numbers import format_integer, length, number
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
@@ -35,9 +35,9 @@ ROUGH_COLUMNS = (
     Column("roughness", "roughness_m", length, numeric=True),
     Column("mean steps", lambda row: BOUND_SIGNS.get(row["method"], "") + number(row["mean_steps"], 4), numeric=True),
     Column("standard error", "standard_error", lambda value: number(value, 2), numeric=True),
-    Column("walks", "walks", whole, numeric=True),
-    Column("cut off", "capped", whole, numeric=True),
-    Column("at step", "cut_off_at", whole, numeric=True),
+    Column("walks", "walks", format_integer, numeric=True),
+    Column("cut off", "capped", format_integer, numeric=True),
+    Column("at step", "cut_off_at", format_integer, numeric=True),
     Column("method", "method"),
 )
 DERIVATIVE_COLUMNS = (

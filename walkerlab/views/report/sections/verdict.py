@@ -61,7 +61,7 @@ def outcome_statements(results: Results) -> Iterator[Statement]:
 
 
 def walk_end(results: Results, stage: str) -> tuple[float | None, float | None]:
-    """Return a walk's end time (s) and the hip's height at that time (m); None for values that are not stored."""
+    """Return a walk's end time (s) and the hip's height at that time (m), or None for values that are not stored."""
     summary, trajectory = results.summary(stage), results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:
         return summary.get("end_time_s"), None

@@ -12,12 +12,12 @@ from walkerlab.views.report.numbers import (
     NONE,
     decimals_left,
     fixed,
+    format_integer,
     length,
     number,
     power_of_ten,
     quantity,
     span,
-    whole,
 )
 from walkerlab.views.report.outcomes import CONTACT_STAGE, MODEL_NAMES, RIGID_STAGE, tone
 from walkerlab.views.report.results import Results, stage_section
@@ -54,7 +54,7 @@ def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]
         "cost of transport": number(get("cost_of_transport"), 4),
         "energy balance error": joules(summary["energy_balance_residual_J"]),
         **{f"energy lost {CHANNELS.get(key, key)}": joules(value) for key, value in lost.items()},
-        "solver work": whole(get("rhs_evaluations")),
+        "solver work": format_integer(get("rhs_evaluations")),
     }
     meanings = words.terms("walks.meanings", summary)
     known = {name: value for name, value in values.items() if value != NONE}
@@ -139,7 +139,7 @@ def steps(results: Results) -> Section | None:
 
 
 def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
-    """Format a quantity of step `place`, from 0, with the decimals that its numerical error allows; slips in mm."""
+    """Format a quantity of step `place`, from 0, with the decimals that its numerical error allows. Slips are in mm."""
     value, factor = summary[key][place], 1e3 if key == "slips_m" else 1.0
     errors, name = summary.get("numerical_error") or {}, ERROR_OF_EACH_STEP[key]
     error = errors["of_steps"][name][place] if name in errors.get("of_steps", ()) else errors.get(name)

@@ -38,7 +38,7 @@ class Track {
     this.over = time > this.end + 1e-6;
     this.time = time;
   }
-  // The leg that pushes off, kept for 0.08 s so that it is seen; -1 if there is none.
+  // The leg that pushes off, kept for 0.08 s to make it visible, or -1 if no leg does.
   get pushing() {
     const step = this.strikes.findLastIndex((strike) => strike <= this.time);
     return this.pushes && step >= 0 && this.time - this.strikes[step] < 0.08 ? 1 - (step % 2) : -1;
@@ -98,13 +98,13 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   // The camera follows the walkers that still walk; it leaves one that has ended within half a second.
   const shares = tracks.map((track) => clamp(1 - (track.time - track.end) / 0.5, 0, 1));
   const hip = tracks.reduce((sum, track, index) => sum + shares[index] * track.at("hx"), 0) / shares.reduce((sum, share) => sum + share, 0);
-  const place = picture.place = (x, y) => [
+  const toPixels = picture.toPixels = (x, y) => [
     width / 2 + scale * (cos * (x - hip) + sin * y),
     0.83 * height + scale * (sin * (x - hip) - cos * y),
   ];
   const across = (0.75 * width) / scale;
   const slab = (from, to, top, bottom, fill) => {
-    const corners = [[from, top], [to, top], [to, bottom], [from, bottom]].map(([x, y]) => place(x, y));
+    const corners = [[from, top], [to, top], [to, bottom], [from, bottom]].map(([x, y]) => toPixels(x, y));
     c.fillStyle = fill;
     c.beginPath();
     for (const [x, y] of corners) c.lineTo(x, y);
@@ -123,26 +123,26 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
   c.lineWidth = 1;
   c.beginPath();
   levels.forEach(([from, to, height], k) => {
-    if (k === 0) c.moveTo(...place(from, height));
-    c.lineTo(...place(from, height));
-    c.lineTo(...place(to, height));
+    if (k === 0) c.moveTo(...toPixels(from, height));
+    c.lineTo(...toPixels(from, height));
+    c.lineTo(...toPixels(to, height));
   });
   const tick = 0.5 * scene.leg_m;
   const ticks = [];
   for (let i = Math.ceil((hip + back - across) / tick); i * tick < hip + back + across; i++) ticks.push(i * tick);
   for (const far of ticks) {
-    c.moveTo(...place(far - back, under));
-    c.lineTo(...place(far - back, under - 0.03 * scene.leg_m));
+    c.moveTo(...toPixels(far - back, under));
+    c.lineTo(...toPixels(far - back, under - 0.03 * scene.leg_m));
   }
   c.stroke();
   c.fillStyle = colours.soft;
   c.font = "12px system-ui, sans-serif";
   c.textAlign = "center";
   for (const far of ticks) {
-    const [x, y] = place(far - back, under - 0.1 * scene.leg_m);
-    const said = `${digits(far)} m`;
-    const room = 0.5 * c.measureText(said).width;
-    if (x > room && x < width - room) c.fillText(said, x, y);
+    const [x, y] = toPixels(far - back, under - 0.1 * scene.leg_m);
+    const label = `${digits(far)} m`;
+    const room = 0.5 * c.measureText(label).width;
+    if (x > room && x < width - room) c.fillText(label, x, y);
   }
   drawRelief(picture, scene, levels, colours);
   picture.points = [];
@@ -150,22 +150,22 @@ function drawWalk(picture, scene, tracks, colours, back = 0) {
 }
 
 // Draw uneven ground a second time, below it, with exaggerated heights and a label with the factor.
-function drawRelief({ context: c, place, height }, scene, levels, colours) {
+function drawRelief({ context: c, toPixels, height }, scene, levels, colours) {
   const roughest = Math.max(0, ...scene.ground.map(([, level]) => Math.abs(level)));
   const times = roughest ? niceStep((0.04 * scene.leg_m) / roughest) : 0;
   if (times <= 1) return;
   c.strokeStyle = c.fillStyle = colours.bad;
   c.beginPath();
-  for (const [from, to, level] of levels) for (const x of [from, to]) c.lineTo(...place(x, times * level - 0.19 * scene.leg_m));
+  for (const [from, to, level] of levels) for (const x of [from, to]) c.lineTo(...toPixels(x, times * level - 0.19 * scene.leg_m));
   c.stroke();
   c.textAlign = "left";
   c.fillText(`red line: ground heights × ${digits(times)}`, 8, height - 8);
 }
 
 function drawWalker(picture, scene, track, colours, scale, index) {
-  const { context: c, place, points } = picture;
+  const { context: c, toPixels, points } = picture;
   const broad = index === 0 ? 10 : 5;
-  const joint = (name) => place(track.at(name[0] + "x" + name.slice(1)), track.at(name[0] + "y" + name.slice(1)));
+  const joint = (name) => toPixels(track.at(name[0] + "x" + name.slice(1)), track.at(name[0] + "y" + name.slice(1)));
   c.lineCap = c.lineJoin = "round";
   c.globalAlpha = track.over ? 0.35 : index === 0 && !track.alone ? 0.75 : 1;
   for (const leg of [1, 0]) {
@@ -174,7 +174,7 @@ function drawWalker(picture, scene, track, colours, scale, index) {
     const path = new Path2D();
     for (const name of bent ? ["h", `k${leg}`] : ["h"]) path.lineTo(...joint(name));
     // The sole is where the leg's direction meets the foot's arc.
-    const [x, y] = place(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radius_m);
+    const [x, y] = toPixels(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radius_m);
     const radius = scale * scene.foot_radius_m;
     const down = Math.PI / 2 - (track.at(`b${leg}`) ?? track.at(`a${leg}`));
     path.lineTo(x + radius * Math.cos(down), y + radius * Math.sin(down));
@@ -190,7 +190,7 @@ function drawWalker(picture, scene, track, colours, scale, index) {
       c.stroke(path);
     }
     if (bent) dot(c, joint(`k${leg}`), 0.7 * broad, colours[track.style]);
-    points.push({ at: joint(`f${leg}`), said: `${track.name}, foot of leg ${leg + 1}: ${metres(track.at(`fx${leg}`), 4)} along, ${metres(track.at(`fy${leg}`))} above` });
+    points.push({ at: joint(`f${leg}`), text: `${track.name}, foot of leg ${leg + 1}: ${metres(track.at(`fx${leg}`), 4)} along, ${metres(track.at(`fy${leg}`))} above` });
   }
   if (track.has("u") && scene.torso_m) {
     const tilted = track.at("u") + scene.slope_rad;
@@ -198,11 +198,11 @@ function drawWalker(picture, scene, track, colours, scale, index) {
     c.lineWidth = broad;
     c.beginPath();
     c.moveTo(...joint("h"));
-    c.lineTo(...place(track.at("hx") + scene.torso_m * Math.sin(tilted), track.at("hy") + scene.torso_m * Math.cos(tilted)));
+    c.lineTo(...toPixels(track.at("hx") + scene.torso_m * Math.sin(tilted), track.at("hy") + scene.torso_m * Math.cos(tilted)));
     c.stroke();
   }
   dot(c, joint("h"), broad, colours[track.style]);
-  points.push({ at: joint("h"), said: `${track.name}, hip: ${metres(track.at("hx"), 4)} along, ${metres(track.at("hy"), 4)} above` });
+  points.push({ at: joint("h"), text: `${track.name}, hip: ${metres(track.at("hx"), 4)} along, ${metres(track.at("hy"), 4)} above` });
   c.strokeStyle = colours.force;
   c.lineWidth = 2;
   for (const leg of [0, 1]) {
@@ -259,8 +259,8 @@ function drawFoot(picture, scene, track, leg, colours) {
   const foot = new Path2D();
   if (scene.foot_radius_m > 0) foot.arc(x, sole - radius, radius, 0, TAU);
   else [[x, sole], [x - 0.3 * height, sole - height], [x + 0.3 * height, sole - height]].forEach((corner) => foot.lineTo(...corner));
-  const seen = sole > 0;
-  if (seen) {
+  const visible = sole > 0;
+  if (visible) {
     c.globalAlpha = 0.8;
     c.fillStyle = colours[track.style];
     c.fill(foot);
@@ -286,7 +286,7 @@ function drawFoot(picture, scene, track, leg, colours) {
   const bar = niceStep(scene.closeup_m / 3);
   c.fillText(metres(bar, 1), 8, height - 14);
   c.fillRect(8, height - 9, scale * bar, 2);
-  if (!seen) {
+  if (!visible) {
     c.textAlign = "center";
     c.fillText(`${metres(clearance(scene, track, leg))} above the ground`, width / 2, 0.3 * height);
     arrow(c, width / 2, 0.25 * height, 0, -0.15 * height);
@@ -298,7 +298,7 @@ function drawFoot(picture, scene, track, leg, colours) {
   force(c, scene, track, leg, x, Math.min(sole, ground + 0.2 * height), 0.4 * height, 0.62 * height);
 }
 
-function footSaid(track, leg) {
+function describeFoot(track, leg) {
   const parts = [`leg ${leg + 1}`];
   if (track.has("p0")) parts.push(`penetration ${metres(track.at(`p${leg}`))}`);
   if (track.has("q0")) parts.push(`slip ${metres(track.at(`q${leg}`))}`);
@@ -318,8 +318,8 @@ class Plot {
   static HEIGHT = 230;
   static FRAME = [46, 8, 8, 36];
 
-  constructor(place, titles, unit, inTime, seek) {
-    Object.assign(this, { place, titles, unit, inTime });
+  constructor(container, titles, unit, inTime, seek) {
+    Object.assign(this, { container, titles, unit, inTime });
     const sheet = document.createElement("div");
     sheet.className = "sheet";
     this.curves = element("svg", { viewBox: `0 0 ${Plot.WIDTH} ${Plot.HEIGHT}`, role: "img" });
@@ -327,7 +327,7 @@ class Plot {
     this.tip = document.createElement("output");
     this.tip.className = "tip";
     sheet.append(this.curves, this.cursor, this.tip);
-    place.append(sheet);
+    container.append(sheet);
     const look = (event) => this.look(event, seek);
     this.cursor.addEventListener("pointermove", look);
     this.cursor.addEventListener("pointerdown", (event) => {
@@ -337,7 +337,7 @@ class Plot {
     this.cursor.addEventListener("pointerleave", () => (this.tip.textContent = ""));
   }
 
-  draw(series, said) {
+  draw(series, description) {
     this.series = series;
     const [left, top, right, bottom] = Plot.FRAME;
     const limits = (key) => {
@@ -349,8 +349,8 @@ class Plot {
     const [x, y] = [limits("x"), limits("y")];
     this.toX = (value) => left + ((value - x[0]) / (x[1] - x[0])) * (Plot.WIDTH - left - right);
     this.toY = (value) => Plot.HEIGHT - bottom - ((value - y[0]) / (y[1] - y[0])) * (Plot.HEIGHT - top - bottom);
-    this.fromX = (place) => x[0] + ((place - left) / (Plot.WIDTH - left - right)) * (x[1] - x[0]);
-    this.curves.setAttribute("aria-label", said);
+    this.fromX = (pixel) => x[0] + ((pixel - left) / (Plot.WIDTH - left - right)) * (x[1] - x[0]);
+    this.curves.setAttribute("aria-label", description);
     this.curves.replaceChildren(...this.axis(x, true), ...this.axis(y, false), ...series.map((one) => this.curve(one)));
     this.line = element("line", { class: "now", y1: top, y2: Plot.HEIGHT - bottom });
     this.dots = series.map((one) => element("circle", { r: 4.5, class: one.style }));
@@ -402,9 +402,9 @@ class Plot {
     const box = this.cursor.getBoundingClientRect();
     const x = ((event.clientX - box.left) / box.width) * Plot.WIDTH;
     const y = ((event.clientY - box.top) / box.height) * Plot.HEIGHT;
-    const found = this.inTime ? this.series.map((one) => nearest(one, (i) => Math.abs(this.toX(one.x[i]) - x))) : [this.nearestCurve(x, y)];
-    const time = this.inTime ? Math.max(0, this.fromX(x)) : found[0].time;
-    const values = found.map(({ one, row }) => `${one.said} ${this.inTime ? "" : `${digits(one.x[row])} rad, `}${digits(one.y[row])} ${this.unit}`);
+    const hits = this.inTime ? this.series.map((one) => nearest(one, (i) => Math.abs(this.toX(one.x[i]) - x))) : [this.nearestCurve(x, y)];
+    const time = this.inTime ? Math.max(0, this.fromX(x)) : hits[0].time;
+    const values = hits.map(({ one, row }) => `${one.name} ${this.inTime ? "" : `${digits(one.x[row])} rad, `}${digits(one.y[row])} ${this.unit}`);
     this.tip.textContent = [`${time.toFixed(3)} s`, ...values].join("\n");
     this.tip.style.left = x < Plot.WIDTH / 2 ? "auto" : "3.2rem";
     this.tip.style.right = x < Plot.WIDTH / 2 ? ".6rem" : "auto";
@@ -427,17 +427,17 @@ function nearest(one, distance) {
 }
 
 function element(name, attributes, text) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (text !== undefined) made.textContent = text;
-  return made;
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  if (text !== undefined) node.textContent = text;
+  return node;
 }
 
-// Start a player: one clock, and everything that follows it. Returns its controls and the picture of the walk.
+// Start a player, whose views all follow one clock, and return its controls and the picture of the walk.
 function play(root, firstScene, firstTracks) {
   const find = (selector) => root.querySelector(selector);
   let [scene, tracks, plots, end, strikes] = [{}, [], [], 0, [0]];
-  let [round, again, lap, back] = [0, 0, 0, 0];
+  let [loopEnd, loopStart, lapLength, back] = [0, 0, 0, 0];
   const [walk, foot] = [
     new Picture(find(".walk"), (width) => (width < 500 ? 0.78 : 0.56)),
     new Picture(find(".foot"), (width) => (width < 420 ? 0.8 : 0.4)),
@@ -460,8 +460,8 @@ function play(root, firstScene, firstTracks) {
     end = Math.max(...tracks.map((track) => track.end));
     strikes = [0, ...close.strikes, end];
     // End and start of the loop (s), and its distance (m); `back` is the distance of all completed loops.
-    [round, again, lap] = scene.loop ?? [end, 0, 0];
-    if (!lap) back = 0;
+    [loopEnd, loopStart, lapLength] = scene.loop ?? [end, 0, 0];
+    if (!lapLength) back = 0;
     const to = Math.min(step, strikes.length - 2);
     slider.max = end;
     plots = makePlots(root, tracks, seek);
@@ -481,7 +481,7 @@ function play(root, firstScene, firstTracks) {
     root.dataset.time = time.toFixed(4);
     if (playing && frame++ % 6) return;
     slider.setAttribute("aria-valuetext", `${time.toFixed(2)} of ${end.toFixed(2)} seconds`);
-    find(".foot-said").textContent = footSaid(close, leg);
+    find(".foot-values").textContent = describeFoot(close, leg);
     readout();
   };
   const stop = () => {
@@ -492,7 +492,7 @@ function play(root, firstScene, firstTracks) {
     if (!playing) return;
     const next = time + (Math.min(now - last, 100) / 1000) * Number(find(".speed").value);
     last = now;
-    if (find(".loop").checked && next >= round) (back += lap), seek(next - round + again, false);
+    if (find(".loop").checked && next >= loopEnd) (back += lapLength), seek(next - loopEnd + loopStart, false);
     else if (next < end) seek(next, false);
     else return seek(end);
     requestAnimationFrame(tick);
@@ -515,10 +515,11 @@ function play(root, firstScene, firstTracks) {
   };
   const keys = { " ": "play", ArrowLeft: "frame-back", ArrowRight: "frame-on", PageUp: "step-back", PageDown: "step-on", Home: "first", End: "last" };
   root.addEventListener("keydown", (event) => {
-    const own = event.key === " " ? "BUTTON INPUT SELECT" : "SELECT";
+    // These controls need the key themselves.
+    const reserved = event.key === " " ? "BUTTON INPUT SELECT" : "SELECT";
     const action = keys[event.key];
     if (!action || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (own.includes(event.target.tagName) && event.target !== slider) return;
+    if (reserved.includes(event.target.tagName) && event.target !== slider) return;
     event.preventDefault();
     actions[action]();
   });
@@ -529,7 +530,7 @@ function play(root, firstScene, firstTracks) {
     const box = walk.canvas.getBoundingClientRect();
     const far = ({ at: [x, y] }) => Math.hypot(x - event.clientX + box.left, y - event.clientY + box.top);
     const near = walk.points.filter((point) => far(point) < 24);
-    find(".scene .tip").textContent = near.map((point) => point.said).join("\n");
+    find(".scene .tip").textContent = near.map((point) => point.text).join("\n");
   });
   find(".walk").addEventListener("pointerleave", () => (find(".scene .tip").textContent = ""));
 
@@ -558,52 +559,52 @@ function play(root, firstScene, firstTracks) {
 }
 
 // Read a player's scene and tracks from the page.
-const told = (root) => [
+const readData = (root) => [
   JSON.parse(root.dataset.player),
   [...root.querySelectorAll(".track")].map(({ dataset }) => new Track(JSON.parse(dataset.meta), dataset.floats)),
 ];
 
 function makePlots(root, tracks, seek) {
-  const place = (name) => root.querySelector(`[data-view=${name}]`);
+  const view = (name) => root.querySelector(`[data-view=${name}]`);
   for (const old of root.querySelectorAll(".views .sheet")) old.remove();
-  const drawn = (name, there) => !(place(name).hidden = !there);
-  const start = (track, name) => Float32Array.from(track.all[name], (value, _, all) => value - track.all[name][0]);
-  const series = (track, x, y, said, dash) => ({ track, x, y, said: `${track.name.split(" ")[0].toLowerCase()} ${said}`, style: track.style, dash });
-  const made = [];
-  if (drawn("phase", tracks.every((track) => track.has("v0")))) {
-    const phase = new Plot(place("phase"), ["angle (rad)", "angular velocity (rad/s)"], "rad/s", false, seek);
+  const showIf = (name, available) => !(view(name).hidden = !available);
+  const sinceStart = (track, name) => Float32Array.from(track.all[name], (value, _, all) => value - track.all[name][0]);
+  const series = (track, x, y, label, dash) => ({ track, x, y, name: `${track.name.split(" ")[0].toLowerCase()} ${label}`, style: track.style, dash });
+  const plots = [];
+  if (showIf("phase", tracks.every((track) => track.has("v0")))) {
+    const phase = new Plot(view("phase"), ["angle (rad)", "angular velocity (rad/s)"], "rad/s", false, seek);
     const choice = root.querySelector(".leg");
-    const turn = () => {
+    const drawPhase = () => {
       const leg = choice.value;
       phase.draw(tracks.map((track) => series(track, track.all[`a${leg}`], track.all[`v${leg}`], "")), `Angular velocity of leg ${Number(leg) + 1} over its angle: closed loops, one for each model`);
     };
-    turn();
+    drawPhase();
     choice.onchange = () => {
-      turn();
+      drawPhase();
       seek(Number(root.dataset.time));
     };
-    made.push(phase);
+    plots.push(phase);
   }
-  const angles = new Plot(place("angles"), ["time (s)", "angle (rad)"], "rad", true, seek);
+  const angles = new Plot(view("angles"), ["time (s)", "angle (rad)"], "rad", true, seek);
   angles.draw(
     tracks.flatMap((track) => [0, 1].map((leg) => series(track, track.all.t, track.all[`a${leg}`], `leg ${leg + 1}`, leg ? "dashed" : ""))),
     "Angles of both legs over time, for each model",
   );
-  made.push(angles);
+  plots.push(angles);
   const parts = [["ke", "kinetic", ""], ["pe", "potential", "dashed"], ["me", "sum", "dotted"]];
   const with_energy = tracks.filter((track) => track.has("me"));
-  if (drawn("energies", with_energy.length)) {
-    const energies = new Plot(place("energies"), ["time (s)", "change since the start (J)"], "J", true, seek);
+  if (showIf("energies", with_energy.length)) {
+    const energies = new Plot(view("energies"), ["time (s)", "change since the start (J)"], "J", true, seek);
     energies.draw(
-      with_energy.flatMap((track) => parts.map(([name, said, dash]) => series(track, track.all.t, start(track, name), said, dash))),
+      with_energy.flatMap((track) => parts.map(([name, label, dash]) => series(track, track.all.t, sinceStart(track, name), label, dash))),
       "Changes of kinetic and potential energy and of their sum over time, for each model",
     );
-    made.push(energies);
+    plots.push(energies);
   }
-  return made;
+  return plots;
 }
 
-// Build the table of each model's values at the current instant; returns the function that updates it.
+// Build the table of each model's values at the current instant, and return the function that updates it.
 function makeReadout(table, tracks) {
   const rows = [["a0", "angle of leg 1 (rad)"], ["a1", "angle of leg 2 (rad)"], ["v0", "velocity of leg 1 (rad/s)"], ["v1", "velocity of leg 2 (rad/s)"], ["ke", "kinetic energy (J)"], ["pe", "potential energy (J)"], ["me", "their sum (J)"]].filter(([name]) => tracks.some((track) => track.has(name)));
   for (const part of [table.tHead, table.tBodies[0]]) part.replaceChildren();
@@ -614,11 +615,11 @@ function makeReadout(table, tracks) {
     cell.textContent = text;
     head.append(cell);
   }
-  const cells = rows.map(([name, said]) => {
+  const cells = rows.map(([name, label]) => {
     const row = table.tBodies[0].insertRow();
     const heading = document.createElement("th");
     heading.scope = "row";
-    heading.textContent = said;
+    heading.textContent = label;
     row.append(heading);
     return tracks.map((track) => {
       const cell = row.insertCell();
@@ -649,13 +650,13 @@ function load(mark, walk) {
 
 function begin(old, next) {
   old.replaceWith(next);
-  play(next, ...told(next));
+  play(next, ...readData(next));
   next.focus();
   next.scrollIntoView({ block: "nearest" });
 }
 
 const pristine = document.querySelector("[data-player]")?.cloneNode(true);
-for (const root of document.querySelectorAll("[data-player]")) play(root, ...told(root));
+for (const root of document.querySelectorAll("[data-player]")) play(root, ...readData(root));
 for (const diagram of document.querySelectorAll(".diagram")) {
   const marks = [...diagram.querySelectorAll("[data-gait]")];
   for (const [index, mark] of marks.entries()) {
