@@ -40,7 +40,9 @@ def same(served, config, changes, models):
             assert "error" in said["fixedpoint"]
             continue
         if done.no_answer is not None:
-            assert said[stage]["error"] == done.summary["error"]
+            # a moved slider does not wait for the search of nearby gaits, with which the command's advice begins
+            assert done.summary["error"]["advice"].endswith(said[stage]["error"]["advice"])
+            assert said[stage]["error"] | {"advice": ""} == done.summary["error"] | {"advice": ""}
         there = {key: value for key, value in said[stage].items() if key != "error"}
         printed = {key: done.summary[key] for key in there}
         assert json.loads(json.dumps(printed)) == there
