@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
+from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk
 from walkerlab.exchange.recording import read_recording
@@ -19,7 +20,7 @@ LINES = {"angle 1": "HIP>F1", "angle 2": "HIP>F2"}
 
 
 def walk_of(path, columns=(), units=()):
-    return as_walk(read_recording(path), dict(columns), dict(units))
+    return as_walk(read_recording(path), Recorded(columns=dict(columns), units=dict(units)))
 
 
 # C3D

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import RecordedWalk
+from walkerlab.exchange.columns import HIP_OF_LINES, RecordedWalk
 from walkerlab.exchange.leg_angles import legs
 from walkerlab.exchange.marker_lines import NAMED
-from walkerlab.exchange.rate_jumps import Array, noise_of, typical_interval
+from walkerlab.exchange.rate_jumps import Array, noise_of, sums_at_jumps, typical_interval
 from walkerlab.exchange.smooth_course import FAR_PERCENT
 from walkerlab.exchange.touches import ERRORS, Height, Touch, angles_at_jumps, find_touches
+from walkerlab.physics.hybrid.rigid_measures import energies
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     STRAIGHT,
@@ -45,6 +46,10 @@ LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angl
 FEWEST_ALTERNATING: Final = 2  # fewest heel strikes of each leg that show whether lengths alternate
 ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
 SIDE_ERRORS: Final = 6.0  # standard errors beyond which one leg's rates jump elsewhere, with half of the strikes
+BESIDE_RAD: Final = 0.03  # distance of the sum of angles from which a tilt is sought to the likely one
+SAME_WAY: Final = 0.03  # largest relative difference between the way over a belt and that of the legs
+FAR_CLOCK: Final = 1.15  # smallest factor between a clock and that of the swinging legs that is named
+LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
 COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
 CONSTANT: Final = 0.25  # largest scatter of a constant error over a step, as a fraction of it
@@ -87,7 +92,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         return np.asarray(2.0 * model.leg_length * np.sin(half) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
 
     touches = find_touches(walk.time_s, angle, height)
-    refuse_gaps(walk.time_s, [touch.time_s for touch in touches], source)
+    refuse_gaps(walk, [touch.time_s for touch in touches], source)
     touches, doubts = longest_walk(touches)
     if len(touches) < 2:
         raise ConfigError(
@@ -107,7 +112,77 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     ]
     steps = divided(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    return steps
+    return with_belt(walk, with_clock_doubt(steps, model))
+
+
+def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
+    """Return by how much (rad) the direction that angles are from leans off the vertical, its top forwards.
+
+    Rates of legs jump at heel strikes, where both feet are on the floor.
+    """
+    angle = legs(walk)
+
+    def total(angles: Array) -> Array:
+        return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
+
+    sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
+
+    def height(angles: Array) -> Array:
+        # beside the likely sum, because a small shift would be within its error
+        return np.asarray((total(angles) - sum_rad - BESIDE_RAD) * (angles[:, 0] - angles[:, 1]))
+
+    touches = find_touches(walk.time_s, angle, height)
+    period = typical_interval([touch.time_s for touch in touches], walk.time_s)
+    jumps = angles_at_jumps(walk.time_s, angle, touches, period)
+    return 0.5 * (float(np.mean(total(jumps[1]))) if jumps else sum_rad)
+
+
+def with_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
+    """Return steps whose lengths add up to the way over a treadmill's belt, if there is one."""
+    if not walk.belt_m_s:
+        return steps
+    way = walk.belt_m_s * float(steps.touch_time_s[-1])
+    if walk.hip_is_in_m:
+        ends = steps.origin_s + np.array([0.0, steps.touch_time_s[-1]])
+        way += float(np.diff(np.interp(ends, walk.time_s, walk.quantities[HIP_OF_LINES]))[0])
+    share = way / float(steps.length_m.sum())
+    doubts = steps.doubts
+    if abs(share - 1.0) > SAME_WAY:
+        doubts = (
+            *doubts,
+            f"The way over the belt is {share:.3g} times that of the legs' angles: the belt's speed, the leg's length "
+            "or the unit of time may be wrong.",
+        )
+    return replace(steps, length_m=share * steps.length_m, doubts=doubts)
+
+
+def with_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
+    """Say if the legs swing as if the clock were wrong, as in a film that is played at another speed.
+
+    Energy is constant within a step of straight legs that nothing drives. In the clock's time kinetic energy is smaller
+    by the clock rate squared, so its changes over those of potential energy show the rate.
+    """
+    if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
+        return steps
+    order = np.where(steps.step[:, None] % 2 == 0, [0, 1], [1, 0])
+    angles, rates = (np.take_along_axis(each, order, axis=1) for each in (steps.angle_rad, steps.velocity_rad_s))
+    energy = energies(model, np.concatenate((angles, rates), axis=1))
+    changes = [
+        energy[rows] - np.mean(energy[rows], axis=0)
+        for n in range(steps.touch_time_s.size)
+        if (rows := steps.step == n).any()
+    ]
+    shares = np.array([-float(each[:, 0] @ each[:, 1]) / float(each[:, 1] @ each[:, 1]) for each in changes])
+    share = float(np.median(shares))
+    error = float(np.std(shares)) / math.sqrt(shares.size)
+    if share <= 0.0 or abs(math.log(share)) < 2.0 * math.log(FAR_CLOCK) or abs(share - 1.0) < ERRORS * error:
+        return steps
+    rate = share**-0.5
+    doubt = (
+        f"The legs of this walker would swing {rate:.2g} times as fast as the recording's: a film of another frame "
+        "rate (--fps), another unit of time, or another walker."
+    )
+    return replace(steps, doubts=(*steps.doubts, doubt))
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
@@ -288,15 +363,16 @@ def refuse_lengths(steps: RecordedSteps, source: str) -> None:
             )
 
 
-def refuse_gaps(time: Array, touches: list[float], source: str) -> None:
+def refuse_gaps(walk: RecordedWalk, touches: list[float], source: str) -> None:
     """Raise ConfigError for a step whose samples are too far apart to determine its heel strikes and velocities."""
     for number, (begin, end) in enumerate(pairwise(touches), 1):
-        first, last = longest_gap(time, begin, end)
+        first, last = longest_gap(walk.time_s, begin, end)
         if last - first > LONGEST_GAP * (end - begin):
             raise ConfigError(
                 f"{source}: step {number} has no sample from time {first:.6g} to {last:.6g} s, "
-                f"{(last - first) / (end - begin):.0%} of its duration.",
-                f"Record at least {1 / LONGEST_GAP:.0f} samples per step, or cut the recording to a part without gaps.",
+                f"{(last - first) / (end - begin):.0%} of its duration.{f' {walk.gaps}.' if walk.gaps else ''}",
+                f"Record at least {1 / LONGEST_GAP:.0f} samples per step, or read a part without gaps (--from-s, "
+                "--to-s).",
             )
 
 
