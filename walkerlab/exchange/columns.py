@@ -468,8 +468,8 @@ def line_columns(recording: Recording, top: str, bottom: str) -> list[tuple[str,
 
 
 def axes_of(recording: Recording, marker: str) -> dict[str, str]:
-    """Return the column of each coordinate of a marker, such as HIP.x, HIP X, HIP.PosX or HIP[0]."""
-    pattern = re.compile(rf"{re.escape(marker)}(?:(?i:[\s._:]+(?:pos[\s._]*)?([xyz]))|\[([012])\])")
+    """Return the column of each coordinate of a marker, such as HIP.x, HIP X, HIP.PosX or HIP[:,0]."""
+    pattern = re.compile(rf"{re.escape(marker)}(?:(?i:[\s._:]+(?:pos[\s._]*)?([xyz]))|\[(?::,)?([012])\])")
     axes: dict[str, str] = {}
     for column in recording.columns:
         match = pattern.fullmatch(column)

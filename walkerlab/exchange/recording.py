@@ -48,8 +48,8 @@ TIME_NAMES = [
     )
 ]  # fmt: skip
 """Names of a file's time column; T comes last, because it may be a temperature."""
-UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*(?!\d+\s*\])([^\[\]()]*?)\s*[\])]\s*$")
-"""Pattern for a unit in brackets behind a name; whole numbers in brackets count the parts of a vector."""
+UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*(?!(?::,)?\d+\s*\])([^\[\]()]*?)\s*[\])]\s*$")
+"""Pattern for a unit in brackets behind a name; [2] and [:,2] count the parts of a vector."""
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 """Texts of cells without a value, in lower case."""

@@ -49,6 +49,7 @@ SIDE_ERRORS: Final = 6.0  # standard errors beyond which one leg's rates jump el
 BESIDE_RAD: Final = 0.03  # distance of the sum of angles from which a tilt is sought to the likely one
 SAME_WAY: Final = 0.03  # largest relative difference between the way over a belt and that of the legs
 FAR_CLOCK: Final = 1.15  # smallest factor between a clock and that of the swinging legs that is named
+TURN_RAD: Final = 1e-3  # turn with which the direction of gravity is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
 COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
@@ -105,14 +106,12 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_duration(step_s, source)
     refuse_hurry(step_s, model, source)
     refuse_spread(walk, touches, source)
-    doubts += [
-        *unit_doubts(touches),
-        *knee_doubts(walk, touches, model),
-        *offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height),
-    ]
+    offsets = offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height)
+    doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
     steps = divided(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    return with_belt(walk, with_clock_doubt(steps, model))
+    # energy jumps at heel strikes, so that the clock shows only if these are certain
+    return with_belt(walk, steps if offsets else with_clock_doubt(steps, model))
 
 
 def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
@@ -160,24 +159,24 @@ def with_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     """Say if the legs swing as if the clock were wrong, as in a film that is played at another speed.
 
     Energy is constant within a step of straight legs that nothing drives. In the clock's time kinetic energy is smaller
-    by the clock rate squared, so its changes over those of potential energy show the rate.
+    by the clock rate squared, so its changes over those of potential energy show the rate. A tilt of the recording
+    turns gravity, and is fitted as well.
     """
     if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
         return steps
     order = np.where(steps.step[:, None] % 2 == 0, [0, 1], [1, 0])
     angles, rates = (np.take_along_axis(each, order, axis=1) for each in (steps.angle_rad, steps.velocity_rad_s))
-    energy = energies(model, np.concatenate((angles, rates), axis=1))
-    changes = [
-        energy[rows] - np.mean(energy[rows], axis=0)
-        for n in range(steps.touch_time_s.size)
-        if (rows := steps.step == n).any()
-    ]
-    shares = np.array([-float(each[:, 0] @ each[:, 1]) / float(each[:, 1] @ each[:, 1]) for each in changes])
-    share = float(np.median(shares))
-    error = float(np.std(shares)) / math.sqrt(shares.size)
-    if share <= 0.0 or abs(math.log(share)) < 2.0 * math.log(FAR_CLOCK) or abs(share - 1.0) < ERRORS * error:
+    energy, ahead, behind = (
+        energies(model, np.concatenate((angles + turn, rates), axis=1)) for turn in (0.0, TURN_RAD, -TURN_RAD)
+    )
+    turning = (ahead[:, 1] - behind[:, 1]) / (2.0 * TURN_RAD)
+    columns = np.column_stack((energy, turning))
+    for number in range(int(steps.step[-1]) + 1):
+        columns[steps.step == number] -= np.mean(columns[steps.step == number], axis=0)
+    gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
+    rate = gravity**-0.5 if gravity else 1.0
+    if 1.0 / FAR_CLOCK < rate < FAR_CLOCK:
         return steps
-    rate = share**-0.5
     doubt = (
         f"The legs of this walker would swing {rate:.2g} times as fast as the recording's: a film of another frame "
         "rate (--fps), another unit of time, or another walker."
