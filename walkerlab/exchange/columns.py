@@ -134,7 +134,8 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
             else:
                 source = named.get(name, Source(column))
                 unit = unit_value(recording, name, column, QUANTITY_KINDS[name], units)
-                values[name] = source.sign * unit * within.columns[column] + source.constant
+                floor = floor_in_column(recording, asked, slope_rad) if name in NEEDED[1:] else 0.0
+                values[name] = source.sign * (unit * within.columns[column] + floor) + source.constant
         except ConfigError as error:
             if column in needed:
                 raise
@@ -205,7 +206,7 @@ def with_likely_places(recording: Recording, lines: Sequence[str], least: float 
         if re.fullmatch(rf"{re.escape(marker)}{LIKELIHOOD}", column)
     }
     if least is None:
-        low = {marker: each for marker, each in likelihoods.items() if np.nanmin(each) < UNLIKELY}
+        low = {marker: each for marker, each in likelihoods.items() if np.any(each < UNLIKELY)}
         spelled = ", ".join(f"{marker} at {spell_rows(each < UNLIKELY)}" for marker, each in low.items())
         return recording, [
             f"Likelihoods are below {UNLIKELY:g}: {spelled}; --min-likelihood makes such places gaps."
@@ -218,7 +219,7 @@ def with_likely_places(recording: Recording, lines: Sequence[str], least: float 
     columns, unseen = dict(recording.columns), dict(recording.unseen)
     for marker, likelihood in likelihoods.items():
         for column in axes_of(recording, marker).values():
-            columns[column] = np.where(likelihood >= least, columns[column], np.nan)
+            columns[column] = np.where(likelihood < least, np.nan, columns[column])
             unseen[column] = f"likelihoods below {least:g} are taken for 'not seen'"
     return replace(recording, columns=columns, unseen=unseen), []
 
@@ -240,16 +241,23 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
     """Return the angle (rad) by which the direction that angles are from leans, and what the file says about it."""
     tilt = asked.camera_tilt_deg
     if tilt is None and recording.levelled_by:
-        # the program subtracts the floor's angle also from angles of a picture that it has mirrored
-        mirrored = recording.levelled_by == SEGMENTS and asked.walks == "left"
-        side = "the floor's normal, but with the wrong sign," if mirrored else "the floor's normal"
-        return (-slope_rad if mirrored else slope_rad), [
-            f"{recording.levelled_by} levels the floor, so angles are taken from {side}: state --camera-tilt 0 if its "
-            "floor_angle was 0."
+        return (0.0 if recording.levelled_by == SEGMENTS else slope_rad), [
+            f"{recording.levelled_by} levels the floor, so angles are taken from the floor's normal: state "
+            "--camera-tilt 0 if its floor_angle was 0."
         ]
     if isinstance(tilt, float | int):
         return math.radians(tilt), []
     return (slope_rad if tilt == "floor" else 0.0), []
+
+
+def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> float:
+    """Return the angle (rad) that Sports2D subtracted from angles of segments, because the floor leans in its picture.
+
+    It does so with one sign for walks to both sides, although it mirrors the picture of a walk to the left.
+    """
+    if asked.camera_tilt_deg is not None or recording.levelled_by != SEGMENTS:
+        return 0.0
+    return slope_rad if asked.walks == "left" else -slope_rad
 
 
 def with_lines(

@@ -138,7 +138,8 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     angle = legs(walk)
     swing = angle - np.mean(angle, axis=0)
     second = -1.0 if "angle 1" not in walk.lines and float(swing[:, 0] @ swing[:, 1]) > 0.0 else 1.0
-    ways = [way for way in find_ways(walk.time_s, angle * [1.0, second]) if way.forwards or not walk.walks]
+    directed = bool(walk.walks and walk.lines)
+    ways = [way for way in find_ways(walk.time_s, angle * [1.0, second]) if way.forwards or not directed]
     if not ways:
         return walk
     place = max(range(len(ways)), key=lambda place: len(ways[place].passings))

@@ -66,6 +66,7 @@ class RecordedSteps:
     angle_rad: Array  # (samples, 2)
     velocity_rad_s: Array  # (samples, 2)
     touch_time_s: Array  # (steps,) ends of the steps
+    touch_error_s: Array  # (steps + 1,) standard errors of the heel strikes, the first one included
     length_m: Array  # (steps,)
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
@@ -403,7 +404,10 @@ def divided(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts:
     times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     lengths = lengths_of(model, angles_rad, step, len(times))
     scatter = float(np.median([touch.fit.scatter for touch in touches[1:]]))
-    return RecordedSteps(times_s, step, angles_rad, velocities_rad_s, times, lengths, scatter, swapped, origin, doubts)
+    errors = np.array([touch.error_s for touch in touches])
+    return RecordedSteps(
+        times_s, step, angles_rad, velocities_rad_s, times, errors, lengths, scatter, swapped, origin, doubts
+    )
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:

@@ -137,6 +137,7 @@ def content_of(
         "step_periods_s": periods.tolist(),
         "step_lengths_m": steps.length_m.tolist(),
         "touch_times_s": steps.touch_time_s.tolist(),
+        "touch_errors_s": steps.touch_error_s.tolist(),
         "end_time_s": float(steps.time_s[-1]),
         "speed_m_s": speed,
         "froude": speed / math.sqrt(config.gravity_m_s2 * config.walker.leg_length_m),
