@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "exchange"))
-from filmed_walks import PERIOD_S, SLOPE, angles_at  # noqa: E402
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "exchange"))
+from filmed_walks import PERIOD_S, SLOPE, angles_at
 
-import walkerlab  # noqa: E402
-from walkerlab.errors import ConfigError  # noqa: E402
+import walkerlab
+from walkerlab.errors import ConfigError
 
 FRAME_RATES = (25.0, 30.0, 50.0, 60.0, 100.0, 120.0, 240.0, 1000.0)  # frames/s
 NOISES_DEG = (0.0, 0.01, 0.05, 0.1)
@@ -69,7 +69,7 @@ def count_strikes(crop: Crop, rng: np.random.Generator, folder: Path) -> Count:
         return Count(0, 0, [], f"{error.message}")
     strikes = summary["first_heel_strike_s"] + np.array([0.0, *summary["touch_times_s"]])
     errors = np.array(summary["touch_errors_s"])
-    sure = STRIKES_S[(STRIKES_S > time[0] + MARGIN_S) & (STRIKES_S < time[-1] - MARGIN_S)]
+    sure = STRIKES_S[(time[0] + MARGIN_S < STRIKES_S) & (time[-1] - MARGIN_S > STRIKES_S)]
     away = np.abs(strikes[:, None] - STRIKES_S)
     missed = int(np.sum(np.abs(sure[:, None] - strikes).min(axis=1) > 0.1 * PERIOD_S))
     invented = int(np.sum(away.min(axis=1) > 0.1 * PERIOD_S)) + strikes.size - np.unique(away.argmin(axis=1)).size

@@ -55,6 +55,7 @@ FRAME: Final = re.compile(r"(?i:frames?(?:[\s_]?(?:idx|index|number|no\.?))?#?)"
 """Pattern for the name of a column that counts frames."""
 PAIR: Final = re.compile(r"""(?:[^,"]|"[^"]*")+|"[^,]*""")
 FRAME_TIME: Final = "frame / fps"
+HUGE: Final = 1e50  # size of values that are gaps, because their squares overflow
 SAME_RATE: Final = 0.01  # largest relative difference of two frame rates that are the same
 LIKELIHOOD: Final = r"(?i:[\s._:]+(?:likelihood|confidence|score))"
 UNLIKELY: Final = 0.5  # likelihood below which a marker's place is doubtful
@@ -320,7 +321,7 @@ def without_gaps(
     used = list(dict.fromkeys(column for source in sources for column in columns_of(recording, source)))
     for column in used:
         refuse_problem(recording, column)
-    finite = {column: np.isfinite(recording.columns[column]) for column in used}
+    finite = {column: np.abs(recording.columns[column]) < HUGE for column in used}
     whole = rows & np.all(list(finite.values()), axis=0)
     if not whole.any():
         raise ConfigError(f"{recording.path} has no sample with values of {', '.join(used)}.", "Record the walk again.")

@@ -39,6 +39,7 @@ JUMP_ERRORS: Final = 4.5  # standard errors beyond which rates jump elsewhere, o
 MOST_JUMPS: Final = 20  # number of heel strikes at which jumps are sought
 SHIFTS: Final = 61
 SIDES: Final = 2
+LOPSIDED: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
 SMALLEST: Final = 1e-30  # rad^2, added to sums of squares, of which logarithms are taken
 
 
@@ -125,9 +126,7 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
         return None
     rows = time - begin <= WIDEST * period
     t, y = time[rows] - begin, angle[rows]
-    degree = best_degree(t, y, 0.0)
-    # The best degree balances bias and scatter. One degree more keeps the bias within the standard error.
-    fit = fit_of_degree(t, y, 0.0, degree + 1) or fit_of_degree(t, y, 0.0, degree)
+    fit = fit_within_error(t, y, 0.0, best_degree(t, y, 0.0))
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
     return touch if touch and touch.error_s < PRECISE_S and off <= ERRORS * touch.error_s else None
@@ -141,7 +140,7 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     for iteration in range(ITERATIONS):
         # The best degree shows only once the polynomials meet near the strike.
         degree = best_degree(t, y, at) if iteration < SETTLED else degree
-        fit = fit_of_degree(t, y, at, degree)
+        fit = fit_within_error(t, y, at, degree)
         touch = touch_of(fit, height, near + at, leg) if fit else None
         if touch is None or touch.fall_m_s <= 0.0:
             return None
@@ -178,9 +177,23 @@ def best_degree(t: Array, y: Array, at: float) -> int:
     return min(fits, key=lambda degree: fits[degree].criterion, default=DEGREES[0])
 
 
+def fit_within_error(t: Array, y: Array, at: float, degree: int) -> Fit | None:
+    """Fit polynomials of a degree, or of one more on a single side, where an instant is at the end of the samples.
+
+    The best degree balances bias and scatter. One degree more keeps the bias at the end within the standard error.
+    """
+    fit = fit_of_degree(t, y, at, degree)
+    return fit if fit and len(fit.rates) == SIDES else fit_of_degree(t, y, at, degree + 1) or fit
+
+
 def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
-    """Fit polynomials that meet at an instant, without a side that has too few samples; None if both have."""
-    sides = {name: side for name, side in {"before": t < at, "after": t >= at}.items() if np.sum(side) > degree}
+    """Fit polynomials that meet at an instant, without a side that has too few samples; None if both have.
+
+    Few samples on a side, as where a recording begins just before a strike, would bend the other side to a low degree.
+    """
+    both = {"before": t < at, "after": t >= at}
+    fewest = max(degree + 1, LOPSIDED * max(int(np.sum(side)) for side in both.values()))
+    sides = {name: side for name, side in both.items() if np.sum(side) >= fewest}
     if not sides:
         return None
     used, scale = np.any(list(sides.values()), axis=0), float(np.ptp(t))
