@@ -9,7 +9,7 @@ the angles around the fit gives the standard error of that time.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -126,7 +126,9 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
         return None
     rows = time - begin <= WIDEST * period
     t, y = time[rows] - begin, angle[rows]
-    fit = fit_within_error(t, y, 0.0, best_degree(t, y, 0.0))
+    degree = best_degree(t, y, 0.0)
+    # The best degree balances bias and scatter. One degree more keeps the bias within the standard error.
+    fit = fit_of_degree(t, y, 0.0, degree + 1) or fit_of_degree(t, y, 0.0, degree)
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
     return touch if touch and touch.error_s < PRECISE_S and off <= ERRORS * touch.error_s else None
@@ -180,10 +182,14 @@ def best_degree(t: Array, y: Array, at: float) -> int:
 def fit_within_error(t: Array, y: Array, at: float, degree: int) -> Fit | None:
     """Fit polynomials of a degree, or of one more on a single side, where an instant is at the end of the samples.
 
-    The best degree balances bias and scatter. One degree more keeps the bias at the end within the standard error.
+    The best degree balances bias and scatter. What one degree more changes at the end is taken for a further error.
     """
     fit = fit_of_degree(t, y, at, degree)
-    return fit if fit and len(fit.rates) == SIDES else fit_of_degree(t, y, at, degree + 1) or fit
+    if fit is None or len(fit.rates) == SIDES:
+        return fit
+    wider = fit_of_degree(t, y, at, degree + 1)
+    change = float(np.linalg.norm(wider.angle - fit.angle)) if wider else 0.0
+    return replace(wider or fit, deviation=float(np.hypot((wider or fit).deviation, change)))
 
 
 def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
