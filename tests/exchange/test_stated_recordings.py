@@ -299,7 +299,26 @@ def test_a_limit_without_likelihoods_is_refused(tmp_path):
         read(tmp_path, *sampled(), min_likelihood=0.6)
 
 
+@pytest.mark.parametrize("tilt", ["floor", "free"])
+def test_the_slope_is_estimated_from_angles_off_the_floors_normal(tilt, tmp_path):
+    time, angle = sampled(fps=60.0, noise=2e-4)
+    path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", zip(time, *(angle + SLOPE).T, strict=True))
+    result = walkerlab.identify(path, fit=["slope_deg"], level="angles", camera_tilt_deg=tilt)
+    (row,) = result.summary["estimates"]
+    assert row["value"] == pytest.approx(math.degrees(SLOPE), abs=4.0 * row["standard_error"] + 1e-3)
+    assert "angle_offset_rad" in result.summary["nuisance"]
+
+
 # Sports2D
+
+
+def test_the_slope_of_a_film_of_sports2d_needs_a_statement_about_the_floor(tmp_path):
+    path = tmp_path / "walk.mot"
+    path.write_text(sports2d_angles(angles_at(sampled()[0]) + SLOPE), encoding="utf-8")
+    columns = {"angle 1": "right thigh+90deg", "angle 2": "left thigh+90deg"}
+    with pytest.raises(ConfigError, match="which levels the floor") as refused:
+        walkerlab.identify(path, fit=["slope_deg"], level="angles", columns=columns)
+    assert "--camera-tilt floor" in refused.value.advice
 
 
 def sports2d_angles(angle):

@@ -68,8 +68,12 @@ class Identify(Recorded):
 
     @property
     def sensors(self) -> tuple[Nuisance, ...]:
-        """Properties of clock and sensors to estimate; a camera's free tilt is an offset of all angles."""
-        return (*self.nuisance, *((OFFSET,) if self.camera_tilt_deg == "free" else ()))
+        """Properties of clock and sensors to estimate.
+
+        A camera's free tilt is an offset of all angles. So is the floor's normal, while the slope is estimated.
+        """
+        follows = self.camera_tilt_deg == "floor" and self.level == "angles" and "slope_deg" in self.keys
+        return tuple(dict.fromkeys((*self.nuisance, *((OFFSET,) if follows or self.camera_tilt_deg == "free" else ()))))
 
     @property
     def keys(self) -> tuple[str, ...]:
