@@ -142,14 +142,14 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     for iteration in range(ITERATIONS):
         # The best degree shows only once the polynomials meet near the strike.
         degree = best_degree(t, y, at) if iteration < SETTLED else degree
-        fit = fit_within_error(t, y, at, degree)
+        fit = fit_at(t, y, at, degree)
         touch = touch_of(fit, height, near + at, leg) if fit else None
         if touch is None or touch.fall_m_s <= 0.0:
             return None
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
         correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
         if iteration >= SETTLED and abs(correction) < CLOSE * touch.error_s:
-            return touch
+            return touch_of(with_bias(touch.fit, t, y, at, degree), height, near + at, leg)
         at += correction
     # With much noise the samples that change sides keep moving the zero.
     return touch if touch and abs(correction) < touch.error_s else None
@@ -179,17 +179,17 @@ def best_degree(t: Array, y: Array, at: float) -> int:
     return min(fits, key=lambda degree: fits[degree].criterion, default=DEGREES[0])
 
 
-def fit_within_error(t: Array, y: Array, at: float, degree: int) -> Fit | None:
-    """Fit polynomials of a degree, or of one more on a single side, where an instant is at the end of the samples.
-
-    The best degree balances bias and scatter. What one degree more changes at the end is taken for a further error.
-    """
+def fit_at(t: Array, y: Array, at: float, degree: int) -> Fit | None:
+    """Fit polynomials of a degree, or of one more on a single side, where an instant is at the end of the samples."""
     fit = fit_of_degree(t, y, at, degree)
-    if fit is None or len(fit.rates) == SIDES:
-        return fit
-    wider = fit_of_degree(t, y, at, degree + 1)
-    change = float(np.linalg.norm(wider.angle - fit.angle)) if wider else 0.0
-    return replace(wider or fit, deviation=float(np.hypot((wider or fit).deviation, change)))
+    return fit if fit and len(fit.rates) == SIDES else fit_of_degree(t, y, at, degree + 1) or fit
+
+
+def with_bias(fit: Fit, t: Array, y: Array, at: float, degree: int) -> Fit:
+    """Return a fit whose error includes what one degree more changes: the best degree balances bias and scatter."""
+    narrow, wide = (fit_of_degree(t, y, at, each) for each in (degree, degree + 1))
+    change = float(np.linalg.norm(wide.angle - narrow.angle)) if narrow and wide else 0.0
+    return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
 
 
 def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
