@@ -13,7 +13,7 @@ Tilt = Annotated[
 
 
 class Recorded(Block):
-    """What a file with a recorded walk does not say for itself."""
+    """Statements about a file with a recorded walk that the file does not make itself."""
 
     columns: dict[Text, Text] = key(
         dict,
@@ -57,8 +57,16 @@ class Recorded(Block):
         le=1e7,
         default_in_words="times as in the file",
     )
-    from_s: float | None = key(None, "s", "time at which the part to read begins", default_in_words="the first sample")
-    to_s: float | None = key(None, "s", "time at which the part to read ends", default_in_words="the last sample")
+    from_s: float | None = key(
+        None, "s", "time at which the part to read begins", bounds="any number", default_in_words="the first sample"
+    )
+    to_s: float | None = key(
+        None,
+        "s",
+        "time at which the part to read ends",
+        bounds="any number, above from_s",
+        default_in_words="the last sample",
+    )
     min_likelihood: float | None = key(
         None,
         "1",
