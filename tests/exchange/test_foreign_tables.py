@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import walkerlab
+from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk, parse_units
 from walkerlab.exchange.recording import read_recording
@@ -38,7 +39,7 @@ def read(folder, name, text, columns=(), units=(), encoding="utf-8"):
     """Write a file and read its walk."""
     path = folder / name
     path.write_text(text, encoding=encoding)
-    return as_walk(read_recording(path), dict(columns), dict(units))
+    return as_walk(read_recording(path), Recorded(columns=dict(columns), units=dict(units)))
 
 
 def holds_the_walk(walk, part=slice(None)):
@@ -152,8 +153,9 @@ def test_unreadable_optional_quantity_is_omitted_with_the_reason(tmp_path):
     walk = read(tmp_path, "walk.csv", text)
     assert "kinetic_J" not in walk.quantities
     assert "lacks 1 of 6 values, the first at sample 2" in walk.left_out["kinetic_J"]
-    with pytest.raises(ConfigError, match="lacks 1 of 6 values"):
-        read(tmp_path, "walk.csv", text, {"kinetic_J": "kinetic_J"})
+    named = read(tmp_path, "walk.csv", text, {"kinetic_J": "kinetic_J"})
+    assert named.time_s.size == 5
+    assert named.doubts == ("Gaps are left out: kinetic_J at sample 2.",)
 
 
 @pytest.mark.parametrize("name", ["spare", ""])
@@ -316,8 +318,7 @@ def test_gaps_at_both_ends_are_cut(tmp_path):
     assert holds_the_walk(walk, slice(1, 4))
     assert walk.left_out["samples"] == "1 at the beginning and 2 at the end, which have gaps"
     values[2, 0] = np.nan
-    with pytest.raises(ConfigError, match=r"'HIP\.x' lacks 1 of 6 values, the first at sample 3"):
-        read(tmp_path, "walk.trc", trc(values=values), LINES)
+    assert read(tmp_path, "walk.trc", trc(values=values), LINES).doubts == ("Gaps are left out: HIP.x at sample 3.",)
     values[:, 0] = np.nan
     with pytest.raises(ConfigError, match=r"no sample with values of"):
         read(tmp_path, "walk.trc", trc(values=values), LINES)
@@ -368,7 +369,6 @@ def test_motion_file_without_version_and_degrees_needs_a_unit(tmp_path):
         ("Format Version,1.23,Take Name,walk\n\n,Type,Marker,Marker\n", "Motive"),
         ("NO_OF_FRAMES\t2\nFREQUENCY\t100\nMARKER_NAMES\tHIP\tF1\n1\t2\t3\t4\t5\t6\n", "Qualisys"),
         ("mass_A\nt\tx\ty\n0.0\t1.0\t2.0\n0.1\t1.1\t2.1\n", "Tracker"),
-        ("scorer,net,net\nbodyparts,hip,hip\ncoords,x,y\n0,1,2\n1,2,3\n", "DeepLabCut"),
     ],
 )
 def test_unsupported_table_names_its_program(beginning, program, tmp_path):
@@ -388,7 +388,7 @@ def test_qualisys_table_with_column_headers_is_read(tmp_path):
 def test_table_of_frame_numbers_asks_for_times(tmp_path):
     with pytest.raises(ConfigError, match="no time column") as caught:
         read(tmp_path, "walk.csv", table(header=("frame_idx", *HEADER[1:])))
-    assert "counts frames" in caught.value.advice
+    assert "--fps" in caught.value.advice
 
 
 @pytest.mark.parametrize(
@@ -461,7 +461,7 @@ def test_deeply_nested_results_are_rejected_quickly(tag, tmp_path):
 def test_time_to_read_is_linear_in_the_number_of_columns(suffix, tmp_path):
     """Ten times as many columns take far less than a hundred times as long."""
     took = []
-    for count in (1_000, 10_000):
+    for count in (3_000, 30_000):
         names = [f"m{n}" for n in range(count // 3)]
         path = tmp_path / f"wide{suffix}"
         if suffix == ".trc":
@@ -471,7 +471,7 @@ def test_time_to_read_is_linear_in_the_number_of_columns(suffix, tmp_path):
         begin = process_time()
         recording = read_recording(path)
         columns = {} if suffix == ".csv" else {"angle 1": "m1>m2", "angle 2": "m1>m3"}
-        as_walk(recording, columns, {})
+        as_walk(recording, Recorded(columns=columns))
         took.append(process_time() - begin)
     assert took[1] < 40.0 * took[0]
 

@@ -7,7 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline
+from filmed_walks import (
+    PERIOD_S,
+    SLOPE,
+    all_steps_are_right,
+    angles_at,
+    places_of,
+    read,
+    read_places,
+    sampled,
+)
 
 import walkerlab
 from walkerlab.config.loader import load
@@ -20,49 +29,6 @@ from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, simulate
 from walkerlab.scene.rigid import rigid_walker
-
-PERIOD_S, LENGTH_M = 0.7035968805, 0.3714302
-SLOPE = 0.0174
-LEGS = {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}
-
-
-@functools.cache
-def splines():
-    """The paper's walk: a spline through the leg angles of each step."""
-    trajectory = walkerlab.simulate(strides=4).content["trajectory"]
-    pieces = []
-    for step in range(8):
-        rows = trajectory["step"] == step
-        time = trajectory["time"][rows]
-        pieces.append((time, CubicHermiteSpline(time, trajectory["angle"][rows], trajectory["velocity"][rows])))
-    return pieces
-
-
-def angles_at(time):
-    """Leg angles (samples, 2) of the paper's walk, whose first heel strike is at time 0."""
-    angle = np.empty((time.size, 2))
-    for instants, spline in splines():
-        rows = (time >= instants[0]) & (time <= instants[-1])
-        angle[rows] = spline(time[rows])
-    return angle
-
-
-def sampled(begin=0.0, end=7.5 * PERIOD_S, fps=100.0, noise=0.0, seed=0):
-    time = np.arange(begin, end, 1.0 / fps)
-    return time, angles_at(time) + noise * np.random.default_rng(seed).standard_normal((time.size, 2))
-
-
-def read(folder, time, angle, header="time (s),angle 1 (rad),angle 2 (rad)", **options):
-    rows = "\n".join(f"{t:.9f},{a:.12g},{b:.12g}" for t, (a, b) in zip(time, angle, strict=True))
-    path = folder / "walk.csv"
-    path.write_text(f"{header}\n{rows}\n", encoding="utf-8")
-    return walkerlab.read_walk(path, slope_deg=math.degrees(SLOPE), **options).summary
-
-
-def all_steps_are_right(summary, period=1e-5, length=1e-5):
-    return summary["step_periods_s"] == pytest.approx([PERIOD_S] * summary["steps"], abs=period) and summary[
-        "step_lengths_m"
-    ] == pytest.approx([LENGTH_M] * summary["steps"], abs=length)
 
 
 @pytest.mark.parametrize("fps", [25.0, 60.0, 100.0, 240.0, 1000.0])
@@ -329,42 +295,6 @@ def test_implausibly_small_angles_raise_a_warning(tmp_path):
     assert any("only 0.37 degrees apart at heel strikes. The unit" in doubt for doubt in doubts)
 
 
-def places_of(angle, belt_m_s=0.0, fps=100.0):
-    """Places (samples, marker, axis) of hip and feet in m, x along the slope, y up, z sideways; the hip sways."""
-    time = np.arange(len(angle)) / fps
-    stride = np.arange(len(angle)) / fps / PERIOD_S
-    from_hip = np.stack([np.sin(angle), -np.cos(angle), np.broadcast_to([0.1, -0.1], angle.shape)], axis=2)
-    stance = np.where(np.floor(stride) % 2 == 0, 1, 0)
-    foothold = np.floor(stride) * LENGTH_M * np.cos(SLOPE), -np.floor(stride) * LENGTH_M * np.sin(SLOPE)
-    rows = np.arange(len(angle))
-    hip = np.zeros((len(angle), 3))
-    hip[:, 0] = foothold[0] - from_hip[rows, stance, 0] - belt_m_s * time
-    hip[:, 1] = foothold[1] - from_hip[rows, stance, 1]
-    feet = hip[:, None] + from_hip
-    sway = 0.03 * np.sin(math.pi * stride)
-    return np.concatenate((hip[:, None] + sway[:, None, None] * [0.0, 0.0, 1.0], feet), axis=1)
-
-
-def read_places(folder, places, fps=100.0, **options):
-    """Read a .trc file of the markers HIP, FOOT1 and FOOT2 (mm)."""
-    names = ("HIP", "FOOT1", "FOOT2")
-    rows = [
-        "\t".join([str(n + 1), f"{n / fps:.6f}", *(f"{value:.6f}" for value in 1e3 * row.ravel())])
-        for n, row in enumerate(places)
-    ]
-    head = [
-        "PathFileType\t4\t(X/Y/Z)\twalk.trc",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"{fps}\t{fps}\t{len(rows)}\t3\tmm\t{fps}\t1\t{len(rows)}",
-        "Frame#\tTime\t" + "\t\t\t".join(names),
-        "\t\t" + "\t".join(f"{axis}{n}" for n in (1, 2, 3) for axis in "XYZ"),
-        "",
-    ]
-    path = folder / "walk.trc"
-    path.write_text("\n".join([*head, *rows]), encoding="utf-8")
-    return walkerlab.read_walk(path, LEGS, slope_deg=math.degrees(SLOPE), **options).summary
-
-
 @pytest.mark.parametrize("belt_m_s", [0.0, 0.5279, 0.53, 0.56])
 def test_walking_direction_follows_the_feet_on_floor_and_treadmill(belt_m_s, tmp_path):
     """On a treadmill the hip drifts forwards, backwards or only sideways."""
@@ -406,26 +336,71 @@ def test_missing_marker_is_a_gap_but_a_foot_at_the_origin_is_not(tmp_path):
     places -= places[20, 2]
     assert np.abs(places[:70, 2]).max() < 1e-9
     assert all_steps_are_right(read_places(tmp_path, places))
+    for missing in (0.0, -9.999):
+        places[100:107, 1] = missing
+        summary = read_places(tmp_path, places)
+        assert all_steps_are_right(summary)
+        value = f"({1e3 * missing:g}, {1e3 * missing:g}, {1e3 * missing:g})"
+        assert (
+            f"FOOT1.x, FOOT1.y, FOOT1.z at samples 101 to 107 ({value} is taken for 'not seen')" in summary["doubts"][0]
+        )
     places[100:112, 1] = 0.0
-    with pytest.raises(ConfigError, match=r"FOOT1\.x. lacks 12 of \d+ values, the first at sample 101") as zeros:
+    with pytest.raises(ConfigError, match=r"step 2 has no sample from time 0\.99 to 1\.12 s") as zeros:
         read_places(tmp_path, places)
-    assert "(0, 0, 0) at samples 101 to 112 is taken for 'not seen'" in zeros.value.message
-    places[100:112, 1] = -9.999
-    with pytest.raises(ConfigError, match=r"\(-9999, -9999, -9999\) at samples 101 to 112 is taken for 'not seen'"):
+    assert "FOOT1.x, FOOT1.y, FOOT1.z at samples 101 to 112 ((0, 0, 0) is taken for 'not seen')" in zeros.value.message
+
+
+@pytest.mark.parametrize("marker", [0, 1])
+def test_a_frozen_marker_is_a_gap_and_a_foot_that_stands_still_is_not(marker, tmp_path):
+    places = places_of(sampled()[1])
+    assert np.ptp(places[75:100, 1], axis=0).max() < 1e-9
+    places[150:157, marker] = places[149, marker]
+    summary = read_places(tmp_path, places)
+    assert all_steps_are_right(summary)
+    assert re.search(r"at samples 1(4[5-9]|5[0-4]) to 157", summary["doubts"][0])
+    places[150:165, marker] = places[149, marker]
+    with pytest.raises(ConfigError, match="has no sample from time") as refused:
         read_places(tmp_path, places)
+    assert re.search(r"at samples 1(4[5-9]|5[0-4]) to 165", refused.value.message)
+
+
+def test_a_frozen_angle_is_a_gap_and_coarse_digits_are_not(tmp_path):
+    time, angle = sampled()
+    rounded = np.degrees(angle).round(1)
+    assert read(tmp_path, time, rounded, "time (s),angle 1 (deg),angle 2 (deg)")["doubts"] == []
+    for at in (100, 130, 170):
+        frozen = angle.copy()
+        frozen[at : at + 7, 0] = frozen[at - 1, 0]
+        summary = read(tmp_path, time, frozen)
+        assert re.match(
+            rf"Gaps are left out: angle 1 at samples \d+ to {at + 7} \(it stands still", summary["doubts"][0]
+        )
+        assert all_steps_are_right(summary, period=1e-4, length=1e-4)
 
 
 def test_jump_of_leg_length_is_reported(tmp_path):
     places = places_of(sampled()[1])
     places[250, 1, 1] += 0.1
     summary = read_places(tmp_path, places)
-    assert summary["doubts"] == ["The length of HIP>FOOT1 jumps at sample 251 (time 2.5 s)."]
+    assert summary["doubts"] == ["The length of HIP>FOOT1 is off at sample 251 (time 2.5 s), which is left out."]
     assert all_steps_are_right(summary)
     places = places_of(sampled()[1])
-    places[250:262, 1, 2] += 0.1
+    places[250:257, 1, 2] += 0.1
     summary = read_places(tmp_path, places)
-    assert summary["doubts"] == ["The length of HIP>FOOT1 jumps at samples 251 to 262 (time 2.5 to 2.61 s)."]
-    assert all_steps_are_right(summary, length=2e-4)
+    assert summary["doubts"][0].startswith("The length of HIP>FOOT1 is off at samples 251 to 257 (time 2.5 to 2.56 s)")
+    assert all_steps_are_right(summary)
+    places[257:262, 1, 2] += 0.1
+    with pytest.raises(ConfigError, match="has no sample") as refused:
+        read_places(tmp_path, places)
+    assert "The length of HIP>FOOT1 is off at samples 251 to 262" in refused.value.message
+
+
+def test_a_leg_whose_length_changes_along_the_walk_is_named(tmp_path):
+    places = places_of(sampled()[1])
+    grows = 1.0 + 0.05 * np.linspace(0.0, 1.0, len(places))[:, None]
+    places[:, 1] = places[:, 0] + grows * (places[:, 1] - places[:, 0])
+    doubts = read_places(tmp_path, places)["doubts"]
+    assert any(re.match(r"The length of HIP>FOOT1 changes by [345]\.\d% along the walk", doubt) for doubt in doubts)
 
 
 @pytest.mark.parametrize("first", [30, 100, 180, 250])

@@ -8,6 +8,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
+from walkerlab.config.recording import Recorded
 from walkerlab.exchange.columns import as_walk
 from walkerlab.exchange.rate_jumps import MOST_FOUND, sums_at_jumps
 from walkerlab.exchange.recording import TIME, Recording
@@ -62,7 +63,7 @@ def test_heel_strikes_are_found_with_offset_angles():
     walker, time, angle = recorded("paper")
     columns = {TIME: time, "angle 1": angle[:, 0] + 0.05, "angle 2": angle[:, 1] + 0.05}
     units = {TIME: "s", "angle 1": "rad", "angle 2": "rad"}
-    walk = as_walk(Recording(Path("film.csv"), columns, units), {}, {})
+    walk = as_walk(Recording(Path("film.csv"), columns, units), Recorded())
     steps = divide_into_steps(walk, walker, "film.csv", touch_sum_rad=0.1)
     assert steps.touch_time_s.size >= 7
     assert np.diff(steps.touch_time_s) == pytest.approx(0.7036, abs=0.01)

@@ -1,10 +1,15 @@
-"""Files written by the libraries that people use: ezc3d, c3d, pandas and OpenSim, where they are installed."""
+"""Files written by the programs that people use, by their own functions, where they are installed."""
 
+import datetime
+import math
 import warnings
 
 import numpy as np
 import pytest
+from filmed_walks import SLOPE, all_steps_are_right, places_of, sampled
 
+import walkerlab
+from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk
 from walkerlab.exchange.recording import read_recording
@@ -19,7 +24,7 @@ LINES = {"angle 1": "HIP>F1", "angle 2": "HIP>F2"}
 
 
 def walk_of(path, columns=(), units=()):
-    return as_walk(read_recording(path), dict(columns), dict(units))
+    return as_walk(read_recording(path), Recorded(columns=dict(columns), units=dict(units)))
 
 
 # C3D
@@ -181,3 +186,210 @@ def test_opensim_angles_in_degrees_are_converted(name, header, tmp_path):
     path.write_text(f"name walk\n{header}endheader\ntime\ta\tb\n0\t1\t2\n1\t3\t4\n", encoding="utf-8")
     unit = "deg" if osim.Storage(str(path)).isInDegrees() else "rad"
     assert read_recording(path).kind_units["angle"] == unit
+
+
+# Whole walks: periods and lengths are read back
+
+
+FPS = 100.0
+LEGS = {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}
+HEIGHT_PX = 600.0
+
+
+def walk_right(tmp_path, name, **keys):
+    """Read a file, and check that it has the steps of the walk that was written; return what was doubted."""
+    summary = walkerlab.read_walk(tmp_path / name, slope_deg=math.degrees(SLOPE), **keys).summary
+    assert summary["steps"] == 7
+    assert all_steps_are_right(summary, period=1e-4, length=1e-4)
+    return summary["doubts"]
+
+
+def pixels():
+    """Return places (samples, marker, axis) in a picture, y downwards."""
+    return [400.0, 900.0] + places_of(sampled()[1])[:, :, :2] * [HEIGHT_PX, -HEIGHT_PX]
+
+
+# Sports2D and Pose2Sim
+
+
+def sports2d():
+    process = pytest.importorskip("Sports2D.process", reason="Sports2D is not installed", exc_type=ImportError)
+    return process, pytest.importorskip("pandas")
+
+
+def angles_of_sports2d(process, walks, side):
+    """Return the leg angles (samples, 2) in degrees that Sports2D computes and corrects in a walk right or left."""
+    from Pose2Sim.common import angle_dict
+
+    across = (pixels() - pixels()[:, :1]) * [1.0 if walks == "right" else -1.0, 1.0]
+    names, keypoints = ["right thigh", "left thigh"], ["RHip", "RKnee", "LKnee", "LHip"]
+    places = np.stack([across[:, 0], across[:, 1], across[:, 2], across[:, 0]], axis=1)
+    about = side, False, list(range(4)), keypoints, names, angle_dict
+    angles = np.array([process.compute_angles_for_person(row[:, 0], row[:, 1], *about)[1] for row in places])
+    # Sports2D subtracts the angle of the floor, as `compute_floor_line` finds it in the picture
+    return angles - math.degrees(-SLOPE if walks == "right" else SLOPE)
+
+
+@pytest.mark.parametrize(("walks", "side"), [("right", "right"), ("right", "none"), ("left", "left"), ("left", "none")])
+def test_angles_of_sports2d_are_from_the_horizontal_and_the_floor(walks, side, tmp_path):
+    process, pandas = sports2d()
+    table = pandas.DataFrame(angles_of_sports2d(process, walks, side), columns=["right thigh", "left thigh"])
+    process.make_mot_with_angles(table, pandas.Series(sampled()[0]), str(tmp_path / "walk.mot"))
+    columns = {"angle 1": "right thigh+90deg", "angle 2": "left thigh+90deg"}
+    doubts = walk_right(tmp_path, "walk.mot", columns=columns, walks=walks)
+    assert doubts[0].startswith("Sports2D (angles) levels the floor")
+
+
+@pytest.mark.parametrize("level", [True, False])
+def test_markers_of_sports2d_are_from_the_floor_where_they_are_in_metres(level, tmp_path):
+    process, pandas = sports2d()
+    names, columns = ["RHip", "RAnkle", "LAnkle"], {"angle 1": "RHip>RAnkle", "angle 2": "RHip>LAnkle"}
+    parts = []
+    for marker, name in enumerate(names):
+        part = pandas.DataFrame(np.c_[pixels()[:, marker], np.zeros(len(pixels()))], columns=[name] * 3)
+        floor_rad = -SLOPE  # as `compute_floor_line` returns it
+        size = (1.0, HEIGHT_PX, 10.0, 1920, 1080, 0.0, 900.0, -floor_rad, "none")
+        parts.append(process.convert_px_to_meters(part, *size) if level else part)
+    table = pandas.concat([pandas.Series(sampled()[0], name="time"), *parts], axis=1)
+    name = f"film_Sports2D_{'m' if level else 'px'}_person00.trc"
+    process.make_trc_with_trc_data(table, str(tmp_path / name), fps=FPS)
+    doubts = walk_right(tmp_path, name, columns=columns)
+    assert doubts == (
+        ["Sports2D levels the floor, so angles are taken from the floor's normal: state --camera-tilt 0 if its "
+         "floor_angle was 0."] if level else []
+    )  # fmt: skip
+    stated = walkerlab.read_walk(tmp_path / name, columns, slope_deg=math.degrees(SLOPE), camera_tilt_deg="floor")
+    assert (stated.summary["doubts"] == []) is level
+
+
+# DeepLabCut, movement, sleap-io
+
+
+def poses():
+    save_poses = pytest.importorskip("movement.io.save_poses", reason="movement is not installed", exc_type=ImportError)
+    load_poses = pytest.importorskip("movement.io.load_poses", exc_type=ImportError)
+    places, likelihood = pixels(), np.full((len(pixels()), 3, 1), 0.9)
+    places[200:205, 1] += 50.0
+    likelihood[200:205, 1] = 0.05
+    data = load_poses.from_numpy(
+        places.transpose(0, 2, 1)[..., None], likelihood, ["walker"], ["HIP", "FOOT1", "FOOT2"], fps=FPS
+    )
+    return save_poses, data
+
+
+@pytest.mark.parametrize("writer", ["to_dlc_file", "to_lp_file"])
+def test_poses_of_movement_have_three_header_rows(writer, tmp_path):
+    save_poses, data = poses()
+    getattr(save_poses, writer)(data, tmp_path / "film.csv")
+    doubts = walk_right(tmp_path, "film_walker.csv", columns=LEGS, fps=FPS, min_likelihood=0.6)
+    assert "FOOT1.x, FOOT1.y at samples 201 to 205 (likelihoods below 0.6" in doubts[0]
+
+
+def test_poses_of_movement_may_name_their_individual(tmp_path):
+    save_poses, data = poses()
+    save_poses.to_dlc_file(data, tmp_path / "film.csv", split_individuals=False)
+    columns = {name: line.replace("HIP", "walker.HIP").replace("FOOT", "walker.FOOT") for name, line in LEGS.items()}
+    walk_right(tmp_path, "film.csv", columns=columns, fps=FPS, min_likelihood=0.6)
+
+
+def test_a_data_frame_as_deeplabcut_writes_it_is_read(tmp_path):
+    pandas = pytest.importorskip("pandas", reason="pandas is not installed")
+    header = [("net", part, axis) for part in ("HIP", "FOOT1", "FOOT2") for axis in ("x", "y", "likelihood")]
+    names = pandas.MultiIndex.from_tuples(header, names=["scorer", "bodyparts", "coords"])
+    values = np.concatenate((pixels(), np.ones((len(pixels()), 3, 1))), axis=2).reshape(len(pixels()), -1)
+    pandas.DataFrame(values, columns=names).to_csv(tmp_path / "film.csv")
+    assert walk_right(tmp_path, "film.csv", columns=LEGS, fps=FPS) == []
+
+
+@pytest.mark.parametrize("style", ["sleap", "instances", "frames"])
+def test_predictions_of_sleap_are_read(style, tmp_path):
+    sleap = pytest.importorskip("sleap_io", reason="sleap-io is not installed", exc_type=ImportError)
+    skeleton, video = sleap.Skeleton(["HIP", "FOOT1", "FOOT2"]), sleap.Video.from_filename("film.mp4")
+    frames = [
+        sleap.LabeledFrame(video=video, frame_idx=n, instances=[
+            sleap.PredictedInstance.from_numpy(row, skeleton=skeleton, point_scores=np.full(3, 0.9), score=0.9)
+        ])
+        for n, row in enumerate(pixels())
+        if n not in (150, 151, 152)
+    ]  # fmt: skip
+    sleap.save_csv(sleap.Labels(frames), str(tmp_path / "film.csv"), format=style)
+    columns = (
+        {name: "inst0." + line.replace(">", ">inst0.") for name, line in LEGS.items()} if style == "frames" else LEGS
+    )
+    assert walk_right(tmp_path, "film.csv", columns=columns, fps=FPS, min_likelihood=0.5) == []
+
+
+# Kinetics Toolkit, pandas and polars
+
+
+def time_series():
+    toolkit = pytest.importorskip("kineticstoolkit", reason="kineticstoolkit is not installed", exc_type=ImportError)
+    time, angle = sampled()
+    series = toolkit.TimeSeries(time=time)
+    for marker, name in enumerate(("HIP", "FOOT1", "FOOT2")):
+        series.data[name] = np.c_[places_of(angle)[:, marker], np.ones(time.size)]
+    return toolkit, series
+
+
+def test_points_of_kineticstoolkit_are_read_from_c3d(tmp_path):
+    pytest.importorskip("ezc3d", reason="ezc3d is not installed")
+    toolkit, series = time_series()
+    toolkit.write_c3d(str(tmp_path / "walk.c3d"), series)
+    walk_right(tmp_path, "walk.c3d", columns=LEGS)
+
+
+def test_points_of_kineticstoolkit_are_read_from_a_table(tmp_path):
+    _, series = time_series()
+    series.to_dataframe().to_csv(tmp_path / "walk.csv")
+    assert walk_right(tmp_path, "walk.csv", columns={"time": "column 1", **LEGS}, units={"time": "s"}) == []
+
+
+def test_time_deltas_and_dates_of_pandas_are_seconds(tmp_path):
+    pandas = pytest.importorskip("pandas", reason="pandas is not installed")
+    time, angle = sampled()
+    deltas = pandas.to_timedelta(time, unit="s")
+    begin = pandas.Timestamp("2026-03-29 01:59:58", tz="Europe/Berlin")
+    for index in (deltas, pandas.Timestamp("2026-12-31 23:59:58") + deltas, begin + deltas):
+        pandas.DataFrame(angle, columns=["angle 1 (rad)", "angle 2 (rad)"], index=index).to_csv(
+            tmp_path / "walk.csv", index_label="time"
+        )
+        assert walk_right(tmp_path, "walk.csv") == []
+
+
+def test_dates_and_times_of_polars_are_seconds(tmp_path):
+    polars = pytest.importorskip("polars", reason="polars is not installed", exc_type=ImportError)
+    time, angle = sampled()
+    begin = datetime.datetime(2026, 12, 31, 23, 59, 58)
+    dates = [begin + datetime.timedelta(seconds=t) for t in time.tolist()]
+    for times in (dates, [date.time() for date in dates]):
+        frame = polars.DataFrame({"time": times, "angle 1 (rad)": angle[:, 0], "angle 2 (rad)": angle[:, 1]})
+        frame.write_csv(tmp_path / "walk.csv")
+        assert walk_right(tmp_path, "walk.csv") == []
+
+
+# C3D and OpenSim
+
+
+def test_a_walk_of_ezc3d_in_millimetres_is_read(tmp_path):
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed")
+    content = ezc3d.c3d()
+    for name, value in {"RATE": [FPS], "LABELS": ["HIP", "FOOT1", "FOOT2"], "UNITS": ["mm"]}.items():
+        content["parameters"]["POINT"][name]["value"] = value
+    places = places_of(sampled()[1])
+    content["data"]["points"] = np.concatenate((1e3 * places.transpose(2, 1, 0), np.ones((1, 3, len(places)))), axis=0)
+    content.write(str(tmp_path / "walk.c3d"))
+    assert walk_right(tmp_path, "walk.c3d", columns=LEGS) == []
+
+
+@pytest.mark.parametrize("name", ["walk.mot", "walk.sto"])
+def test_states_of_opensim_are_read_in_radians(name, tmp_path):
+    osim = opensim()
+    table = osim.TimeSeriesTable()
+    labels = ["/jointset/hip/leg_1/value", "/jointset/hip/leg_2/value"]
+    table.setColumnLabels(labels)
+    time, angle = sampled()
+    for instant, row in zip(time.tolist(), angle.tolist(), strict=True):
+        table.appendRow(instant, osim.RowVector(row))
+    table.addTableMetaDataString("inDegrees", "no")
+    osim.STOFileAdapter.write(table, str(tmp_path / name))
+    assert walk_right(tmp_path, name, columns=dict(zip(("angle 1", "angle 2"), labels, strict=True))) == []

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import as_walk, parse_pairs, parse_units
 from walkerlab.exchange.recording import read_recording
@@ -77,13 +78,13 @@ def written(folder, name, text, encoding="utf-8"):
 
 
 def read(path, columns=(), units=()):
-    return as_walk(read_recording(path), dict(columns), dict(units))
+    return as_walk(read_recording(path), Recorded(columns=dict(columns), units=dict(units)))
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_same_walk_is_read_from_every_format(name, tmp_path):
     units = {} if name == "own.csv" else {"angle": "rad", "time": "s"} if name == "table.txt" else {"time": "s"}
-    walk = as_walk(read_recording(written(tmp_path, name, FILES[name])), {}, units)
+    walk = as_walk(read_recording(written(tmp_path, name, FILES[name])), Recorded(units=units))
     assert walk.time_s == pytest.approx(TIMES, abs=1e-12)
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
@@ -91,14 +92,14 @@ def test_same_walk_is_read_from_every_format(name, tmp_path):
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 def test_delimiter_at_the_end_of_every_row_is_ignored(delimiter, tmp_path):
     rows = "".join(f"{line.replace(',', delimiter)}{delimiter}\n" for line in OWN.splitlines())
-    walk = as_walk(read_recording(written(tmp_path, "own.csv", f"Walk of today\n{rows}\n")), {}, {})
+    walk = as_walk(read_recording(written(tmp_path, "own.csv", f"Walk of today\n{rows}\n")), Recorded())
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
 
 def test_unit_of_one_component_applies_to_it_alone(tmp_path):
     """Also where that component is the time."""
     text = RES.replace('"TIME" unitsValue="sec"', '"TIME" unitsValue="millisecond"')
-    walk = as_walk(read_recording(written(tmp_path, "walk.res", text)), {}, {})
+    walk = as_walk(read_recording(written(tmp_path, "walk.res", text)), Recorded())
     assert walk.time_s == pytest.approx(TIMES / 1000.0, abs=1e-12)
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-11)
 
@@ -107,11 +108,11 @@ def test_adams_results_begin_with_the_initial_conditions(tmp_path):
     """ADAMS writes the state at time 0 into a block of its own; a static solution at the same time replaces it."""
     initial = '<Data name="initialConditions_001" id="9"><Step type="initialConditions">-0.1\n0.5 0.6</Step></Data>'
     path = written(tmp_path, "walk.res", RES.replace('<Data name="dynamic_001"', f'{initial}<Data name="dynamic_001"'))
-    walk = as_walk(read_recording(path), {}, {})
+    walk = as_walk(read_recording(path), Recorded())
     assert walk.time_s == pytest.approx([-0.1, *TIMES], abs=1e-12)
     assert walk.both_legs("angle")[0].tolist() == [0.5, 0.6]
     path = written(tmp_path, "walk.res", path.read_text(encoding="utf-8").replace("-0.1\n0.5", f"{TIMES[0]}\n0.5"))
-    assert as_walk(read_recording(path), {}, {}).both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
+    assert as_walk(read_recording(path), Recorded()).both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
 
 
 @pytest.mark.parametrize("names", ["T,time", "T,t", "T,sensor.time", "time,t", "t,sensor.time"])
@@ -123,13 +124,16 @@ def test_column_t_is_time_only_if_no_other_column_fits(names, tmp_path):
 
 
 def test_header_can_state_degrees(tmp_path):
-    walk = as_walk(read_recording(written(tmp_path, "walk.mot", MOT)), {}, {})
+    walk = as_walk(read_recording(written(tmp_path, "walk.mot", MOT)), Recorded())
     assert walk.both_legs("angle") == pytest.approx(np.radians(ANGLES), abs=1e-12)
 
 
 def test_angles_are_computed_from_pairs_of_markers(tmp_path):
     path = written(tmp_path, "walk.trc", marker_file(TIMES, markers()))
-    walk = as_walk(read_recording(path), {"angle 1": "HIP>FOOT1", "angle 2": "HIP > FOOT2", "hip_along_m": "HIP.x"}, {})
+    walk = as_walk(
+        read_recording(path),
+        Recorded(columns={"angle 1": "HIP>FOOT1", "angle 2": "HIP > FOOT2", "hip_along_m": "HIP.x"}),
+    )
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
     assert walk.quantities["hip_along_m"] == pytest.approx(0.1 * TIMES, abs=1e-12)
 
@@ -137,18 +141,21 @@ def test_angles_are_computed_from_pairs_of_markers(tmp_path):
 def test_markers_may_be_recorded_with_z_upwards_and_walking_backwards(tmp_path):
     turned = markers()[:, :, [2, 0, 1]] * [1.0, -1.0, 1.0]
     path = written(tmp_path, "walk.trc", marker_file(TIMES, turned))
-    walk = as_walk(read_recording(path), {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}, {})
+    walk = as_walk(read_recording(path), Recorded(columns={"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}))
     assert walk.both_legs("angle") == pytest.approx(ANGLES, abs=1e-12)
 
 
-def test_gap_is_an_error_only_in_a_used_column(tmp_path):
+def test_gap_is_left_out_of_a_used_column(tmp_path):
     places = markers()
     text = marker_file(TIMES, places).replace(repr(float(places[2, 2, 0])), "")
     recording = read_recording(written(tmp_path, "walk.trc", text))
     assert np.isnan(recording.columns["FOOT2.x"]).sum() == 1
-    assert as_walk(recording, {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT1"}, {}).time_s.size == TIMES.size
-    with pytest.raises(ConfigError, match=r"FOOT2\.x.* lacks 1 of 5 values, the first at sample 3"):
-        as_walk(recording, {"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}, {})
+    assert (
+        as_walk(recording, Recorded(columns={"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT1"})).time_s.size == TIMES.size
+    )
+    walk = as_walk(recording, Recorded(columns={"angle 1": "HIP>FOOT1", "angle 2": "HIP>FOOT2"}))
+    assert walk.time_s == pytest.approx(np.delete(TIMES, 2))
+    assert walk.doubts == ("Gaps are left out: FOOT2.x at sample 3.",)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +176,6 @@ def test_gap_is_an_error_only_in_a_used_column(tmp_path):
         ("walk.csv", OWN.replace(repr(float(ANGLES[1, 0])), "abc"), "line 3: 'abc' is not a number"),
         ("walk.csv", OWN + ",7", "4 values where the header names 3"),
         ("walk.csv", "\n".join([*OWN.splitlines(), OWN.splitlines()[2]]), "time does not increase"),
-        ("walk.csv", OWN.replace("\n0.2,", "\n,"), "'time' lacks 1 of 5 values, the first at sample 3"),
         ("walk.res", RES[:-40], "not complete XML"),
         ("walk.res", RES.replace('id="3"', 'id="2"'), "not unique"),
         ("walk.res", RES.replace('id="3"', 'id="x"'), "no id"),
@@ -215,16 +221,16 @@ def test_unknown_column_or_unit_is_named(columns, units, message, advice, tmp_pa
         written(tmp_path, "walk.csv", OWN.replace(",angle 2 (rad)", ",angle 2 (gon)") if "angle" in units else OWN)
     )
     with pytest.raises(ConfigError, match=message) as caught:
-        as_walk(recording, columns, units)
+        as_walk(recording, Recorded(columns=columns, units=units))
     assert advice in caught.value.advice
 
 
 def test_missing_unit_is_requested(tmp_path):
     recording = read_recording(written(tmp_path, "walk.csv", OWN.replace("angle 2 (rad)", "angle 2")))
     with pytest.raises(ConfigError, match="states no unit for 'angle 2'") as caught:
-        as_walk(recording, {}, {})
+        as_walk(recording, Recorded())
     assert "--units angle=rad" in caught.value.advice
-    assert as_walk(recording, {}, parse_units(["rad"])).both_legs("angle") == pytest.approx(ANGLES)
+    assert as_walk(recording, Recorded(units=parse_units(["rad"]))).both_legs("angle") == pytest.approx(ANGLES)
 
 
 def test_ambiguous_column_is_rejected_with_the_candidates(tmp_path):
@@ -238,7 +244,7 @@ def test_ambiguous_column_is_rejected_with_the_candidates(tmp_path):
         )
     )
     with pytest.raises(ConfigError, match="could each be 'angle 2'"):
-        as_walk(recording, {}, {"angle": "rad", "time": "s"})
+        as_walk(recording, Recorded(units={"angle": "rad", "time": "s"}))
 
 
 def test_column_and_unit_options_are_parsed_as_pairs():

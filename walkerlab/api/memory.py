@@ -16,6 +16,7 @@ from walkerlab.config.files import DEFAULT, builtin_config, read_layers
 from walkerlab.config.layers import merge_layers
 from walkerlab.config.loader import suspicious_values
 from walkerlab.config.overlay import tree_of
+from walkerlab.config.recording import Recorded
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import align_start, validate_tree
@@ -311,7 +312,6 @@ def read_walk(
     units: Mapping[str, str] | None = None,
     walker: Walker | None = None,
     slope_deg: float | None = None,
-    walks: str | None = None,
     **keys: Setting,
 ) -> Result:
     """Read a walk from a file, in memory.
@@ -321,8 +321,7 @@ def read_walk(
     units      units by kind, quantity or column, if the file does not state them, such as {"angle": "deg"}
     walker     walker that made the recording, built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
-    walks      direction of a walk of markers, as the recording sees it: left, right, away or towards
-    keys       other config keys
+    keys       other keys of the block `recording`, such as walks, camera_tilt_deg or fps; other config keys
 
     Returns a result whose `summary` has the steps, and whose arrays have a row for each step and each sample. Raises
     ConfigError for a file without a walk.
@@ -331,7 +330,8 @@ def read_walk(
     >>> read_walk(stored.artifact).steps
     4
     """
-    recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {}), "walks": walks}
+    stated = {name: keys.pop(name) for name in Recorded.model_fields.keys() & keys.keys()}
+    recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {}), **stated}
     values = {"slope_deg": slope_deg, "recording": recording}
     return in_memory("recorded-walk", config_of_scene(walker, values, keys))
 

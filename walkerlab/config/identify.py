@@ -1,17 +1,18 @@
 """The identify block: a measured walk, and the parameters to estimate from it."""
 
-from typing import Literal, get_args
+from typing import Final, Literal, get_args
 
 from pydantic import field_validator
 
-from walkerlab.config.fields import Block, Text, key, meaning_error
-from walkerlab.config.recording import WALKS, Direction
+from walkerlab.config.fields import Text, check_against, key, meaning_error
+from walkerlab.config.recording import Recorded
 
 Nuisance = Literal["time_offset_s", "clock_rate", "angle_offset_rad", "angle_gain"]
+OFFSET: Final = "angle_offset_rad"
 Pair = list[float]
 
 
-class Identify(Block):
+class Identify(Recorded):
     """Estimation problem of `walkerlab identify`."""
 
     data: Text = key(
@@ -55,16 +56,24 @@ class Identify(Block):
     loss: Literal["linear", "soft_l1"] = key(
         "linear", "", "linear: least squares; soft_l1: outliers count by their size, not its square"
     )
-    columns: dict[Text, Text] = key(
-        dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
+    _one_offset = check_against(
+        "nuisance",
+        "camera_tilt_deg",
+        lambda nuisance, tilt: (
+            f"has {OFFSET}, which camera_tilt_deg: free estimates already: leave out one of both"
+            if tilt == "free" and OFFSET in nuisance
+            else ""
+        ),
     )
-    units: dict[Text, Text] = key(
-        dict,
-        "",
-        "units by kind (time, length, angle), quantity or column",
-        bounds="a unit for each kind, quantity or column",
-    )
-    walks: Direction | None = WALKS
+
+    @property
+    def sensors(self) -> tuple[Nuisance, ...]:
+        """Properties of clock and sensors to estimate.
+
+        A camera's free tilt is an offset of all angles. So is the floor's normal, while the slope is estimated.
+        """
+        follows = self.camera_tilt_deg == "floor" and self.level == "angles" and "slope_deg" in self.keys
+        return tuple(dict.fromkeys((*self.nuisance, *((OFFSET,) if follows or self.camera_tilt_deg == "free" else ()))))
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -1,19 +1,87 @@
-"""The recording block: a walk measured or computed elsewhere, to compare with."""
+"""The recording block: a walk measured or computed elsewhere, to compare with; `identify` shares its keys."""
 
-from typing import Any, Literal
+from typing import Annotated, Literal
 
-from walkerlab.config.fields import Block, Text, key
+from pydantic import Discriminator, Field, Tag
 
-Direction = Literal["left", "right", "away", "towards"]
-WALKS: Any = key(
-    None,
-    "",
-    "direction of a walk of markers, as the recording sees it; right is the first horizontal axis",
-    default_in_words="the one in which swinging feet move",
-)
+from walkerlab.config.fields import Block, Text, check_against, key
+
+Tilt = Annotated[
+    Annotated[Literal["floor", "free"], Tag("word")] | Annotated[float, Field(ge=-45.0, le=45.0), Tag("number")],
+    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+]
 
 
-class RecordedFile(Block):
+class Recorded(Block):
+    """Statements about a file with a recorded walk that the file does not make itself."""
+
+    columns: dict[Text, Text] = key(
+        dict,
+        "",
+        "column of each quantity that the header does not identify; -NAME changes the sign, NAME+90deg adds a constant",
+        bounds="a column for each quantity",
+    )
+    units: dict[Text, Text] = key(
+        dict,
+        "",
+        "units by kind (angle, length, ...), quantity or column",
+        bounds="a unit for each kind, quantity or column",
+    )
+    walks: Literal["left", "right", "away", "towards"] | None = key(
+        None,
+        "",
+        "direction of a walk, as the recording sees it; right is the first horizontal axis of markers",
+        default_in_words="the one in which swinging feet move",
+    )
+    camera_tilt_deg: Tilt | None = key(
+        None,
+        "deg",
+        "angle by which the direction that the angles are measured from leans off the vertical, its top forwards; "
+        "floor: as the floor's normal does, free: to be found in the recording",
+        bounds="-45 to 45, floor, free",
+        default_in_words="0, or floor if the file's program levels the floor",
+    )
+    belt_speed_m_s: float | None = key(
+        None,
+        "m/s",
+        "speed of a treadmill's belt, which gives the lengths of steps",
+        gt=0.0,
+        le=1e3,
+        default_in_words="no belt",
+    )
+    fps: float | None = key(
+        None,
+        "1/s",
+        "frames per second of the film, for files that count frames or state the times of another speed",
+        ge=1e-3,
+        le=1e7,
+        default_in_words="times as in the file",
+    )
+    from_s: float | None = key(
+        None, "s", "time at which the part to read begins", bounds="any number", default_in_words="the first sample"
+    )
+    to_s: float | None = key(
+        None,
+        "s",
+        "time at which the part to read ends",
+        bounds="any number, above from_s",
+        default_in_words="the last sample",
+    )
+    min_likelihood: float | None = key(
+        None,
+        "1",
+        "likelihood of a marker below which its place is a gap",
+        ge=0.0,
+        le=1.0,
+        default_in_words="none",
+    )
+
+    _span = check_against(
+        "to_s", "from_s", lambda end, begin: "" if end is None or end > begin else "is not after from_s"
+    )
+
+
+class RecordedFile(Recorded):
     """File with a walk for `walkerlab compare --with`, and the meaning of its columns."""
 
     file: Text = key(
@@ -30,13 +98,3 @@ class RecordedFile(Block):
         bounds="any text",
         default_in_words="file name without extension",
     )
-    columns: dict[Text, Text] = key(
-        dict, "", "column of each quantity that the header does not identify", bounds="a column for each quantity"
-    )
-    units: dict[Text, Text] = key(
-        dict,
-        "",
-        "units by kind (angle, length, ...), quantity or column",
-        bounds="a unit for each kind, quantity or column",
-    )
-    walks: Direction | None = WALKS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,17 +11,22 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.marker_lines import (
     Line,
+    body_doubts,
+    body_gaps,
     find_plane,
-    length_doubts,
+    frozen_rows,
     refuse_running,
+    spell_rows,
     swap_lines_back,
     unseen_as_gaps,
 )
-from walkerlab.exchange.recording import TIME, UNIT_IN_NAME, Array, Recording
+from walkerlab.exchange.recording import SEGMENTS, TIME, UNIT_IN_NAME, Array, Recording
 from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
 
 OF_LEG: Final = {
@@ -42,6 +48,17 @@ HIP_OF_LINES: Final = "upper marker along the walk"
 """Place (m) of the marker at the top of the first line, where angles are those of lines."""
 SAMPLE: Final = "sample"
 """Number of each sample in the file, from 1."""
+QUOTED: Final = re.compile(r"""["'](.*)["']""")
+CHANGED: Final = re.compile(r"(-?)(.+?)(?:([+-] *(?:\d+\.?\d*|\.\d+)) *([a-zA-Z°/]+))?")
+"""Pattern for a column with another sign, and a constant with its unit."""
+FRAME: Final = re.compile(r"(?i:frames?(?:[\s_]?(?:idx|index|number|no\.?))?#?)")
+"""Pattern for the name of a column that counts frames."""
+PAIR: Final = re.compile(r"""(?:[^,"]|"[^"]*")+|"[^,]*""")
+FRAME_TIME: Final = "frame / fps"
+HUGE: Final = 1e50  # size of values that are gaps, because their squares overflow
+SAME_RATE: Final = 0.01  # largest relative difference of two frame rates that are the same
+LIKELIHOOD: Final = r"(?i:[\s._:]+(?:likelihood|confidence|score))"
+UNLIKELY: Final = 0.5  # likelihood below which a marker's place is doubtful
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +73,10 @@ class RecordedWalk:
     unit_is_stated: bool = True  # whether the file states the unit of a leg's angle for itself, or the user
     lines: tuple[str, ...] = ()  # quantities that are angles of lines between markers
     doubts: tuple[str, ...] = ()  # what is odd about the recording, and what was done about it
+    gaps: str = ""  # samples within the walk that are left out because they have gaps, in words
+    tilt_rad: float = 0.0  # angle by which the direction that angles are measured from leans, its top forwards
+    belt_m_s: float = 0.0  # speed of a treadmill's belt
+    hip_is_in_m: bool = False  # whether the place of the upper marker has a known unit
 
     def both_legs(self, name: str) -> Array | None:
         """Return a quantity of both legs (samples, 2); None unless it is recorded for both."""
@@ -63,66 +84,211 @@ class RecordedWalk:
         return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
 
 
-def as_walk(
-    recording: Recording, columns: Mapping[str, str], units: Mapping[str, str], walks: str = ""
-) -> RecordedWalk:
+@dataclass(frozen=True)
+class Source:
+    """Column, or line between markers, that a quantity comes from: sign times its values, plus a constant."""
+
+    column: str
+    sign: float = 1.0
+    constant: float = 0.0  # SI
+
+
+def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> RecordedWalk:
     """Return the quantities of a recorded walk in SI units.
 
-    columns  columns that the user names, by quantity; `HIP>FOOT` is the angle of the line between two markers
-    units    units that the file does not state, by kind ('angle', 'length', ...), by quantity or by column
-    walks    left, right, away or towards, as the recording sees the walk; '' to find the direction between markers
+    asked      what the user states about the file
+    slope_rad  slope of the ground, for angles from the floor's normal
 
     Raises ConfigError for a column or unit that is unknown or missing, for gaps, and for running.
     """
+    units = asked.units
     refuse_units(recording, units, QUANTITY_KINDS)
-    named = find_named(recording, columns)
+    recording, notes = with_frame_times(recording, asked)
+    if FRAME_TIME in recording.columns:
+        units = {name: unit for name, unit in units.items() if name != TIME}
+    named = find_named(recording, asked)
     sources, left_out = matches(recording, named.keys())
-    sources |= named
+    sources |= {name: source.column for name, source in named.items()}
     for name in NEEDED:
         if name in left_out:
             raise ConfigError(left_out[name], f'Choose one: --columns "{name}=..."')
         if name not in sources:
             raise missing(recording, name)
     ends = {name: pairs for name, source in sources.items() if (pairs := ends_of(recording, source))}
+    recording, more_notes = with_likely_places(recording, [sources[name] for name in ends], asked.min_likelihood)
     for pairs in ends.values():
         columns_with_gaps, unseen = unseen_as_gaps(recording.columns, pairs)
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
-    asked = {**dict.fromkeys(NEEDED), **named}.keys()
-    part, cut = without_gaps_at_ends(recording, [sources[name] for name in asked])
+    recording = without_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
+    needed = [sources[name] for name in {**dict.fromkeys(NEEDED), **named}]
+    time_unit = unit_value(recording, TIME, sources[TIME], "time", units)
+    rows = within_span(recording, recording.columns[sources[TIME]] * time_unit, asked)
+    rows, cut, gaps = without_gaps(recording, needed, rows)
     left_out |= {"samples": cut} if cut else {}
-    within = replace(recording, columns={name: values[part] for name, values in recording.columns.items()})
+    within = replace(recording, columns={name: values[rows] for name, values in recording.columns.items()})
     values, lines = {}, dict[str, Line]()
-    for name, source in sources.items():
+    for name, column in sources.items():
         try:
-            refuse_gaps(recording, source, part)
+            refuse_gaps(recording, column, rows)
             if name in ends:
                 lines[name] = places_of_ends(within, ends[name], units)
             else:
-                values[name] = recording.columns[source][part] * unit_value(
-                    recording, name, source, QUANTITY_KINDS[name], units
-                )
+                source = named.get(name, Source(column))
+                unit = unit_value(recording, name, column, QUANTITY_KINDS[name], units)
+                floor = floor_in_column(recording, asked, slope_rad) if name in NEEDED[1:] else 0.0
+                values[name] = source.sign * (unit * within.columns[column] + floor) + source.constant
         except ConfigError as error:
-            if name in asked:
+            if column in needed:
                 raise
             left_out[name] = error.message.removeprefix(f"{recording.path}: ")
     time = values.pop(TIME)
     refuse_order(recording.path, time)
     used = {name: sources[name] for name in (TIME, *values, *lines)}
-    values[SAMPLE] = 1.0 + np.arange(part.start, part.stop)
-    walk = RecordedWalk(time, values, used, left_out, walks, states_unit(recording, sources["angle 1"], units))
-    return with_lines(walk, lines, str(recording.path)) if lines else walk
+    values[SAMPLE] = np.asarray(1.0 + np.flatnonzero(rows))
+    tilt, tilt_notes = camera_tilt(recording, asked, slope_rad)
+    walk = RecordedWalk(
+        time,
+        values,
+        used,
+        left_out,
+        asked.walks or "",
+        states_unit(recording, sources["angle 1"], units),
+        doubts=(*notes, *more_notes, *tilt_notes, *([f"{gaps}."] if gaps else [])),
+        gaps=gaps,
+        tilt_rad=tilt,
+        belt_m_s=asked.belt_speed_m_s or 0.0,
+        hip_is_in_m=bool(lines) and scale_of_line(recording, ends[next(iter(lines))], units) is not None,
+    )
+    if not lines:
+        return walk
+    constants = {name: source.constant for name, source in named.items() if name in lines}
+    return with_lines(walk, lines, constants, str(recording.path))
 
 
-def with_lines(walk: RecordedWalk, lines: Mapping[str, Line], source: str) -> RecordedWalk:
+def with_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, list[str]]:
+    """Return a recording whose time is that of frames at a stated rate, if one is stated, and what is odd about it.
+
+    Frames are those of a column that counts them, otherwise those of regular times, otherwise the samples.
+    """
+    if asked.fps is None or not recording.columns:
+        return recording, []
+    name = asked.columns.get(TIME) or next((name for name in recording.columns if FRAME.fullmatch(name)), None)
+    stated = recording.columns.get(recording.time_name or "")
+    notes = []
+    if name is not None:
+        refuse_problem(recording, name := named_column(recording, name))
+        frames = recording.columns[columns_of(recording, name)[0]]
+        if np.any(np.mod(frames[np.isfinite(frames)], 1.0)):
+            raise ConfigError(f"{recording.path}: {name!r} does not count frames.", "Leave out --fps, or that column.")
+    elif stated is not None and (typical := float(np.nanmedian(np.diff(stated)))) > 0.0:
+        frames = np.round((stated - stated[0]) / typical)
+        value = value_in_si(stated_unit(recording, TIME, recording.time_name or "", "time", asked.units), "time") or 1.0
+        if abs(asked.fps * typical * value - 1.0) > SAME_RATE:
+            notes = [
+                f"The file's times, {1.0 / (typical * value):.4g} frames/s, are replaced by {asked.fps:g} frames/s."
+            ]
+    else:
+        frames = np.arange(float(next(iter(recording.columns.values())).size))
+    columns = {name: values for name, values in recording.columns.items() if name != recording.time_name}
+    units = recording.units | {FRAME_TIME: SI["time"]}
+    return replace(recording, columns={FRAME_TIME: frames / asked.fps, **columns}, units=units), notes
+
+
+def with_likely_places(recording: Recording, lines: Sequence[str], least: float | None) -> tuple[Recording, list[str]]:
+    """Return a recording with gaps where a marker of some lines is unlikely, and what is odd about likelihoods.
+
+    Raises ConfigError for a limit without likelihoods in the file.
+    """
+    markers = dict.fromkeys(marker for line in lines if (ends := LINE.fullmatch(line)) for marker in ends.groups())
+    likelihoods = {
+        marker: recording.columns[column]
+        for marker in markers
+        for column in recording.columns
+        if re.fullmatch(rf"{re.escape(marker)}{LIKELIHOOD}", column)
+    }
+    if least is None:
+        low = {marker: each for marker, each in likelihoods.items() if np.any(each < UNLIKELY)}
+        spelled = ", ".join(f"{marker} at {spell_rows(each < UNLIKELY)}" for marker, each in low.items())
+        return recording, [
+            f"Likelihoods are below {UNLIKELY:g}: {spelled}; --min-likelihood makes such places gaps."
+        ] if low else []
+    if not likelihoods:
+        raise ConfigError(
+            f"{recording.path} has no likelihoods of {' and '.join(markers) or 'markers'}.",
+            "They would be in columns such as HIP.likelihood. Leave out --min-likelihood.",
+        )
+    columns, unseen = dict(recording.columns), dict(recording.unseen)
+    for marker, likelihood in likelihoods.items():
+        for column in axes_of(recording, marker).values():
+            columns[column] = np.where(likelihood < least, np.nan, columns[column])
+            unseen[column] = f"likelihoods below {least:g} are taken for 'not seen'"
+    return replace(recording, columns=columns, unseen=unseen), []
+
+
+def without_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
+    """Return a recording with gaps where angles stand still for some samples and then leap, as fillers of gaps do."""
+    for name in names:
+        if name in recording.problems:
+            continue
+        values = recording.columns[name]
+        frozen = frozen_rows(values[:, None])
+        if frozen.any():
+            columns = recording.columns | {name: np.where(frozen, np.nan, values)}
+            recording = replace(recording, columns=columns, unseen=recording.unseen | {name: "it stands still there"})
+    return recording
+
+
+def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tuple[float, list[str]]:
+    """Return the angle (rad) by which the direction that angles are from leans, and what the file says about it."""
+    tilt = asked.camera_tilt_deg
+    if tilt is None and recording.levelled_by:
+        return (0.0 if recording.levelled_by == SEGMENTS else slope_rad), [
+            f"{recording.levelled_by} levels the floor, so angles are taken from the floor's normal: state "
+            "--camera-tilt 0 if its floor_angle was 0."
+        ]
+    if isinstance(tilt, float | int):
+        return math.radians(tilt), []
+    return (slope_rad if tilt == "floor" else 0.0), []
+
+
+def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> float:
+    """Return the angle (rad) that Sports2D subtracted from angles of segments, because the floor leans in its picture.
+
+    It does so with one sign for walks to both sides, although it mirrors the picture of a walk to the left.
+    """
+    if asked.camera_tilt_deg is not None or recording.levelled_by != SEGMENTS:
+        return 0.0
+    return slope_rad if asked.walks == "left" else -slope_rad
+
+
+def with_lines(
+    walk: RecordedWalk, lines: Mapping[str, Line], constants: Mapping[str, float], source: str
+) -> RecordedWalk:
     """Add the angles of lines between markers (by quantity) to a walk; raises ConfigError for running."""
     lines, swaps = swap_lines_back(lines, walk.quantities[SAMPLE], walk.time_s)
+    named = {walk.sources[name]: line for name, line in lines.items()}
+    off, jumps = body_gaps(named, walk.quantities[SAMPLE], walk.time_s)
+    lines = {name: (top[~off], bottom[~off]) for name, (top, bottom) in lines.items()}
+    walk = only_rows(walk, ~off)
     plane = find_plane(lines, walk.walks)
     refuse_running(lines, plane, source)
-    angles = {name: plane.angle(line) for name, line in lines.items()}
+    angles = {name: plane.angle(line) + constants.get(name, 0.0) for name, line in lines.items()}
     hip = next(iter(lines.values()))[0] @ plane.ahead
-    by_source = {walk.sources[name]: line for name, line in lines.items()}
-    doubts = *swaps, *length_doubts(by_source, walk.quantities[SAMPLE], walk.time_s)
-    return replace(walk, quantities={**walk.quantities, **angles, HIP_OF_LINES: hip}, lines=tuple(lines), doubts=doubts)
+    doubts = (
+        *walk.doubts,
+        *swaps,
+        *jumps,
+        *body_doubts({walk.sources[name]: line for name, line in lines.items()}, plane),
+    )
+    gaps = "; ".join(text.removesuffix(".") for text in (walk.gaps, *jumps) if text)
+    quantities = {**walk.quantities, **angles, HIP_OF_LINES: hip}
+    return replace(walk, quantities=quantities, lines=tuple(lines), doubts=doubts, gaps=gaps)
+
+
+def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
+    """Return the samples of a walk at `rows` (samples,)."""
+    kept = {name: values[rows] for name, values in walk.quantities.items()}
+    return replace(walk, time_s=walk.time_s[rows], quantities=kept)
 
 
 def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
@@ -131,20 +297,45 @@ def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
     return line_columns(recording, ends[1], ends[2]) if ends else []
 
 
-def without_gaps_at_ends(recording: Recording, sources: Iterable[str]) -> tuple[slice, str]:
-    """Return the samples from the first to the last in which no source has a gap, and in words what is cut, or ''.
+def within_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[np.bool_]:
+    """Return which samples are in the part that is asked for; raises ConfigError if there are none."""
+    begin, end = (-math.inf if asked.from_s is None else asked.from_s), (math.inf if asked.to_s is None else asked.to_s)
+    # samples without a time are no part that could be left out
+    rows = ~((time < begin) | (time > end))
+    if not rows.any():
+        raise ConfigError(
+            f"{recording.path} has no sample from {begin:g} to {end:g} s; its times go from {np.min(time):g} to "
+            f"{np.max(time):g} s.",
+            "Change --from-s and --to-s.",
+        )
+    return np.asarray(rows)
+
+
+def without_gaps(
+    recording: Recording, sources: Iterable[str], rows: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], str, str]:
+    """Return the rows without gaps in any source, and in words what is cut at the ends and what is left out within.
 
     Raises ConfigError for a column that is not of numbers, and if every sample has a gap.
     """
-    used = dict.fromkeys(column for source in sources for column in columns_of(recording, source))
+    used = list(dict.fromkeys(column for source in sources for column in columns_of(recording, source)))
     for column in used:
         refuse_problem(recording, column)
-    whole = np.flatnonzero(np.all([np.isfinite(recording.columns[column]) for column in used], axis=0))
-    if not whole.size:
+    finite = {column: np.abs(recording.columns[column]) < HUGE for column in used}
+    whole = rows & np.all(list(finite.values()), axis=0)
+    if not whole.any():
         raise ConfigError(f"{recording.path} has no sample with values of {', '.join(used)}.", "Record the walk again.")
-    before, after = int(whole[0]), next(iter(recording.columns.values())).size - 1 - int(whole[-1])
+    first, last = np.flatnonzero(whole)[[0, -1]].tolist()
+    before, after = int(np.sum(rows[:first])), int(np.sum(rows[last + 1 :]))
     cut = f"{before} at the beginning and {after} at the end, which have gaps" if before or after else ""
-    return slice(before, int(whole[-1]) + 1), cut
+    inside = (np.arange(rows.size) > first) & (np.arange(rows.size) < last) & rows
+    gaps = dict[str, list[str]]()
+    for column in used:
+        if (lacking := inside & ~finite[column]).any():
+            reason = f" ({recording.unseen[column]})" if column in recording.unseen else ""
+            gaps.setdefault(f"{spell_rows(lacking)}{reason}", []).append(column)
+    spelled = "; ".join(f"{', '.join(columns)} at {place}" for place, columns in gaps.items())
+    return whole, cut, f"Gaps are left out: {spelled}" if gaps else ""
 
 
 def refuse_problem(recording: Recording, column: str) -> None:
@@ -156,16 +347,16 @@ def refuse_problem(recording: Recording, column: str) -> None:
         )
 
 
-def refuse_gaps(recording: Recording, source: str, part: slice) -> None:
-    """Raise ConfigError for a source of which values are missing within a part of the samples."""
+def refuse_gaps(recording: Recording, source: str, rows: NDArray[np.bool_] | slice) -> None:
+    """Raise ConfigError for a source of which values are missing at some of the rows."""
     for column in columns_of(recording, source):
         refuse_problem(recording, column)
         values = recording.columns[column]
-        gaps = np.arange(values.size)[part][~np.isfinite(values[part])]
+        gaps = np.arange(values.size)[rows][~np.isfinite(values[rows])]
         if gaps.size:
             raise ConfigError(
                 f"{recording.path}: {column!r} lacks {gaps.size} of {values.size} values, the first at sample "
-                f"{gaps[0] + 1}{f': {unseen}' if (unseen := recording.unseen.get(column)) else ''}.",
+                f"{gaps[0] + 1}.",
                 "Fill the gaps, or cut the recording to a part without them.",
             )
 
@@ -220,23 +411,53 @@ def leg_names(name: str) -> list[str]:
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
 
-def find_named(recording: Recording, columns: Mapping[str, str]) -> dict[str, str]:
-    """Return the columns that the user names, by quantity; raises ConfigError for an unknown quantity or column."""
+def find_named(recording: Recording, asked: Recorded) -> dict[str, Source]:
+    """Return the sources that the user names, by quantity; raises ConfigError for an unknown quantity or column."""
     known = {plain(name): name for name in QUANTITY_KINDS}
-    sources = {}
-    for quantity, column in columns.items():
+    sources = {TIME: Source(FRAME_TIME)} if FRAME_TIME in recording.columns else {}
+    for quantity, text in asked.columns.items():
         name = known.get(plain(quantity))
         if name is None:
             near = get_close_matches(plain(quantity), known, 1)
             advice = f"Did you mean {known[near[0]]!r}?" if near else f"Available: {', '.join(QUANTITY_KINDS)}."
             raise ConfigError(f"--columns: {quantity!r} is not a quantity of a walk.", advice)
-        sources[name] = named_column(recording, column)
-        columns_of(recording, sources[name])
+        if name not in sources:
+            sources[name] = parse_source(recording, text, QUANTITY_KINDS[name])
+            columns_of(recording, sources[name].column)
     return sources
+
+
+def parse_source(recording: Recording, text: str, kind: str) -> Source:
+    """Return the source that a text such as NAME, -NAME or NAME+90deg names; an exact or quoted column name wins.
+
+    Raises ConfigError for a constant in an unknown unit, and for a line with a sign.
+    """
+    name = named_column(recording, text)
+    if name in recording.columns:
+        return Source(name)
+    if quoted := QUOTED.fullmatch(text):
+        return Source(named_column(recording, quoted[1]))
+    match = CHANGED.fullmatch(text)
+    if match is None or not (match[1] or match[3]):
+        return Source(name)
+    unit = value_in_si(match[4], kind) if match[4] else 0.0
+    if unit is None:
+        raise ConfigError(
+            f"--columns: {text!r} adds a constant in {match[4]!r}, which is no unit of {kind}.",
+            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; quote a name that ends so: '\"{text}\"'.",
+        )
+    column = named_column(recording, match[2].strip())
+    if match[1] and LINE.fullmatch(column) and column not in recording.columns:
+        raise ConfigError(
+            f"--columns: {text!r} changes the sign of a line's angle, which follows from the way the walk goes.",
+            "Leave out the sign, or state the direction with --walks.",
+        )
+    return Source(column, -1.0 if match[1] else 1.0, float(match[3].replace(" ", "")) * unit if match[3] else 0.0)
 
 
 def named_column(recording: Recording, name: str) -> str:
     """Return the column that a user names as in the file's header, with or without the unit in brackets."""
+    name = name.strip()
     return name if name in recording.columns else UNIT_IN_NAME.sub("", name)
 
 
@@ -256,12 +477,13 @@ def line_columns(recording: Recording, top: str, bottom: str) -> list[tuple[str,
 
 
 def axes_of(recording: Recording, marker: str) -> dict[str, str]:
-    """Return the column of each coordinate of a marker, such as HIP.x, HIP X or HIP.PosX."""
-    pattern = re.compile(rf"{re.escape(marker)}(?i:[\s._:]+(?:pos[\s._]*)?([xyz]))")
+    """Return the column of each coordinate of a marker, such as HIP.x, HIP X, HIP.PosX or HIP[:,0]."""
+    pattern = re.compile(rf"{re.escape(marker)}(?:(?i:[\s._:]+(?:pos[\s._]*)?([xyz]))|\[(?::,)?([012])\])")
     axes: dict[str, str] = {}
     for column in recording.columns:
         match = pattern.fullmatch(column)
-        first = column if match is None else axes.setdefault(match[1].lower(), column)
+        axis = match and (match[1] or "xyz"[int(match[2])]).lower()
+        first = axes.setdefault(axis, column) if axis else column
         if first != column:
             raise ConfigError(
                 f"{recording.path}: columns {first} and {column} could each be a coordinate of {marker}.",
@@ -285,7 +507,7 @@ def missing(recording: Recording, name: str) -> ConfigError:
     if name == TIME:
         return ConfigError(
             f"{recording.path} has no time column; the first columns are {there}.",
-            'Name it: --columns "time=NAME". A file that counts frames needs a column of times.',
+            'Name it: --columns "time=NAME". For a file that counts frames, state their rate: --fps RATE.',
         )
     markers = [column.removesuffix(".x") for column in recording.columns if column.endswith(".x")]
     if markers and name.startswith("angle"):
@@ -370,20 +592,31 @@ def rate_unit(units: Mapping[str, str], kind: str) -> str:
 
 def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> Line:
     """Return the positions (samples, axes) of a line's ends: in m, or as recorded if all have the same unknown unit."""
-    columns = [column for pair in pairs for column in pair]
-    stated = {stated_unit(recording, column, column, "length", units) for column in columns}
-    scaled = len(stated) > 1 or value_in_si(next(iter(stated)), "length") is not None
-    places = {
-        column: recording.columns[column] * (unit_value(recording, column, column, "length", units) if scaled else 1.0)
-        for column in columns
-    }
-    top, bottom = (np.stack([places[column] for column in end], axis=1) for end in zip(*pairs, strict=True))
+    scale = scale_of_line(recording, pairs, units) or {}
+    top, bottom = (
+        np.stack([recording.columns[column] * scale.get(column, 1.0) for column in end], axis=1)
+        for end in zip(*pairs, strict=True)
+    )
     return top, bottom
 
 
+def scale_of_line(
+    recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]
+) -> dict[str, float] | None:
+    """Return the SI value of the unit of each column of a line's ends; None if all have the same unknown unit."""
+    columns = [column for pair in pairs for column in pair]
+    stated = {stated_unit(recording, column, column, "length", units) for column in columns}
+    if len(stated) == 1 and value_in_si(next(iter(stated)), "length") is None:
+        return None
+    return {column: unit_value(recording, column, column, "length", units) for column in columns}
+
+
 def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """Parse pairs such as `a=b,c=d` into a dictionary; raises ConfigError for any other form."""
-    pairs = [pair for text in texts for pair in text.split(",") if pair.strip()]
+    """Parse pairs such as `a=b,c=d` into a dictionary, in which quotes protect commas.
+
+    Raises ConfigError for any other form.
+    """
+    pairs = [pair for text in texts for pair in PAIR.findall(text) if pair.strip()]
     for pair in pairs:
         if "=" not in pair or not all(side.strip() for side in pair.split("=", 1)):
             raise ConfigError(f"{pair!r} is not of the form NAME=NAME.", f'Write {option} "a=b,c=d".')

@@ -12,10 +12,9 @@ from operator import itemgetter
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk
+from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, only_rows
 from walkerlab.exchange.marker_lines import NAMED, spell_samples, swap_doubt, swapped_rows
 from walkerlab.exchange.rate_jumps import AHEAD, Array, apart_runs
 from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
@@ -35,13 +34,15 @@ class Way:
 
 
 def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Return a walk whose leg angles are continuous, positive with the foot ahead, and go one way.
+    """Return a walk whose leg angles are continuous, from the vertical, positive with the foot ahead, and go one way.
 
     source  name of the recording, for messages
 
     Raises ConfigError for angles that are not those of two legs near the vertical.
     """
-    return on_course(swap_back(keep_one_way(unwrap(walk, source))))
+    mended = on_course(swap_back(keep_one_way(unwrap(walk, source))))
+    upright = {name: mended.quantities[name] - walk.tilt_rad for name in ("angle 1", "angle 2")}
+    return replace(mended, quantities={**mended.quantities, **upright})
 
 
 def legs(walk: RecordedWalk) -> Array:
@@ -53,12 +54,6 @@ def legs(walk: RecordedWalk) -> Array:
 
 def doubting(walk: RecordedWalk, doubt: str) -> RecordedWalk:
     return replace(walk, doubts=(*walk.doubts, doubt))
-
-
-def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
-    """Return the samples of a walk at `rows` (samples,)."""
-    kept = {name: values[rows] for name, values in walk.quantities.items()}
-    return replace(walk, time_s=walk.time_s[rows], quantities=kept)
 
 
 def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
@@ -80,8 +75,8 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
         if abs(middle - half_turns * math.pi) > UPRIGHT_RAD:
             raise ConfigError(
                 f"{source}: {name} lies around {math.degrees(middle):.0f} degrees from the vertical.",
-                "Angles must be from the vertical, positive with the foot ahead (--columns), in the right unit "
-                "(--units).",
+                "Angles must be from the vertical, positive with the foot ahead, in the right unit (--units). For "
+                f'angles from the horizontal: --columns "{name}={walk.sources.get(name, name)}+90deg".',
             )
         walk = replace(walk, quantities={**walk.quantities, name: angle})
         if half_turns % 2:
@@ -143,7 +138,8 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     angle = legs(walk)
     swing = angle - np.mean(angle, axis=0)
     second = -1.0 if "angle 1" not in walk.lines and float(swing[:, 0] @ swing[:, 1]) > 0.0 else 1.0
-    ways = [way for way in find_ways(walk.time_s, angle * [1.0, second]) if way.forwards or not walk.walks]
+    directed = bool(walk.walks and walk.lines)
+    ways = [way for way in find_ways(walk.time_s, angle * [1.0, second]) if way.forwards or not directed]
     if not ways:
         return walk
     place = max(range(len(ways)), key=lambda place: len(ways[place].passings))

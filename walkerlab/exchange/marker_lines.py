@@ -23,6 +23,11 @@ NAMED: Final = 3  # number of stretches of samples that a doubt lists
 JUMP: Final = 8.0  # change of a line's length between samples that is a jump, in standard deviations of all changes
 SMALLEST_JUMP: Final = 0.01  # the same, as a fraction of the length
 NEIGHBOURS: Final = 5  # number of changes whose median a jump differs from
+FEWEST_FROZEN: Final = 3  # fewest samples in which a marker freezes
+LONGEST_LEAP: Final = 1.5  # how much faster than before the leap a marker may move behind it
+LENGTH_PARTS: Final = 5  # number of parts of a walk whose lengths of legs are compared
+SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
+ONE_HIP: Final = 0.02  # largest motion of two hip markers against each other, as a fraction of a leg
 NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
 PLANE_FITS: Final = 3
 RUNNING: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
@@ -53,6 +58,11 @@ def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
         return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
 
     return spell_numbers(numbers, rows, spell_times)
+
+
+def spell_rows(rows: NDArray[np.bool_]) -> str:
+    """Return in words the samples at `rows` (samples,) of a file, which count from 1."""
+    return spell_numbers(np.arange(1.0, rows.size + 1.0), rows)
 
 
 def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[int, int], str] | None = None) -> str:
@@ -171,7 +181,7 @@ def stated_direction(walks: str, up: Array) -> Array:
 def unseen_as_gaps(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return columns with gaps for markers that were not seen, and by column what was taken for such a gap.
+    """Return columns with gaps for markers that were not seen, and by column what was taken for a gap.
 
     Programs write zeros for a marker that they did not see, or another value for all of its coordinates. But a foot may
     well stand at the origin: such a place is a gap if the length of its line is not the usual one.
@@ -193,16 +203,41 @@ def unseen_as_gaps(
             alike[first : last + 1] = np.any(np.abs(length[first : last + 1] - usual) > allowed)
         if alike.any():
             value = ", ".join(f"{each:g}" for each in place[np.argmax(alike)])
-            text = f"({value}) at {spell_numbers(1.0 + np.arange(alike.size), alike)} is taken for 'not seen'"
+            text = f"({value}) is taken for 'not seen'"
             unseen |= dict.fromkeys(names, text)
             gaps |= {name: np.where(alike, np.nan, gaps[name]) for name in names}
     return gaps, unseen
 
 
-def length_doubts(lines: Mapping[str, Line], numbers: Array, time: Array) -> list[str]:
-    """Name the samples at which the length of a leg is off, because legs are rigid and knees bend smoothly."""
-    doubts = []
+def frozen_rows(places: Array) -> NDArray[np.bool_]:
+    """Return the samples (samples,) that repeat a place (samples, axes) before a leap to where it should have moved.
+
+    So fillers of gaps write the last place that was seen. The speed behind the leap says how many samples are missing,
+    because a foot may have stood still before.
+    """
+    change = np.linalg.norm(np.diff(places, axis=0, append=places[-1:]), axis=1)
+    still, frozen = np.append(False, change[:-1] == 0.0), np.zeros(len(places), bool)
+    for first, last in apart_runs(still, still):
+        pace = float(np.max(change[last + 1 : last + 3], initial=0.0))
+        missing = change[last] / pace - 1.0 if pace > 0.0 else 0.0
+        if FEWEST_FROZEN <= missing <= LONGEST_LEAP * (last - first + 1):
+            frozen[max(first, last + 1 - round(LONGEST_LEAP * missing)) : last + 1] = True
+    return frozen
+
+
+def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[NDArray[np.bool_], list[str]]:
+    """Return at which samples a marker freezes, or the length of a leg is off until it jumps back, and name all jumps.
+
+    Legs are rigid, and knees bend smoothly.
+    """
+    off, doubts = np.zeros(time.size, bool), []
     for name, (top, bottom) in lines.items():
+        frozen = frozen_rows(top) | frozen_rows(bottom)
+        if frozen.any():
+            doubts.append(
+                f"A marker of {name} stands still at {spell_samples(time, numbers, frozen)}, which is left out."
+            )
+            off |= frozen
         length = np.linalg.norm(top - bottom, axis=1)
         if length.size <= NEIGHBOURS:
             continue
@@ -210,14 +245,43 @@ def length_doubts(lines: Mapping[str, Line], numbers: Array, time: Array) -> lis
         around = np.lib.stride_tricks.sliding_window_view(np.pad(change, NEIGHBOURS // 2, "edge"), NEIGHBOURS)
         sudden = change - np.median(around, axis=1)
         limit = max(JUMP * NORMAL * float(np.median(np.abs(sudden))), SMALLEST_JUMP * float(np.median(length)))
-        jumps, off = np.flatnonzero(np.abs(sudden) > limit).tolist(), np.zeros(length.size, bool)
+        jumps = np.flatnonzero(np.abs(sudden) > limit).tolist()
+        brief, lasting = np.zeros(length.size, bool), np.zeros(length.size, bool)
         while jumps:
             first = jumps.pop(0)
-            # up to the jump back, if there is one
-            back = bool(jumps) and sudden[first] * sudden[jumps[0]] < 0.0
-            off[first + 1 : (jumps.pop(0) if back else first + 1) + 1] = True
-        if off.any():
-            doubts.append(f"The length of {name} jumps at {spell_samples(time, numbers, off)}.")
+            if jumps and sudden[first] * sudden[jumps[0]] < 0.0:
+                brief[first + 1 : jumps.pop(0) + 1] = True
+            else:
+                lasting[first + 1] = True
+        if brief.any():
+            doubts.append(f"The length of {name} is off at {spell_samples(time, numbers, brief)}, which is left out.")
+        if lasting.any():
+            doubts.append(f"The length of {name} jumps at {spell_samples(time, numbers, lasting)}, and not back.")
+        off |= brief
+    return off, doubts
+
+
+def body_doubts(lines: Mapping[str, Line], plane: WalkPlane) -> list[str]:
+    """Name legs whose length changes slowly, and legs that do not meet at one hip."""
+    doubts, lengths = [], list[float]()
+    for name, (top, bottom) in lines.items():
+        length = np.linalg.norm(top - bottom, axis=1)
+        parts = [float(np.median(part)) for part in np.array_split(length, min(LENGTH_PARTS, length.size))]
+        scatter = NORMAL * float(np.median(np.abs(length - np.median(length))))
+        lengths.append(float(np.median(length)))
+        spread = max(parts) - min(parts)
+        if spread > max(SLOW_CHANGE * lengths[-1], scatter):
+            doubts.append(
+                f"The length of {name} changes by {spread / lengths[-1]:.1%} along the walk: a marker moves on the "
+                "leg, or the camera does not look square to the walk."
+            )
+    tops = [top @ np.stack([plane.ahead, plane.up], axis=1) for top, _ in lines.values()]
+    apart = [np.std(tops[0] - top, axis=0).max() for top in tops[1:]]
+    if apart and max(apart) > ONE_HIP * lengths[0]:
+        doubts.append(
+            f"The upper ends of {' and '.join(lines)} move against each other by {max(apart) / lengths[0]:.1%} of a "
+            "leg (r.m.s.), but a walker's legs meet at one hip: use one marker for both."
+        )
     return doubts
 
 

@@ -7,6 +7,7 @@ OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` maps the
 from __future__ import annotations
 
 import csv
+import math
 import re
 import stat
 import subprocess
@@ -14,6 +15,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from functools import cache
 from importlib.util import find_spec
 from io import BytesIO
@@ -46,7 +48,8 @@ TIME_NAMES = [
     )
 ]  # fmt: skip
 """Names of a file's time column; T comes last, because it may be a temperature."""
-UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
+UNIT_IN_NAME: Final = re.compile(r"\s*[\[(]\s*(?!(?::,)?\d+\s*\])([^\[\]()]*?)\s*[\])]\s*$")
+"""Pattern for a unit in brackets behind a name; [2] and [:,2] count the parts of a vector."""
 DELIMITERS: Final = "\t;,"
 EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "#n/a"})
 """Texts of cells without a value, in lower case."""
@@ -54,6 +57,18 @@ THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
 """Pattern for numbers whose comma may also separate thousands."""
 COMMAS_AND_BLANKS: Final = re.compile(r" *[-+]?\d+,\d+(?: +[-+]?\d+,\d+(?:[eE][-+]?\d+)?)+ *")
 DECLARED_ENCODING: Final = re.compile(rb"""\s*<\?xml[^>]*encoding\s*=\s*["']([\w.-]+)""")
+CLOCKS: Final = tuple(
+    re.compile(pattern)
+    for pattern in (
+        r"(?:(\d+) days? )?(?:(\d+):)?(\d+):(\d\d(?:\.\d+)?)",
+        r"P(?:(\d+)D)?T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?",
+    )
+)
+"""Patterns for days, hours, minutes and seconds: of a clock, and in ISO's notation."""
+DAY_S: Final = 86400.0
+SEGMENTS: Final = "Sports2D (angles)"
+SEGMENT_NAMES: Final = frozenset({"right thigh", "left thigh"})
+"""Names of segments, in a table of angles that Sports2D wrote."""
 NO_FILE: Final = "there is no such file"
 LONGEST_PATH: Final = 200  # characters of a path that messages show
 HEADER_LINES: Final = 60
@@ -75,7 +90,6 @@ PROGRAMS: Final = {
         "Qualisys Track Manager without column headers or time",
         "Export it with column headers and time, or export the markers as .c3d.",
     ),
-    re.compile(r"scorer,"): ("DeepLabCut, which counts frames", ONE_TABLE),
     re.compile(r"mass[ _]\w+\W+mass[ _]\w+[^\n]*\n"): ("Tracker with several tracks", TRACKS),
     re.compile(r"mass[ _]\w+\W*\n#?t\Wx\Wy"): ("Tracker with a single point", ONE_TABLE),
 }
@@ -107,6 +121,7 @@ class Recording:
     # reason by column why it cannot be used, such as a cell with text
     problems: dict[str, str] = field(default_factory=dict)
     unseen: dict[str, str] = field(default_factory=dict)  # by column of a marker, what is taken for a gap, and where
+    levelled_by: str = ""  # program that turns angles until the floor is level
 
     @property
     def time_name(self) -> str | None:
@@ -171,12 +186,34 @@ def read_delimited(path: Path) -> Recording:
     for beginning, (program, advice) in PROGRAMS.items():
         if beginning.match(text):
             raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
-    lines = without_blanks(text.splitlines())
+    lines = with_one_header(without_blanks(text.splitlines()))
     delimiter, header, unit_row, first = header_of(path, lines)
     names, units = names_and_units(header)
     names = [name or f"column {number}" for number, name in enumerate(names, 1)]
     stated = {name: of_row or unit for name, of_row, unit in zip(names, unit_row, units, strict=True) if of_row or unit}
+    if (numbers := plain_numbers(lines[first - 1 :], delimiter, len(names))) is not None:
+        return build_recording(path, names, numbers, stated, {})
     return table_of(path, names, (row for row in rows_of(lines, delimiter) if row[0] >= first), stated)
+
+
+def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | None:
+    """Return the columns (count, samples) of a table whose cells are all plain numbers; None for another table."""
+    try:
+        values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return np.ascontiguousarray(values.T) if values.shape[1] == count else None
+
+
+def with_one_header(lines: list[str]) -> list[str]:
+    """Return the lines of a table of DeepLabCut with one row of names, such as hip.x, instead of three or four."""
+    rows = list(csv.reader(lines[:4]))
+    coords = next((number for number, row in enumerate(rows) if row[:1] == ["coords"]), 0)
+    if not coords or rows[0][:1] != ["scorer"]:
+        return lines
+    names = [".".join(parts) for parts in zip(*(row[1:] for row in rows[1 : coords + 1]), strict=False)]
+    # blank lines keep the numbers of the others
+    return [*[""] * coords, ",".join(["frame", *(f'"{name}"' for name in names)]), *lines[coords + 1 :]]
 
 
 def without_blanks(lines: list[str]) -> list[str]:
@@ -306,9 +343,42 @@ def table_of(
     def has_points() -> bool:
         return any("." in cell and is_number(cell) for cells in table for cell in cells)
 
-    parsed = [parse_column(column, numbers, has_points) for column in zip(*table, strict=True)]
+    columns = list(zip(*table, strict=True))
+    clocks = {
+        name: times for name, cells in zip(names, columns, strict=False) if (times := clock_times(cells)) is not None
+    }
+    parsed = [
+        (clocks[name], "") if name in clocks else parse_column(column, numbers, has_points)
+        for name, column in zip(names, columns, strict=False)
+    ]
     values, problems = zip(*parsed, strict=True) if parsed else ([np.zeros(0)] * len(names), ())
-    return build_recording(path, names, values, units, kind_units, problems)
+    return build_recording(path, names, values, {**units, **dict.fromkeys(clocks, "s")}, kind_units, problems)
+
+
+def clock_times(cells: Sequence[str]) -> Array | None:
+    """Return the seconds of clock times, dates with times or durations; None for a column of other cells.
+
+    Times of day go on after midnight.
+    """
+    if not cells or not (":" in cells[0] or cells[0].startswith("P")):
+        return None
+    times = np.array([seconds_of(cell) for cell in cells])
+    if not np.isfinite(times).all():
+        return None
+    return np.asarray(times + DAY_S * np.cumsum(np.diff(times, prepend=times[:1]) < -0.5 * DAY_S))
+
+
+def seconds_of(cell: str) -> float:
+    """Return a duration, the seconds since midnight or, with a date, since 1970; nan for a cell of another kind."""
+    for pattern in CLOCKS:
+        if match := pattern.fullmatch(cell.replace(",", ".")):
+            days, hours, minutes, seconds = (float(part or 0.0) for part in match.groups())
+            return days * DAY_S + 3600.0 * hours + 60.0 * minutes + seconds
+    try:
+        date = datetime.fromisoformat(cell)
+    except ValueError:
+        return math.nan
+    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
 def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callable[[], bool]) -> tuple[Array, str]:
@@ -427,7 +497,8 @@ def read_opensim(path: Path) -> Recording:
     if "\t" not in lines[start]:
         rows = ((number, " ".join(cells).split()) for number, cells in rows)
     units = {"length": "m", "time": "s", "angle": angle_unit(path, settings)}
-    return table_of(path, names, rows, {}, {kind: unit for kind, unit in units.items() if unit})
+    table = table_of(path, names, rows, {}, {kind: unit for kind, unit in units.items() if unit})
+    return replace(table, levelled_by=SEGMENTS if table.columns.keys() >= SEGMENT_NAMES else "")
 
 
 def angle_unit(path: Path, settings: Mapping[str, str]) -> str:
@@ -473,8 +544,12 @@ def read_markers(path: Path) -> Recording:
     names = [*labels[:2], *coordinates(markers), *[""] * (3 * (count - len(markers)))]
     # writers leave out the tabs behind the last marker that is seen
     padded = ((number, cells + [""] * (len(names) - len(cells))) for number, cells in rows)
-    units = {"time": "s", **({"length": settings["Units"]} if settings.get("Units") else {})}
-    return table_of(path, names, padded, {}, units)
+    unit = settings.get("Units")
+    by_sports2d = "Sports2D" in lines[0]
+    # its files in pixels say metres, too
+    in_pixels = by_sports2d and "_px" in lines[0]
+    table = table_of(path, names, padded, {}, {"time": "s", **({"length": unit} if unit and not in_pixels else {})})
+    return replace(table, levelled_by="Sports2D" if by_sports2d and not in_pixels else "")
 
 
 def coordinates(markers: Iterable[str]) -> list[str]:

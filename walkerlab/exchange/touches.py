@@ -9,7 +9,7 @@ the angles around the fit gives the standard error of that time.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -39,6 +39,7 @@ JUMP_ERRORS: Final = 4.5  # standard errors beyond which rates jump elsewhere, o
 MOST_JUMPS: Final = 20  # number of heel strikes at which jumps are sought
 SHIFTS: Final = 61
 SIDES: Final = 2
+LOPSIDED: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
 SMALLEST: Final = 1e-30  # rad^2, added to sums of squares, of which logarithms are taken
 
 
@@ -141,14 +142,14 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     for iteration in range(ITERATIONS):
         # The best degree shows only once the polynomials meet near the strike.
         degree = best_degree(t, y, at) if iteration < SETTLED else degree
-        fit = fit_of_degree(t, y, at, degree)
+        fit = fit_at(t, y, at, degree)
         touch = touch_of(fit, height, near + at, leg) if fit else None
         if touch is None or touch.fall_m_s <= 0.0:
             return None
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
         correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
         if iteration >= SETTLED and abs(correction) < CLOSE * touch.error_s:
-            return touch
+            return touch_of(with_bias(touch.fit, t, y, at, degree), height, near + at, leg)
         at += correction
     # With much noise the samples that change sides keep moving the zero.
     return touch if touch and abs(correction) < touch.error_s else None
@@ -178,9 +179,27 @@ def best_degree(t: Array, y: Array, at: float) -> int:
     return min(fits, key=lambda degree: fits[degree].criterion, default=DEGREES[0])
 
 
+def fit_at(t: Array, y: Array, at: float, degree: int) -> Fit | None:
+    """Fit polynomials of a degree, or of one more on a single side, where an instant is at the end of the samples."""
+    fit = fit_of_degree(t, y, at, degree)
+    return fit if fit and len(fit.rates) == SIDES else fit_of_degree(t, y, at, degree + 1) or fit
+
+
+def with_bias(fit: Fit, t: Array, y: Array, at: float, degree: int) -> Fit:
+    """Return a fit whose error includes what one degree more changes: the best degree balances bias and scatter."""
+    narrow, wide = (fit_of_degree(t, y, at, each) for each in (degree, degree + 1))
+    change = float(np.linalg.norm(wide.angle - narrow.angle)) if narrow and wide else 0.0
+    return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
+
+
 def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
-    """Fit polynomials that meet at an instant, without a side that has too few samples; None if both have."""
-    sides = {name: side for name, side in {"before": t < at, "after": t >= at}.items() if np.sum(side) > degree}
+    """Fit polynomials that meet at an instant, without a side that has too few samples; None if both have.
+
+    Few samples on a side, as where a recording begins just before a strike, would bend the other side to a low degree.
+    """
+    both = {"before": t < at, "after": t >= at}
+    fewest = max(degree + 1, LOPSIDED * max(int(np.sum(side)) for side in both.values()))
+    sides = {name: side for name, side in both.items() if np.sum(side) >= fewest}
     if not sides:
         return None
     used, scale = np.any(list(sides.values()), axis=0), float(np.ptp(t))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import RecordedWalk
+from walkerlab.exchange.columns import HIP_OF_LINES, RecordedWalk
 from walkerlab.exchange.leg_angles import legs
 from walkerlab.exchange.marker_lines import NAMED
-from walkerlab.exchange.rate_jumps import Array, noise_of, typical_interval
+from walkerlab.exchange.rate_jumps import Array, noise_of, sums_at_jumps, typical_interval
 from walkerlab.exchange.smooth_course import FAR_PERCENT
 from walkerlab.exchange.touches import ERRORS, Height, Touch, angles_at_jumps, find_touches
+from walkerlab.physics.hybrid.rigid_measures import energies
 from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     STRAIGHT,
@@ -45,6 +46,11 @@ LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angl
 FEWEST_ALTERNATING: Final = 2  # fewest heel strikes of each leg that show whether lengths alternate
 ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
 SIDE_ERRORS: Final = 6.0  # standard errors beyond which one leg's rates jump elsewhere, with half of the strikes
+BESIDE_RAD: Final = 0.03  # distance of the sum of angles from which a tilt is sought to the likely one
+SAME_WAY: Final = 0.03  # largest relative difference between the way over a belt and that of the legs
+FAR_CLOCK: Final = 1.15  # smallest factor between a clock and that of the swinging legs that is named
+TURN_RAD: Final = 1e-3  # turn with which the direction of gravity is differentiated
+LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
 COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
 CONSTANT: Final = 0.25  # largest scatter of a constant error over a step, as a fraction of it
@@ -60,6 +66,7 @@ class RecordedSteps:
     angle_rad: Array  # (samples, 2)
     velocity_rad_s: Array  # (samples, 2)
     touch_time_s: Array  # (steps,) ends of the steps
+    touch_error_s: Array  # (steps + 1,) standard errors of the heel strikes, the first one included
     length_m: Array  # (steps,)
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
@@ -87,7 +94,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         return np.asarray(2.0 * model.leg_length * np.sin(half) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
 
     touches = find_touches(walk.time_s, angle, height)
-    refuse_gaps(walk.time_s, [touch.time_s for touch in touches], source)
+    refuse_gaps(walk, [touch.time_s for touch in touches], source)
     touches, doubts = longest_walk(touches)
     if len(touches) < 2:
         raise ConfigError(
@@ -100,14 +107,82 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_duration(step_s, source)
     refuse_hurry(step_s, model, source)
     refuse_spread(walk, touches, source)
-    doubts += [
-        *unit_doubts(touches),
-        *knee_doubts(walk, touches, model),
-        *offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height),
-    ]
+    offsets = offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height)
+    doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
     steps = divided(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    return steps
+    # energy jumps at heel strikes, so that the clock shows only if these are certain
+    return with_belt(walk, steps if offsets else with_clock_doubt(steps, model))
+
+
+def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
+    """Return by how much (rad) the direction that angles are from leans off the vertical, its top forwards.
+
+    Rates of legs jump at heel strikes, where both feet are on the floor.
+    """
+    angle = legs(walk)
+
+    def total(angles: Array) -> Array:
+        return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
+
+    sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
+
+    def height(angles: Array) -> Array:
+        # beside the likely sum, because a small shift would be within its error
+        return np.asarray((total(angles) - sum_rad - BESIDE_RAD) * (angles[:, 0] - angles[:, 1]))
+
+    touches = find_touches(walk.time_s, angle, height)
+    period = typical_interval([touch.time_s for touch in touches], walk.time_s)
+    jumps = angles_at_jumps(walk.time_s, angle, touches, period)
+    return 0.5 * (float(np.mean(total(jumps[1]))) if jumps else sum_rad)
+
+
+def with_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
+    """Return steps whose lengths add up to the way over a treadmill's belt, if there is one."""
+    if not walk.belt_m_s:
+        return steps
+    way = walk.belt_m_s * float(steps.touch_time_s[-1])
+    if walk.hip_is_in_m:
+        ends = steps.origin_s + np.array([0.0, steps.touch_time_s[-1]])
+        way += float(np.diff(np.interp(ends, walk.time_s, walk.quantities[HIP_OF_LINES]))[0])
+    share = way / float(steps.length_m.sum())
+    doubts = steps.doubts
+    if abs(share - 1.0) > SAME_WAY:
+        doubts = (
+            *doubts,
+            f"The way over the belt is {share:.3g} times that of the legs' angles: the belt's speed, the leg's length "
+            "or the unit of time may be wrong.",
+        )
+    return replace(steps, length_m=share * steps.length_m, doubts=doubts)
+
+
+def with_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
+    """Say if the legs swing as if the clock were wrong, as in a film that is played at another speed.
+
+    Energy is constant within a step of straight legs that nothing drives. In the clock's time kinetic energy is smaller
+    by the clock rate squared, so its changes over those of potential energy show the rate. A tilt of the recording
+    turns gravity, and is fitted as well.
+    """
+    if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
+        return steps
+    order = np.where(steps.step[:, None] % 2 == 0, [0, 1], [1, 0])
+    angles, rates = (np.take_along_axis(each, order, axis=1) for each in (steps.angle_rad, steps.velocity_rad_s))
+    energy, ahead, behind = (
+        energies(model, np.concatenate((angles + turn, rates), axis=1)) for turn in (0.0, TURN_RAD, -TURN_RAD)
+    )
+    turning = (ahead[:, 1] - behind[:, 1]) / (2.0 * TURN_RAD)
+    columns = np.column_stack((energy, turning))
+    for number in range(int(steps.step[-1]) + 1):
+        columns[steps.step == number] -= np.mean(columns[steps.step == number], axis=0)
+    gravity = math.hypot(*np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0].tolist())
+    rate = gravity**-0.5 if gravity else 1.0
+    if 1.0 / FAR_CLOCK < rate < FAR_CLOCK:
+        return steps
+    doubt = (
+        f"The legs of this walker would swing {rate:.2g} times as fast as the recording's: a film of another frame "
+        "rate (--fps), another unit of time, or another walker."
+    )
+    return replace(steps, doubts=(*steps.doubts, doubt))
 
 
 def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
@@ -288,15 +363,16 @@ def refuse_lengths(steps: RecordedSteps, source: str) -> None:
             )
 
 
-def refuse_gaps(time: Array, touches: list[float], source: str) -> None:
+def refuse_gaps(walk: RecordedWalk, touches: list[float], source: str) -> None:
     """Raise ConfigError for a step whose samples are too far apart to determine its heel strikes and velocities."""
     for number, (begin, end) in enumerate(pairwise(touches), 1):
-        first, last = longest_gap(time, begin, end)
+        first, last = longest_gap(walk.time_s, begin, end)
         if last - first > LONGEST_GAP * (end - begin):
             raise ConfigError(
                 f"{source}: step {number} has no sample from time {first:.6g} to {last:.6g} s, "
-                f"{(last - first) / (end - begin):.0%} of its duration.",
-                f"Record at least {1 / LONGEST_GAP:.0f} samples per step, or cut the recording to a part without gaps.",
+                f"{(last - first) / (end - begin):.0%} of its duration.{f' {walk.gaps}.' if walk.gaps else ''}",
+                f"Record at least {1 / LONGEST_GAP:.0f} samples per step, or read a part without gaps (--from-s, "
+                "--to-s).",
             )
 
 
@@ -328,7 +404,10 @@ def divided(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts:
     times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     lengths = lengths_of(model, angles_rad, step, len(times))
     scatter = float(np.median([touch.fit.scatter for touch in touches[1:]]))
-    return RecordedSteps(times_s, step, angles_rad, velocities_rad_s, times, lengths, scatter, swapped, origin, doubts)
+    errors = np.array([touch.error_s for touch in touches])
+    return RecordedSteps(
+        times_s, step, angles_rad, velocities_rad_s, times, errors, lengths, scatter, swapped, origin, doubts
+    )
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:

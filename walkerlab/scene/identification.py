@@ -191,7 +191,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family)
     directions = felt_directions(walks, subject.z, family.start)
-    forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.nuisance)
+    forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.sensors)
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
     priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
@@ -255,7 +255,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         step_tables(steps),
         best,
         walk.walk,
-        nuisances_with_errors(best, question.nuisance),
+        nuisances_with_errors(best, question.sensors),
         tuple(sensitivities(fixed, best, estimates, subject.config)),
         measure_radius(steps, gait["spectral_radius"].value) if gait else None,
     )

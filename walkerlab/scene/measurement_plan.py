@@ -125,7 +125,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
     """
     problem = problem_of(subject, measured, question)
     if measured.sampled:
-        nuisances = tuple(dict.fromkeys((*question.nuisance, DELAY)))
+        nuisances = tuple(dict.fromkeys((*question.sensors, DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast
     data = linearise(problem, problem.first(), np.zeros(forecast.heights), exact=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension, Study, lazy_function
-from walkerlab.pipeline.plan.stage import DRAWINGS, Option, Stage, results_of, walks_and
+from walkerlab.pipeline.plan.stage import DRAWINGS, Option, Stage, recording_options, results_of, walks_and
 
 WITH = ("--with",)
 STAGES = (
@@ -14,9 +14,7 @@ STAGES = (
         walks_and(), requires=("contact",), needed_by=DRAWINGS,
         options=(
             Option("--with", "recording.file", "FILE", "Also compare a walk from a file, such as CSV.", "text"),
-            Option("--columns", "recording.columns", "QUANTITY=COLUMN,...", "Columns of that file.", "pairs", WITH),
-            Option("--units", "recording.units", "KIND=UNIT,...", "Units that the file lacks.", "units", WITH),
-            Option("--walks", "recording.walks", "left|right|away|towards", "Direction of markers.", needs=WITH),
+            *recording_options("recording", *WITH),
         ),
     ),
     Stage(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from walkerlab.config import reads
@@ -85,6 +85,22 @@ class Option:
 
 
 STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is two steps.", "int")
+
+
+def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
+    """Return the options that say what a recorded file does not, as keys of a block; each needs some flags."""
+    options = (
+        Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
+        Option("--units", "units", "KIND=UNIT,...", "Units that the file lacks.", "units"),
+        Option("--walks", "walks", "left|right|away|towards", "Direction of the walk in the picture."),
+        Option("--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line that angles are from."),
+        Option("--belt-speed", "belt_speed_m_s", "M/S", "Speed of a treadmill's belt.", "float"),
+        Option("--fps", "fps", "N", "Frames per second of the film.", "float"),
+        Option("--from-s", "from_s", "S", "Time at which the part to read begins.", "float"),
+        Option("--to-s", "to_s", "S", "Time at which the part to read ends.", "float"),
+        Option("--min-likelihood", "min_likelihood", "P", "Likelihood of a marker below which it is a gap.", "float"),
+    )
+    return tuple(replace(option, key=f"{block}.{option.key}", needs=needs) for option in options)
 
 
 @dataclass(frozen=True)

@@ -79,10 +79,10 @@ def refuse(config: IdentifyConfig) -> None:
             "For example --data steps.csv --fit walker.hip_mass_kg --fit slope_deg.",
         )
     refuse_model(config, block)
-    if block.nuisance and block.level == "steps":
+    if block.sensors and block.level == "steps":
         raise ConfigError(
-            f"identify.nuisance: {', '.join(block.nuisance)}: only sampled angles have these.",
-            "Leave out --nuisance, or give angles over time (--level angles).",
+            f"identify.nuisance: {', '.join(block.sensors)}: only sampled angles have these.",
+            "Leave out --nuisance and --camera-tilt free, or give angles over time (--level angles).",
             ("identify", "nuisance"),
         )
     refuse_keys(config, block)

@@ -65,9 +65,9 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
     """
     path = Path(block.data)
     if block.level == "steps":
-        yield refuse_count(path, read_steps(path, block))
+        yield refuse_count(path, read_steps(path, block, config.slope_rad))
         return
-    walk, resolution = read_angles(block)
+    walk, resolution = read_angles(block, config.slope_rad)
     problem, divided = None, False
     for touch_sum_rad in touch_sums(walk, block, config):
         try:
@@ -83,7 +83,7 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
 
 def doubts_about(block: Identify, config: RigidConfig) -> tuple[str, ...]:
     """Return sentences about what is odd in the block's angles, and what was done about it."""
-    walk, _ = read_angles(block)
+    walk, _ = read_angles(block, config.slope_rad)
     try:
         return (*walk.doubts, *divide_into_steps(walk, rigid_walker(config), block.data).doubts)
     except ConfigError:
@@ -102,7 +102,7 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
     """Yield possible sums (rad) of the leg angles at heel strike, measured from the slope's normal: 0, then others."""
     yield 0.0
     angles = walk.both_legs("angle")
-    if angles is None or not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.nuisance):
+    if angles is None or not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return
     model = rigid_walker(config)
     sums = sums_at_jumps(walk.time_s, angles, lambda angles: np.asarray(feet_on_slope(model, *angles.T)))
@@ -111,17 +111,23 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
 
 def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredWalk:
     """Divide the angles in the block's file into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
-    walk, resolution = read_angles(block)
+    walk, resolution = read_angles(block, config.slope_rad)
     return divide_angles(walk, config, block.data, touch_sum_rad, resolution)
 
 
-def read_angles(block: Identify) -> tuple[RecordedWalk, float]:
+def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]:
     """Read the recording in the block's file; return it with the smallest decimal place of its angles (rad).
 
     That is 0 for angles that are computed from markers.
     """
     recording = read_recording(Path(block.data), DATA_KEY)
-    walk = mend_angles(as_walk(recording, block.columns, block.units, block.walks or ""), block.data)
+    if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:
+        raise ConfigError(
+            f"{block.data} is of {recording.levelled_by}, which levels the floor: the slope turns the angles.",
+            "State --camera-tilt floor, or --camera-tilt 0 if its floor_angle was 0.",
+            ("identify", "camera_tilt_deg"),
+        )
+    walk = mend_angles(as_walk(recording, block, slope_rad), block.data)
     source = walk.sources["angle 1"]
     written = recording.columns.get(source)
     if written is None:
@@ -154,10 +160,17 @@ def divide_angles(
     return replace(measured, resolution={LEG_ANGLE: resolution})
 
 
-def read_steps(path: Path, block: Identify) -> MeasuredWalk:
+def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
     """Read a table with one row per step: `period_s` and, if measured, `length_m` and `touch_angle_rad`."""
     table = read_file(path, read_delimited, DATA_KEY)
     refuse_units(table, block.units, STEP_KINDS)
+    for key in ("fps", "from_s", "to_s", "min_likelihood", "walks"):
+        if getattr(block, key) is not None:
+            raise ConfigError(
+                f"identify.{key}: a table of steps has no samples.",
+                f"Leave out {key}, or give angles (--level angles).",
+                ("identify", key),
+            )
     for name in block.columns.keys() - STEP_KINDS.keys():
         raise ConfigError(f"--columns: {name!r} is not a quantity of a step.", f"Choose from {', '.join(STEP_KINDS)}.")
     columns = {name: column for name in STEP_KINDS if (column := read_column(table, name, block)) is not None}
@@ -171,6 +184,11 @@ def read_steps(path: Path, block: Identify) -> MeasuredWalk:
     period = values["period_s"]
     if period.size < MIN_STEPS:
         raise ConfigError(f"{path} has {period.size} step; at least {MIN_STEPS} are needed.", "Measure more steps.")
+    if block.belt_speed_m_s and "length_m" not in values:
+        values["length_m"] = block.belt_speed_m_s * period
+    if "touch_angle_rad" in values:
+        tilt = slope_rad if block.camera_tilt_deg == "floor" else math.radians(float(block.camera_tilt_deg or 0.0))
+        values["touch_angle_rad"] = values["touch_angle_rad"] - tilt
     quantities = dict(zip(STEP_KINDS, (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE), strict=True))
     resolution = {quantities[name]: smallest for name, (_, smallest) in columns.items()}
     return MeasuredWalk(period, values.get("length_m"), values.get("touch_angle_rad"), resolution=resolution)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,9 @@ from walkerlab.exchange.columns import OF_LEG, OF_WALKER, RecordedWalk, as_walk
 from walkerlab.exchange.leg_angles import mend_angles
 from walkerlab.exchange.rate_jumps import noise_of
 from walkerlab.exchange.recording import NO_FILE, TIME, Recording, read_file, read_recording
-from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps
+from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps, find_tilt
 from walkerlab.outcome import Outcome
+from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import OVER_TIME, legs, over_time, step_columns
 from walkerlab.pipeline.store import artifact
@@ -43,7 +45,9 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     block = config.recording
     assert block is not None, "the stage requires the block"
     progress.start("recorded-walk", 1)
-    walk = read_walk(block)
+    walk = read_walk(block, config.slope_rad)
+    if block.camera_tilt_deg == "free":
+        walk = with_found_tilt(walk, rigid_walker(config))
     doubts = list(doubts_about(walk))
     # before the division into steps, which noise may make fail
     for doubt in doubts:
@@ -53,6 +57,14 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
         progress.note(doubt)
     progress.advance()
     return content_of(block, config, walk, steps, [*doubts, *steps.doubts])
+
+
+def with_found_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
+    """Return a walk whose angles are from the vertical, by the tilt at which rates of legs jump at heel strikes."""
+    tilt = find_tilt(walk, model)
+    upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
+    doubt = f"The camera's tilt is {math.degrees(tilt):.2f} degrees, found where the rates of the legs jump."
+    return replace(walk, quantities={**walk.quantities, **upright}, doubts=(*walk.doubts, doubt))
 
 
 def doubts_about(walk: RecordedWalk) -> Iterator[str]:
@@ -70,14 +82,14 @@ def doubts_about(walk: RecordedWalk) -> Iterator[str]:
         yield f"Not used: {name}: {reason.removesuffix('.')}."
 
 
-def read_walk(block: RecordedFile) -> RecordedWalk:
+def read_walk(block: RecordedFile, slope_rad: float) -> RecordedWalk:
     """Read the quantities of a recorded walk in SI units; raises ConfigError for a file that cannot be read."""
     if not block.file:
         raise ConfigError("recording.file: the recording has no file.", "Name one: --with FILE.", ("recording", "file"))
     path = Path(block.file)
     key = "recording", "file"
     recording = read_file(path, read_artifact, key) if path.suffix.lower() == ".h5" else read_recording(path, key)
-    return mend_angles(as_walk(recording, block.columns, block.units, block.walks or ""), block.file)
+    return mend_angles(as_walk(recording, block, slope_rad), block.file)
 
 
 def read_artifact(path: Path) -> Recording:
@@ -125,6 +137,7 @@ def content_of(
         "step_periods_s": periods.tolist(),
         "step_lengths_m": steps.length_m.tolist(),
         "touch_times_s": steps.touch_time_s.tolist(),
+        "touch_errors_s": steps.touch_error_s.tolist(),
         "end_time_s": float(steps.time_s[-1]),
         "speed_m_s": speed,
         "froude": speed / math.sqrt(config.gravity_m_s2 * config.walker.leg_length_m),

@@ -18,6 +18,7 @@ from walkerlab.pipeline.plan.stage import (
     dependency,
     gait_for_start_or_pads,
     gait_unless_start_is_given,
+    recording_options,
     results_of,
 )
 from walkerlab.scene.omissions import contact_walk_omissions, rigid_walk_omissions
@@ -111,9 +112,7 @@ QUESTIONS = (
             Option("--level", "identify.level", "steps|angles", "Kind of data."),
             Option("--loss", "identify.loss", "linear|soft_l1", "soft_l1 for data with outliers."),
             Option("--robustness", "identify.robustness", "", "Report the gait's sensitivity too.", "switch"),
-            Option("--columns", "identify.columns", "QUANTITY=COLUMN,...", "Columns of the file.", "pairs"),
-            Option("--units", "identify.units", "KIND=UNIT,...", "Units that the file lacks.", "units"),
-            Option("--walks", "identify.walks", "left|right|away|towards", "Direction of markers."),
+            *recording_options("identify"),
             Option("--plan", "", "", "Without data: predict the errors of each way to measure.", "switch", runs="plan"),
             replace(ERRORS_TO_REACH, needs=("--plan",)),
         ),

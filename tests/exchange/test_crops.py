@@ -1,0 +1,31 @@
+"""Heel strikes of recordings that are cut anywhere, within stated errors: a sample of scripts/crop_campaign.py."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+
+PLACE = Path(__file__).resolve().parents[2] / "scripts" / "crop_campaign.py"
+
+
+def campaign():
+    spec = importlib.util.spec_from_file_location("crop_campaign", PLACE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_no_strike_of_a_cropped_recording_is_missed_invented_or_far_off(tmp_path):
+    crops = campaign()
+    rng = np.random.default_rng(3)
+    counts = [crops.count_strikes(crops.draw(rng), rng, tmp_path) for _ in range(25)]
+    assert [(each.missed, each.invented, each.problem) for each in counts] == [(0, 0, "")] * 25
+    assert max(error for each in counts for error in each.errors) < 5.0
+
+
+def test_a_strike_just_behind_the_beginning_has_an_error_that_holds(tmp_path):
+    """Few samples before the strike bent the fit of those behind it."""
+    crops = campaign()
+    for crop in (crops.Crop(1.39467, 4.218, 240.0, 1.75e-3, -1.0), crops.Crop(0.69340, 3.98, 25.0, 1.75e-4, -1.0)):
+        counts = [crops.count_strikes(crop, np.random.default_rng(seed), tmp_path) for seed in range(6)]
+        assert max(each.errors[0] for each in counts) < 5.0
