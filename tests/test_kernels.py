@@ -181,7 +181,7 @@ def scratch_beside_scratch(like, out):
 
 @pytest.mark.parametrize("like", [(0.0, 0.0, 0.0), np.rec.array([((1.0, 2.0, 3.0),)], dtype=[("n", "f8", (3,))])[0]])
 def test_scratch_arrays_have_the_length_of_their_type_and_are_not_shared(like):
-    """If a new numba breaks this, what kernels compute is wrong: see `_on_the_stack`."""
+    """If a new numba breaks this, what kernels compute is wrong: see `_stack_memory`."""
     function = scratch_beside_scratch if isinstance(like, tuple) else scratch_like_a_field
     for run in (function, uncompiled(function)):
         out = np.zeros(3)

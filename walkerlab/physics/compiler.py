@@ -40,7 +40,7 @@ files_in_use: set[str] = set()
 
 
 def layout_symbol(record: Any) -> tuple[str, tuple[str, ...]]:
-    """Return the name of a record type in the symbols of machine code; it is the same in every process."""
+    """Return the name of a record type in the symbols of machine code. It is the same in every process."""
     # Numba uses a counter instead. Two processes can then give the same symbol to code compiled for different records,
     # and a third process that loads both would run the wrong code.
     return "Record", (hashlib.sha256(record.name.encode()).hexdigest()[:16],)
@@ -55,7 +55,7 @@ Record.mangling_args = property(layout_symbol)  # type: ignore[method-assign, as
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """Compiled function that Python calls, with its machine code in files; it is also its own cache, as numba calls it.
+    """Compiled function that Python calls, with its machine code in files. It is also its own cache, as numba calls it.
 
     Compiled code that calls it compiles it once more, as its own part: stored machine code cannot be linked.
     """
@@ -71,7 +71,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         return self.part.get_overload(sig)
 
     def compile(self, sig: Any) -> Any:
-        """Return the entry point for these argument types; processes that compile the same code wait for each other."""
+        """Return the entry point for these argument types. Processes that compile the same code wait for each other."""
         self._cache = self
         name = self.file_name(sig)
         vectorize = numba.config.LOOP_VECTORIZE
@@ -100,11 +100,11 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         """Store compiled code, unless it contains addresses of this process."""
         if not code.library.has_dynamic_globals:
             name = self.file_name(signature)
-            write_file(cache_folder() / name, packed(code._reduce()))
+            write_file(cache_folder() / name, pack(code._reduce()))
             files_in_use.add(name)
 
     def file_name(self, signature: Any) -> str:
-        """Return the file name for some argument types; it depends on all code outside the sources of kernels."""
+        """Return the file name for some argument types. It depends on all code outside the sources of kernels."""
         function = self.py_func
         place = f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
         cells = dumps([cell.cell_contents for cell in function.__closure__]) if function.__closure__ else b""
@@ -114,14 +114,16 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         return f"{function.__name__}-{identity[:24]}.kernel"
 
 
-def packed(payload: Any) -> bytes:
+def pack(payload: Any) -> bytes:
     """Convert a kernel's code to the content of a file."""
     data: bytes = dumps(payload)
     return hashlib.sha256(data).digest() + data
 
 
 def read_code(path: Path) -> Any:
-    """Read a kernel's code; None if the file is damaged, unreadable or deleted, or needs classes that are gone."""
+    """Read a kernel's code, or return None if the file is damaged, unreadable or deleted, or needs classes that are
+    gone.
+    """
     try:
         content = path.read_bytes()
         if hashlib.sha256(content[CHECKSUM_BYTES:]).digest() == content[:CHECKSUM_BYTES]:
@@ -132,12 +134,12 @@ def read_code(path: Path) -> Any:
 
 
 def stripped(path: Path) -> bytes:
-    """Return a file's content with only symbol names of its LLVM bitcode, most of the file; linking needs the rest."""
+    """Return a file's content with only symbol names of its LLVM bitcode, most of the file. Linking needs the rest."""
     (name, kind, (machine_code, bitcode)), *rest = read_code(path)
     module = binding.parse_bitcode(bitcode)
     names = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
     symbols = "\n".join(f'@"{each}" = global i8 0' for each in names)
-    return packed(((name, kind, (machine_code, binding.parse_assembly(symbols).as_bitcode())), *rest))
+    return pack(((name, kind, (machine_code, binding.parse_assembly(symbols).as_bitcode())), *rest))
 
 
 def classes_in(kind: Any) -> Iterator[type]:
@@ -177,7 +179,7 @@ class _WithoutEnvironment:
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Code of a kernel part; it is linked into kernels, and becomes machine code only together with them."""
+    """Code of a kernel part. It is linked into kernels, and becomes machine code only together with them."""
 
     # Numba itself also optimises and emits every part separately, which takes a third of the compile time.
 

@@ -20,24 +20,31 @@ class Loss(NamedTuple):
 
 LOSSES = (
     Loss(
-        "damping",
-        "in the ground's damping",
-        "dissipated_damping_J",
-        "cumulative loss in the ground's damping",
-        "damping of the ground",
-        "#0072B2",
+        key="damping",
+        where="in the ground's damping",
+        variable="dissipated_damping_J",
+        meaning="cumulative loss in the ground's damping",
+        cause="damping of the ground",
+        colour="#0072B2",
     ),
-    Loss("friction", "in friction", "dissipated_friction_J", "cumulative loss in friction", "friction", "#E69F00"),
     Loss(
-        "edges",
-        "at pads' edges",
-        "lost_at_edges_J",
-        "cumulative loss of elastic energy at pads' edges",
-        "edges of pads",
-        "#009E73",
+        key="friction",
+        where="in friction",
+        variable="dissipated_friction_J",
+        meaning="cumulative loss in friction",
+        cause="friction",
+        colour="#E69F00",
     ),
-    Loss("knee_strikes", "in knee strikes", "", "", "knees", "#CC79A7"),
-    Loss("knee_stop", "in the knees' stops", "", "", "knees", "#CC79A7"),
+    Loss(
+        key="edges",
+        where="at pads' edges",
+        variable="lost_at_edges_J",
+        meaning="cumulative loss of elastic energy at pads' edges",
+        cause="edges of pads",
+        colour="#009E73",
+    ),
+    Loss(key="knee_strikes", where="in knee strikes", variable="", meaning="", cause="knees", colour="#CC79A7"),
+    Loss(key="knee_stop", where="in the knees' stops", variable="", meaning="", cause="knees", colour="#CC79A7"),
 )
 """Losses, in the order of the account."""
 SAMPLED = {place: loss for place, loss in enumerate(LOSSES) if loss.variable}

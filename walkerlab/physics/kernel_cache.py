@@ -114,7 +114,7 @@ def circumstances() -> dict[str, str]:
 
 @functools.cache
 def why_not_built() -> str:
-    """Return why the package's machine code cannot be used here; an empty text if it can."""
+    """Return why the package's machine code cannot be used here, or '' if it can."""
     try:
         built = json.loads((BUILT / ABOUT).read_text())
     except (OSError, ValueError):
@@ -172,7 +172,7 @@ def _first_usable(candidates: tuple[Path, ...]) -> Path:
 
 
 def _refusal(root: Path) -> str:
-    """Return why compiled code cannot be kept in a folder, which is created if necessary; empty if it can."""
+    """Return why compiled code cannot be kept in a folder, which is created if necessary, or '' if it can."""
     try:
         make_private_folder(root)
         folder = root.resolve()
@@ -210,7 +210,9 @@ def cache_folder() -> Path:
 
 
 def _closed_to_others(folder: Path) -> Path:
-    """Close a folder to other users and delete code that they may have written; return it, or if that fails another."""
+    """Close a folder to other users and delete code that they may have written, and return it, or another
+    if that fails.
+    """
     try:
         deleted = make_private(folder)
     except OSError as error:
@@ -225,7 +227,7 @@ def _closed_to_others(folder: Path) -> Path:
 
 
 def _remove_unused(generations: list[Path]) -> None:
-    """Delete folders unused for a long time, except the latest few; a process that still uses one compiles again."""
+    """Delete folders unused for a long time, except the latest few. A process that still uses one compiles again."""
     last_used: dict[Path, float] = {}  # s since the epoch
     for folder in generations:
         with contextlib.suppress(OSError):  # another process may have deleted it

@@ -31,7 +31,7 @@ C = TypeVar("C", bound=type)
 
 
 def kernel(function: F) -> F:
-    """Compile `function` on its first call and keep the machine code on disk; in kernels it is a `kernel_part`."""
+    """Compile `function` on its first call and keep the machine code on disk. In kernels it is a `kernel_part`."""
     if numba.config.DISABLE_JIT:
         return function
     return cast(F, Kernel(function, targetoptions={"nopython": True, **FLAGS}))
@@ -50,7 +50,7 @@ def forced_inline(function: F) -> F:
 
 
 def compile_as(function: Any, body_for: Callable[..., tuple[Callable[..., Any], dict[str, Any]]]) -> None:
-    """Let compiled calls of `function` use a body chosen from the argument types; each body is compiled once."""
+    """Let compiled calls of `function` use a body chosen from the argument types. Each body is compiled once."""
     # `body_for` receives numba's types of the arguments, and returns the body and its compiler flags
     parts: dict[Any, Any] = {}
     compiled: dict[Any, Any] = {}
@@ -95,7 +95,7 @@ class ByType:
         return chosen in self._bodies
 
     def case(self, chosen: type, forced_inline: bool = False) -> Callable[[F], F]:
-        """Register a body for first arguments of type `chosen`; with `forced_inline` every caller gets a copy of it."""
+        """Register a body for first arguments of type `chosen`. With `forced_inline` every caller gets a copy of it."""
 
         def register(body: F) -> F:
             self._bodies[chosen] = body
@@ -128,7 +128,7 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
 
 
 def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
-    """Declare a function as `by_type` does; types without a registered body use the body of the declaration."""
+    """Declare a function as `by_type` does. Types without a registered body use the body of the declaration."""
     chosen = by_type(declaration)
     chosen.default = declaration
     return chosen
@@ -143,12 +143,12 @@ class ByAddress(types.Type):
 
     @property
     def mangling_args(self) -> tuple[str, tuple[()]]:
-        """Short symbol name; the full one, with all field types, would be longer than most functions."""
+        """Short symbol name, because the full one, with all field types, would be longer than most functions."""
         return f"{self.instance_class.__name__}_{hashlib.sha256(self.name.encode()).hexdigest()[:16]}", ()
 
 
 def by_reference(chosen: C) -> C:
-    """Let kernels pass a NamedTuple class by address; Python creates its values, kernels only read their fields."""
+    """Let kernels pass a NamedTuple class by address. Python creates its values, kernels only read their fields."""
     # Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
     # packing and unpacking them.
 
@@ -186,7 +186,7 @@ def _unbox_reference(kind: ByAddress, value: Any, c: Any) -> Any:
 
 
 def vector(like: Any) -> Any:
-    """Allocate scratch memory (n,) for the calling function; n is the length of `like`, a tuple or an array."""
+    """Allocate scratch memory (n,) for the calling function, where n is the length of `like`, a tuple or an array."""
     # filled with NaN in Python, so that reading an entry before writing it shows up
     return np.full(len(like), np.nan)
 
@@ -197,7 +197,7 @@ def matrix(like: Any) -> Any:
 
 
 def zeros(like: Any) -> Any:
-    """Return a tuple of len(like) zeros; compiled code without reference counts cannot return arrays."""
+    """Return a tuple of len(like) zeros. Compiled code without reference counts cannot return arrays."""
     return (0.0,) * len(like)
 
 
@@ -210,7 +210,7 @@ def _zeros(length: int) -> Callable[..., Any]:
 compile_as(zeros, lambda like: (_zeros(like.shape[0]), PART_FLAGS))
 
 
-def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
+def _stack_memory(function: Callable[..., Any], dimensions: int) -> None:
     """Make compiled calls of `function(like)` return memory in the caller's stack frame."""
     # An intrinsic called through an overload would return memory in the overload's frame.
 
@@ -244,5 +244,5 @@ def _on_the_stack(function: Callable[..., Any], dimensions: int) -> None:
     lower_builtin(function, types.Any)(generate)
 
 
-_on_the_stack(vector, 1)
-_on_the_stack(matrix, 2)
+_stack_memory(vector, 1)
+_stack_memory(matrix, 2)

@@ -62,7 +62,7 @@ def test_ball_rests_at_the_depth_of_the_law(engine):
     target = contact_target(compass())
     for contact in engine.adapter().CONTACTS:
         task = TuningTask(engine.name, contact, target, 1e-4, 1.5)
-        assert task.at_rest() == pytest.approx(target.penetration, rel=2e-3), contact
+        assert task.penetration_at_rest() == pytest.approx(target.penetration, rel=2e-3), contact
 
 
 def test_block_creeps_and_slides_according_to_the_law(engine):

@@ -11,12 +11,12 @@ from walkerlab.physics.hybrid.comparison import (
     IMPACT_PHASE,
     Motion,
     add_strike_samples,
-    between_impacts,
     difference_in_phase,
     difference_in_time,
     hausdorff,
     orbit_distances,
     phase_plane,
+    smooth_phases,
 )
 
 PERIOD, STEPS, KINK = 0.7, 6, 0.05
@@ -89,7 +89,7 @@ def test_late_heel_strike_makes_velocities_differ_by_the_jump():
 
 @pytest.mark.parametrize("step", range(STEPS))
 def test_step_begins_after_its_impact_and_ends_before_the_next(step):
-    angle, velocity = walk().during(step, np.array([0.0, 1.0]))
+    angle, velocity = walk().values_during(step, np.array([0.0, 1.0]))
     assert_allclose(angle[0], legs_at(np.array([float(step)]), 1.0)[0][0], atol=1e-12)
     assert_allclose(velocity[0], legs_at(np.array([float(step)]), 1.0)[1][0] / PERIOD, atol=1e-9)
     assert_allclose(velocity[1], legs_at(np.array([step + 1.0]), -1.0)[1][0] / PERIOD, atol=1e-9)
@@ -120,8 +120,8 @@ def rough(interval, impact):
 
 def test_touch_between_samples_is_extrapolated_from_before_the_impact():
     motion = rough(interval=0.003, impact=1e-4)
-    smeared = motion.during(0, np.array([1.0]))[1]
-    whole = add_strike_samples(motion).during(0, np.array([1.0]))[1]
+    smeared = motion.values_during(0, np.array([1.0]))[1]
+    whole = add_strike_samples(motion).values_during(0, np.array([1.0]))[1]
     assert_allclose(whole, -1.0, atol=1e-9)
     assert abs(smeared + 1.0).min() > 0.1
 
@@ -174,7 +174,7 @@ def locking(at, interval=0.003):
 def test_knee_strike_between_samples_is_not_smeared():
     motion = add_strike_samples(locking(0.5005))
     times = np.linspace(0.49, 0.51, 400)
-    angle, velocity = motion.at(times)
+    angle, velocity = motion.values_at(times)
     assert_allclose(angle[:, 0], np.abs(times - 0.5005), atol=1e-9)
     assert_allclose(velocity[:, 0], np.where(times < 0.5005, -1.0, 1.0), atol=1e-9)
 
@@ -189,7 +189,7 @@ def test_extrapolation_to_a_strike_stops_at_the_previous_one():
 def test_slightly_different_knee_lock_times_are_not_a_difference():
     one, other = (add_strike_samples(locking(at)) for at in (0.5045, 0.5155))
     apart = difference_in_phase(one, other, PHASES)
-    smooth = between_impacts(one, other, PHASES)
+    smooth = smooth_phases(one, other, PHASES)
     assert max(apart.largest("velocity")) == pytest.approx(2.0)
     assert np.abs(apart.velocity[smooth]).max() < 1e-9
     assert (~smooth).sum() == (PHASES < IMPACT_PHASE).sum() + ((PHASES >= 0.5045) & (PHASES <= 0.5155)).sum()

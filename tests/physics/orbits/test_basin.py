@@ -115,7 +115,7 @@ def test_window_lists_cell_centres_row_by_row():
     z = window.starts(np.arange(window.size))
     assert z[:, 1].tolist() == [8.0] * 8
     assert z[:, 2].tolist() == [0.25] * 4 + [0.75] * 4
-    assert z[:4, 0].tolist() == window.along(1).tolist() == [10.5, 11.5, 12.5, 13.5]
+    assert z[:4, 0].tolist() == window.cell_centres(1).tolist() == [10.5, 11.5, 12.5, 13.5]
     parts = window.starts(np.zeros(4, int), subcell_centres(2, 2))
     assert parts[:, [2, 0]].tolist() == [[0.125, 10.25], [0.125, 10.75], [0.375, 10.25], [0.375, 10.75]]
 

@@ -23,7 +23,7 @@ from walkerlab.physics.orbits.attractors import (
     standard_error,
     sweep_attractor,
 )
-from walkerlab.physics.orbits.bifurcations import GaitEquations, on_pairs
+from walkerlab.physics.orbits.bifurcations import GaitEquations, bialternate_product
 from walkerlab.physics.orbits.continuation import CurvePoint, Segment, StepControl, correct, root_along, step_along
 from walkerlab.physics.orbits.families import (
     NO_WALKER,
@@ -496,7 +496,7 @@ def test_bialternate_product_has_products_of_multipliers_as_eigenvalues():
     DP = np.random.default_rng(0).standard_normal((5, 5))
     values = np.linalg.eigvals(DP)
     products = [values[i] * values[j] for i in range(5) for j in range(i)]
-    found = np.linalg.eigvals(on_pairs(DP))
+    found = np.linalg.eigvals(bialternate_product(DP))
     assert np.max([np.min(np.abs(found - product)) for product in products]) < 1e-10
     assert np.all(np.diff(np.abs(multipliers_of(DP))) <= 1e-12)
 

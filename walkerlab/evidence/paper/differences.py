@@ -84,7 +84,7 @@ def compare_motion(
         missing = ("differences of the last stride and between the orbits", "stride")
         phases = np.linspace(0.0, 1.0, comparison.PHASES)
         aligned = comparison.difference_in_phase(contact, rigid, phases)
-        smooth = comparison.between_impacts(contact, rigid, phases)
+        smooth = comparison.smooth_phases(contact, rigid, phases)
         errors |= {"aligned": aligned, "between_impacts": select(aligned, smooth)}
         coordinates = {
             **numbered(len(aligned.angle), STEP, "step number"),

@@ -28,7 +28,7 @@ from walkerlab.physics.solvers.system import Floats
 Loss = Literal["linear", "soft_l1"]
 MAX_ROUNDS: Final = 25
 FREE_ROUNDS: Final = 10  # rounds after which noise and heights keep to the middle of two that lead to each other
-ALIKE: Final = 3.0  # largest difference of the log-likelihoods of such two
+MIN_LIKELIHOOD_GAIN: Final = 3.0  # largest difference of the log-likelihoods of such two
 SETTLED_NOISE: Final = 1e-2  # largest relative change of a settled standard deviation
 SETTLED_LIKELIHOOD: Final = 1e-2  # largest change of the restricted log-likelihood for standard deviations as likely
 SETTLED_MOVE: Final = 0.1  # largest change of a settled unknown, in standard errors
@@ -41,7 +41,7 @@ HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
 SETTLED_FIT: Final = 1e-6  # relative change of the cost, or of the unknowns, that ends a round
 SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
-INSIDE: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
+BOUND_MARGIN: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
 # prior standard deviation of each scaled unknown about its start, which keeps undetermined combinations there
 WEAK_PRIOR: Final = 1.0
 # efficiency of the soft_l1 loss for normal noise: E[psi']^2 / E[psi^2] with psi(x) = x / sqrt(1 + x^2)
@@ -124,7 +124,7 @@ class Fitted:
 
 
 def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambda: None) -> Fitted | str:
-    """Fit the unknowns from a start (unknowns,); return the reason if no walk near the start can be predicted.
+    """Fit the unknowns from a start (unknowns,), or return the reason if no walk near the start can be predicted.
 
     Each round fits the unknowns by least squares on whitened residuals, then the standard deviations.
     """
@@ -147,8 +147,8 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
             return NO_NEIGHBOURS
         rows, earlier = reduce(data), noise
         noise = estimate_noise(rows, problem.floors, problem.leg_length_m, noise)
-        if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < ALIKE:
-            noise = between(earlier, noise) if done == FREE_ROUNDS else earlier
+        if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < MIN_LIKELIHOOD_GAIN:
+            noise = halfway(earlier, noise) if done == FREE_ROUNDS else earlier
         evaluation, robust = evaluate(rows, noise), robust_at(rows, noise)
         disturbances = most_probable_disturbances(rows, noise, evaluation.move)
         likeliest = disturbances[: heights.size]
@@ -158,7 +158,7 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
         moved = float(np.max(np.abs(u - before) / errors))
-        if moved < SETTLED_MOVE and settled(rows, earlier, noise, problem.leg_length_m):
+        if moved < SETTLED_MOVE and has_settled(rows, earlier, noise, problem.leg_length_m):
             why = ""
             break
         if forecast.walks_taken > problem.max_walks:
@@ -172,7 +172,9 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
 
 
 def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
-    """Estimate the standard deviations at u (unknowns,), starting from another fit; None if a walk ends early."""
+    """Estimate the standard deviations at u (unknowns,), starting from another fit, or return None if a
+    walk ends early.
+    """
     problem, even = like.problem, np.zeros(like.forecast.heights)
     robust = robust_at(like.rows, like.noise)
     data, predicted = linearise(problem, u, even, robust=robust), problem.forecast.predict(u, even)
@@ -193,13 +195,13 @@ def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
     return next(shares, 0.0) * heights
 
 
-def between(before: Noise, after: Noise) -> Noise:
+def halfway(before: Noise, after: Noise) -> Noise:
     """Return standard deviations halfway between two."""
     middle = np.sqrt(before.measurement * after.measurement)
     return Noise(middle, *(0.5 * (before.process + after.process)).tolist())
 
 
-def settled(rows: Reduced, before: Noise, after: Noise, leg_length_m: float) -> bool:
+def has_settled(rows: Reduced, before: Noise, after: Noise, leg_length_m: float) -> bool:
     """Whether standard deviations have stopped changing, or change without becoming likelier."""
     same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED_NOISE)
     change, least = np.abs(after.process - before.process), 1e-7 * np.array((leg_length_m, 1.0))
@@ -222,7 +224,7 @@ def typical_sizes(forecast: Forecast) -> Floats:
 def linearise(
     problem: FitProblem, u: Floats, disturbances: Floats, exact: bool = False, robust: Robust | None = None
 ) -> Linearised | None:
-    """Linearise the prediction at u (unknowns,) and the disturbances; None if a walk ends early.
+    """Linearise the prediction at u (unknowns,) and the disturbances, or return None if a walk ends early.
 
     disturbances  heights (m), then kicks if they are known; the walk goes over these heights, without kicks
     robust        how a robust loss trims the residuals; None leaves them whole
@@ -284,7 +286,7 @@ def least_squares_fit(
     from scipy.optimize import least_squares  # takes a third of a second, only needed here
 
     forecast, low_high = problem.forecast, problem.limits()
-    inside = np.clip(u, low_high[0] + INSIDE, low_high[1] - INSIDE)
+    inside = np.clip(u, low_high[0] + BOUND_MARGIN, low_high[1] - BOUND_MARGIN)
     whiten, known = whitening(data, noise), (inside, data.J)
     offset = forecast.values - data.trimmed + data.G[:, : heights.size] @ heights
 

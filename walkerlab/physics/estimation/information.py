@@ -36,7 +36,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
-    """Marginalise information (unknowns, unknowns) to the parameters, its first rows; noise levels count as known."""
+    """Marginalise information (unknowns, unknowns) to the parameters, its first rows. Noise levels count as known."""
     reduced = free_the_rest(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]
@@ -106,7 +106,7 @@ def is_open(singular: Floats) -> NDArray[np.bool_]:
 
 
 def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, ...], set[str]]:
-    """Describe the parameter combinations that the walk does not determine; also return the parameters in them."""
+    """Describe the parameter combinations that the walk does not determine, and return the parameters in them."""
     named, keys = [], set[str]()
     largest = information.singular_values.max(initial=0.0)
     errors = np.sqrt(np.diag(information.covariance))

@@ -29,7 +29,7 @@ def spectral_radius(steps: Floats) -> Floats:
 
 
 def measure_radius(fitted: Fitted, own: float) -> MeasuredRadius | None:
-    """Measure the spectral radius from periods, lengths and angles of successive steps; None for fewer than 8 steps.
+    """Measure the spectral radius from periods, lengths and angles of successive steps, or None for fewer than 8 steps.
 
     Bias and standard error are those of the same estimate for walks of the fitted model, with its disturbances and its
     noise, whose spectral radius is known.

@@ -78,7 +78,7 @@ class Linearised:
 
 
 class Evaluation(NamedTuple):
-    """Likelihoods and the most likely unknowns; several sets of standard deviations add leading axes."""
+    """Likelihoods and the most likely unknowns. Several sets of standard deviations add leading axes."""
 
     restricted: Any  # log-likelihood of the standard deviations with their prior, from the data alone
     likelihood: Any  # log-likelihood of the data
@@ -130,7 +130,7 @@ def reduce(data: Linearised) -> Reduced:
 
 
 def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
-    """Evaluate the likelihoods for one or more noise levels; `noise.measurement` has shape (..., quantities)."""
+    """Evaluate the likelihoods for one or more noise levels. `noise.measurement` has shape (..., quantities)."""
     deviations, process = np.asarray(noise.measurement), noise.process
     fixed, count = 1 + rows.unknowns, len(rows.fixed)
     sets = np.broadcast_shapes(deviations.shape[:-1], process.shape[:-1])
@@ -258,7 +258,7 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
 def climb(
     rows: Reduced, starts: Sequence[Floats], bounds: Floats, sources: tuple[int, ...], leg_length_m: float
 ) -> tuple[Floats, float]:
-    """Maximise the restricted likelihood over logarithms as in `noise_at`; return them, and the likelihood there.
+    """Maximise the restricted likelihood over logarithms as in `noise_at`, and return them, and the likelihood there.
 
     The search starts from the likeliest of `starts`.
     """
@@ -276,7 +276,7 @@ def climb(
 
 
 def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) -> Noise:
-    """Return the standard deviations from their logarithms (..., quantities + sources); other disturbances are zero.
+    """Return the standard deviations from their logarithms (..., quantities + sources). Other disturbances are zero.
 
     leg_length_m  unit of the heights' deviation (m)
     """

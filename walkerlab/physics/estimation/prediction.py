@@ -37,7 +37,7 @@ KEPT_PREDICTIONS: Final = 16  # search, derivatives and checks ask for the same 
 
 
 class WalkMap(Protocol):
-    """Walks of a family of walkers from the section; like `step_map.StepMap`, but with several parameters."""
+    """Walks of a family of walkers from the section. Like `step_map.StepMap`, but with several parameters."""
 
     def step(self, z: Floats, p: Any) -> MappedStep:
         """Take a step from z (d,), with its derivative."""
@@ -58,7 +58,7 @@ class WalkMap(Protocol):
 
 
 class Prediction(NamedTuple):
-    """A predicted walk; its arrays are shared, so never written to."""
+    """A predicted walk. Its arrays are shared, so they are never written to."""
 
     values: Floats  # (values,) predicted values
     walk: DisturbedWalk
@@ -92,7 +92,7 @@ class Forecast:
 
     @property
     def heights(self) -> int:
-        """Number of footholds; one more for angles at sample times, in case predicted steps are shorter."""
+        """Number of footholds, with one more for angles at sample times, in case predicted steps are shorter."""
         return self.measured.count + (1 if self.in_phase else 2)
 
     @cached_property
@@ -132,7 +132,7 @@ class Forecast:
         return np.asarray(self.z + START_SCALE * self.directions @ u[first : first + self.directions.shape[1]])
 
     def predict(self, u: Floats, heights_m: Floats) -> Prediction | None:
-        """Predict the walk; None if it ends early or there is no valid walker."""
+        """Predict the walk, or return None if it ends early or there is no valid walker."""
         prediction: Prediction | None = self._recent(u.tobytes(), heights_m.tobytes())
         return prediction
 

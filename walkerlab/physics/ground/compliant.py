@@ -53,7 +53,7 @@ def contact_walker(
     knee_rules: KneeRules | None = None,
     pinned_foot: int = STANCE_FOOT,
 ) -> ContactWalker:
-    """Assemble a walker on compliant ground; gravity in m/s^2, slope in rad. Foot k and knee k belong to leg k.
+    """Assemble a walker on compliant ground (gravity in m/s^2, slope in rad). Foot k and knee k belong to leg k.
 
     In the pinned forms, the hinge is the centre of the ball of `pinned_foot`, at position 0 along the slope. Raises
     ValueError, with a message for the user, if the parts cannot walk on compliant ground.
@@ -114,13 +114,15 @@ def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
 
 
 def hinge_point(assembly: Assembly, body: str, other: str) -> Position:
-    """Return the point in a body's frame where it is hinged to another; the origin if they are not hinged directly."""
+    """Return the point in a body's frame where it is hinged to another, or the origin if they are not
+    hinged directly.
+    """
     hinge = assembly.hinge(body, other)
     return (0.0, 0.0) if hinge is None else hinge.parent_point_m
 
 
 def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: bool) -> None:
-    """Fill a form with constants about a root; if `merges`, each knee in `locked` makes thigh and shank one body."""
+    """Fill a form with constants about a root. If `merges`, each knee in `locked` makes thigh and shank one body."""
     knees = [(assembly.index(knee.thigh), assembly.index(knee.shank)) for knee in assembly.knees]
     straight = {shank: thigh for thigh, shank in (knees[k] for k in locked)}
     one_with = straight if merges else {}

@@ -13,7 +13,7 @@ from walkerlab.physics.ground.walker import (
     foot_motion,
     half_size,
     one_foot_motion,
-    over_ground,
+    relative_to_ground,
     sines_cosines,
 )
 from walkerlab.physics.kernels import kernel_part, matrix, vector
@@ -47,7 +47,9 @@ def potential_energy(form: GroundModel, y: Any) -> float:
 
 @kernel_part
 def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
-    return elastic_energy(-over_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal)
+    return elastic_energy(
+        -relative_to_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal
+    )
 
 
 @kernel_part
@@ -74,7 +76,7 @@ def push_power(system: OnGround, t: float, y: Any) -> float:
 @kernel_part
 def dissipated_power(system: OnGround, foot: int, y: Any) -> tuple[float, float, float]:
     """Compute the powers (W) that a foot loses to damping and to friction, and the normal force (N) on it."""
-    motion = over_ground(system, foot, one_foot_motion(system.form, foot, y))
+    motion = relative_to_ground(system, foot, one_foot_motion(system.form, foot, y))
     if motion.height >= 0.0:
         return 0.0, 0.0, 0.0
     force = foot_force(system, motion)

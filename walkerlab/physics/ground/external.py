@@ -14,7 +14,7 @@ from walkerlab.physics.kernels import kernel, kernel_part, vector
 
 @kernel_part
 def absolute_state(slope: float, chain: Any, q: Any, v: Any, y: Any) -> None:
-    """Write the state with absolute angles into y; `chain` (n, links) maps the links' relative angles to them."""
+    """Write the state with absolute angles into y. `chain` (n, links) maps the links' relative angles to them."""
     n = chain.shape[0]
     for i in range(2):
         y[i], y[2 + n + i] = q[i], v[i]

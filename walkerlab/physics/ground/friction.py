@@ -27,7 +27,7 @@ class FrictionLaw(Protocol):
 
     @property
     def rising_until(self) -> float:
-        """Slip velocity (m/s) up to which the coefficient grows; infinite without friction."""
+        """Slip velocity (m/s) up to which the coefficient grows, or infinity without friction."""
 
     @property
     def sliding_from(self) -> float:
@@ -160,7 +160,10 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 
 
 def create_law(word: str, contact: Any) -> FrictionLaw:
-    """Create the law named `word` from a contact block in SI; raises TypeError if its class is incomplete."""
+    """Create the law named `word` from a contact block in SI.
+
+    Raises TypeError if its class is incomplete.
+    """
     law = FRICTION_LAWS[word]
     missing = missing_members(law)
     if missing:

@@ -20,7 +20,7 @@ from walkerlab.physics.mechanics.hinges import (
 
 @kernel_part
 def hip_sign(system: OnGround, row: int) -> float:
-    """Return -1 for the hip while the first leg is the stance leg; otherwise 1."""
+    """Return -1 for the hip while the first leg is the stance leg, otherwise 1."""
     return -1.0 if row == HIP_ROW and system.progress.stance == 0 else 1.0
 
 

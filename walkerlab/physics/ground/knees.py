@@ -59,7 +59,7 @@ class Locked(NamedTuple):
 
 
 def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | None = None) -> Locked:
-    """Project the angular velocities onto those that `form` allows; the root's motion does not change.
+    """Project the angular velocities onto those that `form` allows. The root's motion does not change.
 
     The state x (size,) and the variational columns (size, columns) are those of `whole`, the form with all bodies.
     """

@@ -11,7 +11,7 @@ from walkerlab.physics.ground.walker import (
     foot_force,
     foot_motion,
     half_size,
-    over_ground,
+    relative_to_ground,
     sines_cosines,
 )
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector
@@ -33,11 +33,13 @@ def coordinate_and_rate(system: OnGround) -> tuple[float, float]:
 
 @forced_inline
 def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r: Any) -> tuple[float, float]:
-    """Compute the force of ground and push-off on a foot, along and normal to the slope (N); add its torques to r."""
+    """Compute the force of ground and push-off on a foot, along and normal to the slope (N), and add its
+    torques to r.
+    """
     form, push = system.form, push_on(system, t, foot, s, c)
     along, normal = push.along, push.upward
     if system.has_ground[foot] != 0:
-        motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
+        motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
         if motion.height < 0.0:
             force = foot_force(system, motion)
             along += force.along
@@ -80,7 +82,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
 
 
 @derivative.case(OnGround)
-def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
+def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     """Evaluate Newton's law for the centre of mass (unless a foot is pinned) and the tree's equations of motion."""
     form = system.form
     n, half, first = form.bodies, half_size(form), form.places
@@ -97,7 +99,7 @@ def on_ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
-    """Differentiate a foot's penetration, its rate and slip with respect to y[j]; F, U (n,) are projected levers."""
+    """Differentiate a foot's penetration, its rate and slip with respect to y[j]. F, U (n,) are projected levers."""
     p, half = form.places, half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p
@@ -113,9 +115,9 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
 
 @kernel_part
 def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
-    """Add the derivatives of a foot's force and torques to J; its rows are divided by mass and inertia later."""
+    """Add the derivatives of a foot's force and torques to J. Its rows are divided by mass and inertia later."""
     form, push = system.form, push_on(system, t, foot, s, c)
-    motion = over_ground(system, foot, foot_motion(form, foot, s, c, y))
+    motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
     inside, pushed = system.has_ground[foot] != 0 and motion.height < 0.0, push.above != 0.0
     if not inside and not pushed:
         return
@@ -162,7 +164,7 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
 
 
 @jacobian.case(OnGround)
-def on_ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
+def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     """Compute the Jacobian of the equations of motion, exact except at switching points of the force law."""
     form = system.form
     n, p, half = form.bodies, form.places, half_size(form)

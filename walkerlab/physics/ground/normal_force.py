@@ -43,7 +43,7 @@ def impact_normal_force(penetration: float, penetration_rate: float, law: Normal
 
 @kernel_part
 def grip(penetration: float, penetration_rate: float, law: NormalLaw) -> float:
-    """Return the normal force before clamping, divided by a power of the penetration; it falls to zero at release."""
+    """Return the normal force before clamping, divided by a power of the penetration. It falls to zero at release."""
     # The divisor is min(d, d_max)^min(e, 2): the result has a finite slope at the surface and is nowhere steeper than
     # the force.
     full = law.full_damping_penetration

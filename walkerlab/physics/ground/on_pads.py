@@ -26,18 +26,18 @@ def find_pads(system: OnPads, y: Any) -> None:
 
 
 @block.case(OnPads)
-def on_pads_block(system: OnPads) -> Any:
+def pads_block(system: OnPads) -> Any:
     return block(system.walker)
 
 
 @derivative.case(OnPads)
-def on_pads_derivative(system: OnPads, t: float, y: Any, f: Any) -> None:
+def pads_derivative(system: OnPads, t: float, y: Any, f: Any) -> None:
     find_pads(system, y)
     derivative(system.walker, t, y, f)
 
 
 @jacobian.case(OnPads)
-def on_pads_jacobian(system: OnPads, t: float, y: Any, J: Any) -> None:
+def pads_jacobian(system: OnPads, t: float, y: Any, J: Any) -> None:
     """Compute the Jacobian of the equations of motion, ignoring the jumps at the pads' edges."""
     find_pads(system, y)
     jacobian(system.walker, t, y, J)

@@ -23,7 +23,7 @@ def pulse_force(system: OnGround, t: float) -> float:
 
 @kernel_part
 def pulse_left(system: OnGround, t: float) -> float:
-    """Return the remaining duration (s) of the current pulse; 0 if no pulse acts."""
+    """Return the remaining duration (s) of the current pulse, or 0 if no pulse acts."""
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     return max(0.0, system.progress.last_touch + system.form.push_off_duration - t)
@@ -38,7 +38,7 @@ class Push(NamedTuple):
 
 @kernel_part
 def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
-    """Compute the push-off on a foot at time t (s); it is zero outside a pulse and on the stance foot."""
+    """Compute the push-off on a foot at time t (s). It is zero outside a pulse and on the stance foot."""
     form, force = system.form, pulse_force(system, t) if foot != system.progress.stance else 0.0
     if force == 0.0:
         return Push(0.0, 0.0, 0.0, 0.0)
@@ -60,7 +60,9 @@ def lever_to_hip(form: GroundModel, foot: int, s: Any, c: Any, k: int) -> tuple[
 
 @kernel_part
 def push_gradient(form: GroundModel, push: Push, foot: int, s: Any, c: Any, k: int) -> tuple[float, float]:
-    """Compute derivatives (N/rad) of a push with respect to a body's angle; the push turns, at constant magnitude."""
+    """Compute derivatives (N/rad) of a push with respect to the angle of a body. The push changes direction, not
+    magnitude.
+    """
     forward, upward = lever_to_hip(form, foot, s, c, k)
     turned = (push.along * forward + push.upward * upward) / (push.ahead * push.ahead + push.above * push.above)
     return -turned * push.above, turned * push.ahead

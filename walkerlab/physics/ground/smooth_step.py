@@ -1,4 +1,4 @@
-"""ADAMS's cubic STEP function; source: Adams function reference, STEP."""
+"""ADAMS's cubic STEP function. Source: Adams function reference, STEP."""
 
 from walkerlab.physics.kernels import kernel_part
 

@@ -28,7 +28,7 @@ class Terrain(NamedTuple):
 
 
 def checkerboard(pitch: float, lanes: tuple[float, float]) -> Terrain:
-    """Create a lane of pads for each leg; pads and the gaps between them have the length `pitch` (m) of a step."""
+    """Create a lane of pads for each leg. Pads and the gaps between them have the length `pitch` (m) of a step."""
     return Terrain(pitch, lanes, True, False, EVEN)
 
 
@@ -49,7 +49,7 @@ def is_uneven(terrain: Terrain) -> bool:
 
 @kernel_part
 def foothold_height(terrain: Terrain, foothold: int) -> float:
-    """Return the height (m) of a foothold above the slope; foothold 0 is the start's, earlier ones have its height."""
+    """Return the height (m) of a foothold above the slope. Foothold 0 is the start's, earlier ones have its height."""
     return float(terrain.heights[min(max(foothold, 0), terrain.heights.size - 1)])
 
 
@@ -61,7 +61,7 @@ def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
 
 @kernel_part
 def cell_at(terrain: Terrain, foot: int, along: float) -> int:
-    """Return the number of the cell at `along` (m) in a foot's lane; cell j is centred j S from the lane's pad 0."""
+    """Return the number of the cell at `along` (m) in a foot's lane. Cell j is centred j S from the lane's pad 0."""
     if not terrain.has_pads:
         return 0
     return math.floor((along - terrain.lanes[foot]) / terrain.pitch + 0.5)

@@ -31,7 +31,9 @@ RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
 
 @tree.fast_fields
 class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants (SI) of the walker in one form, free or pinned, with certain knees locked; a structured scalar."""
+    """Constants (SI) of the walker in one form, free or pinned, with certain knees locked. It is a
+    structured scalar.
+    """
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
@@ -166,7 +168,7 @@ def on_ground(
     level: Any = (0.0, 0.0),
     progress: WalkProgress | None = None,
 ) -> OnGround:
-    """Return the walker in the form for its knees, by default on foot 1; `level` (2,) is the ground height (m)."""
+    """Return the walker in the form for its knees, by default on foot 1. `level` (2,) is the ground height (m)."""
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(pinned), locked_knees(knee)]
     progress = new_progress() if progress is None else progress
@@ -181,7 +183,7 @@ def locked_knees(knee: Any) -> int:
 
 class FootMotion(NamedTuple):
     along: float  # m, position along the slope
-    height: float  # m, above the slope (after `over_ground`: above the foot's ground, negative inside it)
+    height: float  # m, above the slope (after `relative_to_ground`: above the foot's ground, negative inside it)
     slip: float  # m/s, velocity along the slope of the ball's material at its lowest point
     vertical_velocity: float  # m/s, rate of the height
 
@@ -227,7 +229,7 @@ def feet_motion(form: GroundModel, y: Any) -> tuple[FootMotion, FootMotion]:
 
 
 @kernel_part
-def over_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
+def relative_to_ground(system: OnGround, foot: int, motion: FootMotion) -> FootMotion:
     return FootMotion(motion.along, motion.height - system.level[foot], motion.slip, motion.vertical_velocity)
 
 
@@ -240,7 +242,7 @@ class FootForce(NamedTuple):
 
 @kernel_part
 def foot_force(laws: Any, motion: FootMotion) -> FootForce:
-    """Compute the force of the ground on a penetrating foot; `laws` is a ContactWalker or an OnGround."""
+    """Compute the force of the ground on a penetrating foot. `laws` is a ContactWalker or an OnGround."""
     normal = impact_normal_force(-motion.height, -motion.vertical_velocity, laws.normal)
     mu, mu_slope = friction_coefficient(laws.friction, motion.slip)
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)

@@ -59,8 +59,8 @@ class Motion:
             pieces.append((CubicHermiteSpline(time, self.angle[span], velocity), PchipInterpolator(time, velocity)))
         return pieces
 
-    def at(self, times: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities (times, leg) at times (s); at a heel strike, the values just after it."""
+    def values_at(self, times: Array) -> tuple[Array, Array]:
+        """Compute angles and velocities (times, leg) at times (s). At a heel strike, the values just after it."""
         angle, velocity = np.empty((times.size, LEG_COUNT)), np.empty((times.size, LEG_COUNT))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
         for index in np.unique(piece_of):
@@ -76,10 +76,10 @@ class Motion:
             return float(self.time[index - 1])
         return end
 
-    def during(self, step: int, phases: Array) -> tuple[Array, Array]:
-        """Compute angles and velocities (phases, leg) of a step; phase 0 is after an impact, 1 before the next one."""
+    def values_during(self, step: int, phases: Array) -> tuple[Array, Array]:
+        """Compute angles and velocities (phases, leg) of a step. Phase 0 is after an impact, 1 before the next one."""
         start, end = self.span(step)
-        return self.at(np.minimum(start + phases * (end - start), self.last_before(end)))
+        return self.values_at(np.minimum(start + phases * (end - start), self.last_before(end)))
 
     def span(self, step: int) -> tuple[float, float]:
         """Return the start and end of a step (s)."""
@@ -92,14 +92,17 @@ class Motion:
         return (inside - start) / (end - start)
 
     def last_stride(self) -> Motion:
-        """Cut out the last two completed steps, with the impacts before them; raises ValueError if there are fewer."""
+        """Cut out the last two completed steps, with the impacts before them.
+
+        Raises ValueError if there are fewer.
+        """
         if self.steps < 2:
             raise ValueError("no stride was completed")
         start = self.time[0] if self.steps == 2 else self.last_before(self.step_ends[-3])
         end = self.last_before(self.step_ends[-1])
         inside = self.time[(self.time > start) & (self.time < end)]
         time = np.concatenate(([start], inside, [end]))
-        angle, velocity = self.at(time)
+        angle, velocity = self.values_at(time)
         return replace(self, time=time, angle=angle, velocity=velocity, step_ends=self.step_ends[-2:])
 
 
@@ -144,7 +147,7 @@ def extrapolate(motion: Motion, samples: slice, time: float) -> tuple[Array, Arr
 
 @dataclass(frozen=True, eq=False)
 class WalkDifference:
-    """Difference of two walks over time, or over steps and phases; the last axis is the leg."""
+    """Difference of two walks over time, or over steps and phases. The last axis is the leg."""
 
     angle: Array
     velocity: Array
@@ -159,23 +162,26 @@ def difference_in_time(walk: Motion, reference: Motion) -> tuple[Array, WalkDiff
     """Return the sample times (s) of both walks where the two overlap, and `walk` minus `reference` at these times."""
     time = np.union1d(walk.time, reference.time)
     time = time[(time >= max(walk.time[0], reference.time[0])) & (time <= min(walk.time[-1], reference.time[-1]))]
-    angle, velocity = walk.at(time)
-    reference_angle, reference_velocity = reference.at(time)
+    angle, velocity = walk.values_at(time)
+    reference_angle, reference_velocity = reference.values_at(time)
     return time, WalkDifference(angle - reference_angle, velocity - reference_velocity)
 
 
 def difference_in_phase(walk: Motion, reference: Motion, phases: Array) -> WalkDifference:
-    """Compute `walk` minus `reference` (step, phase, leg) in the steps of both; ValueError if either took no step."""
+    """Compute `walk` minus `reference` (step, phase, leg) in the steps of both.
+
+    Raises ValueError if either took no step.
+    """
     steps = min(walk.steps, reference.steps)
     if steps == 0:
         raise ValueError("no step was completed by both")
-    pairs = [(walk.during(step, phases), reference.during(step, phases)) for step in range(steps)]
+    pairs = [(walk.values_during(step, phases), reference.values_during(step, phases)) for step in range(steps)]
     angle = np.stack([ours[0] - theirs[0] for ours, theirs in pairs])
     velocity = np.stack([ours[1] - theirs[1] for ours, theirs in pairs])
     return WalkDifference(angle, velocity)
 
 
-def between_impacts(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
+def smooth_phases(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.bool_]:
     """Mark the phases (step, phase) at which both walks are smooth: after the impact, and not between knee strikes."""
     # Between the two knee strikes the velocities differ by the whole jump, however similar the walks are.
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))

@@ -19,7 +19,7 @@ from walkerlab.physics.ground.walker import (
     GroundModel,
     OnGround,
     foot_motion,
-    over_ground,
+    relative_to_ground,
     sines_cosines,
 )
 from walkerlab.physics.hybrid.contact_events import (
@@ -66,7 +66,7 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
     sines_cosines(form, y, s, c)
     values[PASSING, node] = 0.0
     for foot in range(2):
-        first, motion = foot * PER_FOOT, over_ground(system, foot, foot_motion(form, foot, s, c, y))
+        first, motion = foot * PER_FOOT, relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
         sample_foot(system, motion, cell_edges(ground.terrain, foot, walk_state.cells[foot]), first, node, finder)
         values[first + MATERIAL, node] = material_along(form, foot, motion.along, y)
         values[PASSING, node] += motion.along if foot == 1 else -motion.along
@@ -111,23 +111,25 @@ def earliest_crossing(
             end = row + FRICTION_SWITCHES + switching_count(system.friction)
         for event in range(row, end):
             if ground.terrain.has_pads or (event != row + LEFT_EDGE and event != row + RIGHT_EDGE):
-                first = earlier(first, walk_state, finder, event)
+                first = earlier_event(first, walk_state, finder, event)
         if inside and foot == progress.stance:
-            first = earlier(first, walk_state, finder, SLIDE)
+            first = earlier_event(first, walk_state, finder, SLIDE)
     if watch_order:  # PASSING is an event only if the order of the feet matters
-        first = earlier(first, walk_state, finder, PASSING)
+        first = earlier_event(first, walk_state, finder, PASSING)
     for knee in range(2):
         if walk_state.knee[knee] == BENT:
-            first = earlier(first, walk_state, finder, EXTENSION + knee)
+            first = earlier_event(first, walk_state, finder, EXTENSION + knee)
         elif walk_state.knee[knee] == STOPPING:
-            first = earlier(first, walk_state, finder, EXTENSION_RATE + knee)
+            first = earlier_event(first, walk_state, finder, EXTENSION_RATE + knee)
     if progress.release == AT_COMPRESSION:
-        first = earlier(first, walk_state, finder, progress.stance * PER_FOOT + VERTICAL_VELOCITY)
-    return earlier(first, walk_state, finder, FALL)
+        first = earlier_event(first, walk_state, finder, progress.stance * PER_FOOT + VERTICAL_VELOCITY)
+    return earlier_event(first, walk_state, finder, FALL)
 
 
 @kernel_part
-def earlier(first: tuple[float, int], walk_state: WalkState, finder: CrossingFinder, event: int) -> tuple[float, int]:
+def earlier_event(
+    first: tuple[float, int], walk_state: WalkState, finder: CrossingFinder, event: int
+) -> tuple[float, int]:
     """Return the fraction of the solver step and number of an event: `event` if it is earlier, otherwise `first`."""
     fraction = leaves_side(finder, event, walk_state.sides[event], walk_state.at_zero[event] != 0)
     return (fraction, event) if fraction < first[0] else first

@@ -41,7 +41,9 @@ DOUBTS = 12
 
 @kernel
 def scan(system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder) -> tuple[float, int]:
-    """Sample all event functions on a solver step into `finder.values`; returns the result of `earliest_crossing`."""
+    """Sample all event functions on a solver step into `finder.values`, and return the result of
+    `earliest_crossing`.
+    """
     for node in range(finder.nodes.size):
         sample_event_functions(system, walk_state, finder.states[node], node, finder)
     return earliest_crossing(system, walk_state, watch_order, finder)
@@ -53,11 +55,11 @@ class EventSearch(NamedTuple):
     target: float  # s, latest end of the next solver step
     event: int  # event that is being located, or the last event
     latest: float  # s, end of the solver step in which the event first appeared, an upper bound of its time
-    arriving: bool  # whether the target is the event's expected time
+    approaching: bool  # whether the target is the event's expected time
     refinements: int  # number of corrections of the expected time
     rewinds: int  # number of rewinds of the present solver step
-    stands: bool  # whether the last solver step is valid; if not, it is repeated up to the new target
-    happens: bool  # whether the event happens at the end of the solver step
+    accepted: bool  # whether the last solver step is valid; if not, it is repeated up to the new target
+    occurs: bool  # whether the event happens at the end of the solver step
 
 
 @kernel
@@ -89,7 +91,7 @@ def walk_in_form(
         sample(method, system, finder.nodes, finder.states)
         fraction, event = scan(system, walk_state, watch_order, finder)
         search = aim(search, walk_state, method, finder, fraction, event)
-        if not search.stands:
+        if not search.accepted:
             rewind(method, system)
             continue
         walk_state.progress.passes_switching = False
@@ -98,7 +100,7 @@ def walk_in_form(
         outcome = judge(system, walk_state, method.clock[T])
         if outcome == endings.GOES_ON:
             forget_zeros(walk_state, method.clock[T] - method.clock[T_OLD])
-            if search.happens:
+            if search.occurs:
                 outcome = react(system, observer, walk_state, method, search.event, until)
         if outcome != endings.GOES_ON:
             return outcome, search.event
@@ -116,21 +118,25 @@ def steps_are_left(walk_state: WalkState, until: int) -> bool:
 
 @kernel_part
 def seek(target: float, event: int) -> EventSearch:
-    """Start the search for the next event, with solver steps up to time `target` (s); `event` was the last event."""
-    return EventSearch(target, event, target, False, 0, 0, False, False)
+    """Start the search for the next event, with solver steps up to time `target` (s). `event` was the last event."""
+    return EventSearch(
+        target, event, latest=target, approaching=False, refinements=0, rewinds=0, accepted=False, occurs=False
+    )
 
 
 @kernel_part
 def aim(
     search: EventSearch, walk_state: WalkState, method: Any, finder: CrossingFinder, fraction: float, event: int
 ) -> EventSearch:
-    """Decide whether the last solver step is valid, and when the next must end; a `fraction` above 1 means no event."""
+    """Decide whether the last solver step is valid, and when the next must end. A `fraction` above 1 means no event."""
     start, end = method.clock[T_OLD], method.clock[T]
     if fraction <= 1.0:
         return approach(search, walk_state, start, end, fraction, event)
-    if search.arriving and end >= search.target:
+    if search.approaching and end >= search.target:
         return confirm(search, start, time_to_zero(method, finder, search.event))
-    return EventSearch(end, search.event, end, False, 0, 0, True, False)
+    return EventSearch(
+        end, search.event, latest=end, approaching=False, refinements=0, rewinds=0, accepted=True, occurs=False
+    )
 
 
 @kernel_part
@@ -138,31 +144,78 @@ def approach(
     search: EventSearch, walk_state: WalkState, start: float, end: float, fraction: float, event: int
 ) -> EventSearch:
     """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already does."""
-    latest = search.latest if search.arriving else end
-    refinements = search.refinements if search.arriving and event == search.event else 0
+    latest = search.latest if search.approaching else end
+    refinements = search.refinements if search.approaching and event == search.event else 0
     wait = max(fraction * (end - start), EVENT_TIME)
     early = start + wait < end - EVENT_TIME
     if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
-        return EventSearch(start + wait, event, latest, True, refinements + 1, search.rewinds + 1, False, False)
+        return EventSearch(
+            start + wait,
+            event,
+            latest,
+            approaching=True,
+            refinements=refinements + 1,
+            rewinds=search.rewinds + 1,
+            accepted=False,
+            occurs=False,
+        )
     if early and is_switching(event):
         # the event function is too far from a polynomial on this solver step: try half of it
         if search.rewinds < REWINDS:
-            return EventSearch(0.5 * (start + end), event, latest, False, 0, search.rewinds + 1, False, False)
+            return EventSearch(
+                0.5 * (start + end),
+                event,
+                latest,
+                approaching=False,
+                refinements=0,
+                rewinds=search.rewinds + 1,
+                accepted=False,
+                occurs=False,
+            )
         # a short solver step does not help either: ignore this event, but no other event in it
         walk_state.progress.passes_switching = True
-        return EventSearch(end, event, latest, False, 0, 0, False, False)
-    return EventSearch(end, event, latest, True, refinements, search.rewinds, True, True)
+        return EventSearch(
+            end, event, latest, approaching=False, refinements=0, rewinds=0, accepted=False, occurs=False
+        )
+    return EventSearch(
+        end,
+        event,
+        latest,
+        approaching=True,
+        refinements=refinements,
+        rewinds=search.rewinds,
+        accepted=True,
+        occurs=True,
+    )
 
 
 @kernel_part
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     """Accept the event that a solver step just missed, extend that step by `wait` (s), or drop the event."""
-    happens = abs(wait) <= EVENT_TIME
+    occurs = abs(wait) <= EVENT_TIME
     doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
     target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
-    if not happens and doubtful and start < target <= search.latest:
-        return EventSearch(target, search.event, search.latest, True, refinements, rewinds, False, False)
-    return EventSearch(search.target, search.event, search.latest, True, refinements, rewinds, True, happens)
+    if not occurs and doubtful and start < target <= search.latest:
+        return EventSearch(
+            target,
+            search.event,
+            search.latest,
+            approaching=True,
+            refinements=refinements,
+            rewinds=rewinds,
+            accepted=False,
+            occurs=False,
+        )
+    return EventSearch(
+        search.target,
+        search.event,
+        search.latest,
+        approaching=True,
+        refinements=refinements,
+        rewinds=rewinds,
+        accepted=True,
+        occurs=occurs,
+    )
 
 
 @kernel_part
@@ -177,7 +230,7 @@ def forget_zeros(walk_state: WalkState, h: float) -> None:
 def react(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, method: Any, event: int, until: int
 ) -> int:
-    """Apply the event at the end of the last solver step; returns the outcome, GOES_ON or CHANGES_FORM."""
+    """Apply the event at the end of the last solver step, and return the outcome, GOES_ON or CHANGES_FORM."""
     steps, locked = walk_state.progress.steps, locked_knees(walk_state.knee)
     outcome = apply_event(system, observer, walk_state, event, method.clock[T], method.y)
     if outcome != endings.GOES_ON:
@@ -236,7 +289,9 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
 
 @kernel_part
 def judge(system: OnGround, walk_state: WalkState, t: float) -> int:
-    """Return the outcome if the flight or the step is too long at t (s), else GOES_ON; updates `airborne_since`."""
+    """Return the outcome if the flight or the step is too long at t (s), otherwise GOES_ON. This updates
+    `airborne_since`.
+    """
     # A foot that lifts at t still counts as on the ground, because the event at the solver step's end is applied later.
     grounded = is_pinned(system)
     for foot in range(2):

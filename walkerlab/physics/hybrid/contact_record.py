@@ -19,7 +19,7 @@ from walkerlab.physics.energy_channels import (
 )
 from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.physics.ground.hinges import hinge_energies, hinge_powers
-from walkerlab.physics.ground.walker import OF_STATES, OnGround, one_foot_motion, over_ground, store_whole
+from walkerlab.physics.ground.walker import OF_STATES, OnGround, one_foot_motion, relative_to_ground, store_whole
 from walkerlab.physics.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY
 from walkerlab.physics.hybrid.contact_state import WalkState
 from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
@@ -81,7 +81,7 @@ CONTACT_TALLY = record_type(ContactTally, {})
 
 @by_reference
 class ContactObserver(NamedTuple):
-    """Samples, energy balance and tangent of a walk; each is skipped if not requested."""
+    """Samples, energy balance and tangent of a walk. Each is skipped if not requested."""
 
     track_energy: bool  # whether to keep the energy balance
     samples: ContactSamples
@@ -95,7 +95,7 @@ class ContactObserver(NamedTuple):
 def observe(
     observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, walk_state: WalkState
 ) -> None:
-    """Record the last solver step; it must be valid, and its event functions must be sampled."""
+    """Record the last solver step. It must be valid, and its event functions must be sampled."""
     record_samples(observer, method, system, walk_state)
     if observer.track_energy:
         balance(observer, method, system)
@@ -151,7 +151,7 @@ def note_torque(observer: ContactObserver, method: Any, system: OnGround, finder
 
 @kernel_part
 def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
-    """Copy the account at a step's end, for the work in completed steps; the copied hip work includes the springs."""
+    """Copy the account at a step's end, for the work in completed steps. The copied hip work includes the springs."""
     for entry in range(ENTRIES):
         observer.account_at_touch[entry] = observer.account[entry]
     observer.account_at_touch[HIP_WORK] += observer.tally.start_spring - hinge_energies(system, y)[0]
@@ -166,7 +166,7 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
         at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
         y = vector(OF_STATES)[: method.y.size]
         interpolate(method, system, min(at, 1.0), y)
-        deepest = max(deepest, -over_ground(system, foot, one_foot_motion(system.form, foot, y)).height)
+        deepest = max(deepest, -relative_to_ground(system, foot, one_foot_motion(system.form, foot, y)).height)
     observer.tally.max_penetration = max(observer.tally.max_penetration, deepest)
 
 

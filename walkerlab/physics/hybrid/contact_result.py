@@ -35,7 +35,7 @@ from walkerlab.physics.hybrid.endings import CHANGES_FORM, FALLEN_HIP
 from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import kernel, uncompiled, vector
 from walkerlab.physics.mechanics.tree import new_record
-from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_named, sharing
+from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_named, share_counts
 from walkerlab.physics.solvers.stepping import BUDGET, RHS, T
 from walkerlab.physics.solvers.system import Floats, State
 
@@ -188,7 +188,7 @@ def walk_on(
     by_size, finder = {y.size: lead}, finder_for(lead, EVENT_ROWS, walker.size)
     while True:
         if y.size not in by_size:
-            by_size[y.size] = sharing(tolerances.new(y.size), lead.clock, lead.counts)
+            by_size[y.size] = share_counts(tolerances.new(y.size), lead.clock, lead.counts)
         method = by_size[y.size]
         method.y[:] = y
         ended, event = walk(system, method, finder, observer, walk_state, until)

@@ -43,7 +43,7 @@ START_ROUNDING = 1e-14  # relative rounding error of a start's coordinates and v
 
 @by_reference
 class WalkState(NamedTuple):
-    """State of a walk apart from its coordinates; events change it, and the result is gathered from it."""
+    """State of a walk apart from its coordinates. Events change it, and the result is gathered from it."""
 
     ground: JudgedGround
     touch_time: Any  # (steps,) s
@@ -152,7 +152,7 @@ def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], 
 
 @kernel_part
 def material_along(form: GroundModel, foot: int, along: float, y: Any) -> float:
-    """Compute the position (m) that a foot at `along` (m) would have without rolling; its change is slip."""
+    """Compute the position (m) that a foot at `along` (m) would have without rolling. Its change is slip."""
     # The velocity of the material point at the bottom of the ball is that of the contact point plus radius times
     # angular velocity, so the displacements differ by radius times the change of the angle.
     for k in range(form.bodies):
@@ -167,7 +167,7 @@ def is_above(walk_state: WalkState, foot: int) -> bool:
 
 @kernel_part
 def is_ahead(walk_state: WalkState, foot: int) -> bool:
-    """Whether a foot is ahead of the other; valid only where the order of the feet is watched."""
+    """Whether a foot is ahead of the other. This is valid only where the order of the feet is watched."""
     return (walk_state.sides[PASSING] > 0) == (foot == 1)
 
 

@@ -31,7 +31,7 @@ RADAU_WEIGHTS = np.array(
 
 @by_reference
 class Tangent(NamedTuple):
-    """Derivative Phi of the state, and workspace; n is the size of the free walker's state with all bodies."""
+    """Derivative Phi of the state, and workspace. `n` is the size of the free walker's state with all bodies."""
 
     # If locked knees or a pinned foot reduce the state, only the first rows are used.
 

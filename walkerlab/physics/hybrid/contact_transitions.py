@@ -20,7 +20,7 @@ from walkerlab.physics.ground.walker import (
     GroundModel,
     OnGround,
     feet_motion,
-    over_ground,
+    relative_to_ground,
 )
 from walkerlab.physics.hybrid.contact_events import (
     EXTENSION,
@@ -57,7 +57,7 @@ TRIP = 0.25  # fraction of the pitch; a foot that touches its old pad this far f
 def apply_event(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, event: int, t: float, y: Any
 ) -> int:
-    """Apply an event to the walk state; returns an outcome if the event ends the walk, otherwise GOES_ON."""
+    """Apply an event to the walk state, and return an outcome if the event ends the walk, otherwise GOES_ON."""
     if event == FALL:
         return FELL
     if event == SLIDE:
@@ -67,7 +67,7 @@ def apply_event(
         knee_stops(system.stop, walk_state, event, t)
         return GOES_ON
     first, second = feet_motion(system.form, y)
-    feet = over_ground(system, 0, first), over_ground(system, 1, second)
+    feet = relative_to_ground(system, 0, first), relative_to_ground(system, 1, second)
     if event == PASSING:
         walk_state.sides[PASSING] = -walk_state.sides[PASSING]
         outcome = GOES_ON
@@ -116,7 +116,7 @@ def apply_event(
 def set_level(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, height: float, foot: int, level: float, y: Any
 ) -> None:
-    """Change the ground under a foot to `level` (m); the energy in the ground's spring is lost.
+    """Change the ground under a foot to `level` (m). The energy in the ground's spring is lost.
 
     height  of the foot above its present ground (m)
     """
@@ -144,7 +144,7 @@ def next_foothold_counts(walk_state: WalkState, foot: int) -> bool:
 def set_foothold(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, height: float, foot: int, y: Any
 ) -> int:
-    """Set the ground under a swing foot to its next foothold's height; on an ordinary plane, a foot below it stubs."""
+    """Set the ground under a swing foot to its next foothold's height. On an ordinary plane, a foot below it stubs."""
     terrain = walk_state.ground.terrain
     set_level(system, observer, walk_state, height, foot, foothold_height(terrain, walk_state.progress.steps + 1), y)
     walk_state.has_ground[foot] = 1 if is_above(walk_state, foot) else 0
@@ -184,7 +184,7 @@ def note_slip(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, 
 def touch(
     form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, t: float, y: Any
 ) -> int:
-    """Decide whether a touch ends the step; returns an outcome if the walk ends, otherwise GOES_ON."""
+    """Decide whether a touch ends the step, and return an outcome if the walk ends, otherwise GOES_ON."""
     # The step ends if the swing foot comes down far enough ahead, on a pad other than the one it left. A swing foot
     # that comes down on the pad it left, but far from where it stood, scuffs: it has tripped over the pad.
     stance, terrain = walk_state.progress.stance, walk_state.ground.terrain
@@ -223,7 +223,7 @@ def touch(
 
 @by_type_or_default
 def catches(stop: Any) -> bool:
-    """Whether a knee locks as soon as it is straight; a compliant stop turns the knee back first."""
+    """Whether a knee locks as soon as it is straight. A compliant stop turns the knee back first."""
     return False
 
 
@@ -234,7 +234,7 @@ def lock_catches(stop: IdealLock) -> bool:
 
 @kernel_part
 def knee_stops(stop: Any, walk_state: WalkState, event: int, t: float) -> None:
-    """Handle a knee's event: a straight knee locks or enters its stop; a knee that turns back in its stop latches."""
+    """Handle a knee's event: a straight knee locks or enters its stop. A knee that turns back in its stop latches."""
     if event < EXTENSION_RATE and not catches(stop):
         walk_state.knee[(event - EXTENSION) % 2] = STOPPING
         return

@@ -11,7 +11,7 @@ from walkerlab.physics.mechanics.hinges import legs_apart
 from walkerlab.physics.solvers.events import CrossingFinder, first_crossing
 from walkerlab.physics.solvers.stepping import interpolate
 
-BEYOND = 1e-12  # fraction of a solver step between a reversal and the start of the search for the next one
+ROUNDING = 1e-12  # fraction of a solver step between a reversal and the start of the search for the next one
 
 
 class TorqueWork(NamedTuple):
@@ -23,13 +23,13 @@ class TorqueWork(NamedTuple):
 
 @kernel_part
 def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder, row: int, until: float) -> TorqueWork:
-    """Compute the work of `torque` (N m) in the last solver step up to fraction `until`; overwrites the `row`."""
+    """Compute the work of `torque` (N m) in the last solver step up to fraction `until`. This overwrites the `row`."""
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)
     angle, positive, fraction = first, 0.0, 0.0
     while fraction < until:
-        fraction = min(until, first_crossing(finder, row, 0, fraction + BEYOND if fraction > 0.0 else 0.0, False))
+        fraction = min(until, first_crossing(finder, row, 0, fraction + ROUNDING if fraction > 0.0 else 0.0, False))
         interpolate(method, system, fraction, y)
         before = angle
         angle, _ = legs_apart(system, y)

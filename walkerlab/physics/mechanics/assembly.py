@@ -32,7 +32,9 @@ class Tree(NamedTuple):
     arm_y: Floats
 
     def merged(self, members: Floats) -> dict[str, Any]:
-        """Return a Mechanism's fields for grouped bodies; members (bodies, n) is 1 where a body belongs to a group."""
+        """Return the fields of a Mechanism for grouped bodies. `members` (bodies, n) is 1 where a body belongs to a
+        group.
+        """
         A, B = (members.T @ pairs @ members for pairs in (self.A, self.B))
         return {"A": A, "B": B, "arm_x": self.arm_x @ members, "arm_y": self.arm_y @ members, "mass": self.mass}
 

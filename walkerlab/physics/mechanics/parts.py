@@ -41,7 +41,7 @@ class Revolute:
 
 @dataclass(frozen=True)
 class BallFoot:
-    """Ball fixed to a body, which touches the ground directly below its centre; a zero radius makes a point foot."""
+    """Ball fixed to a body, which touches the ground directly below its centre. A zero radius makes a point foot."""
 
     name: str
     body: str
@@ -101,14 +101,16 @@ class Assembly:
             group = [one if of == other else of for of in group]
 
     def index(self, body: str) -> int:
-        """Return the index of a body in `bodies`; for an unknown body, raise a KeyError that lists the known ones."""
+        """Return the index of a body in `bodies`. For an unknown body, raise a KeyError that lists the known ones."""
         names = [b.name for b in self.bodies]
         if body not in names:
             raise KeyError(f"no body named {body!r}; bodies: {', '.join(names)}")
         return names.index(body)
 
     def hinge(self, body: str, other: str) -> Revolute | None:
-        """Return the hinge between two bodies, with the first as the parent; None if they are not hinged directly."""
+        """Return the hinge between two bodies, with the first as the parent, or None if they are not hinged
+        directly.
+        """
         for joint in self.joints:
             if (joint.parent, joint.child) == (body, other):
                 return joint

@@ -49,7 +49,7 @@ def record_type(kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
 
 
 def new_record(kind: Any, **fields: Any) -> Any:
-    """Create a structured scalar of a type from `record_type` that kernels can write; fields not named are zero."""
+    """Create a structured scalar of a type from `record_type` that kernels can write. Fields not named are zero."""
     record = np.zeros((), kind)[()]
     for name, value in fields.items():
         record[name] = value
@@ -95,7 +95,7 @@ def mechanism_shapes(n: int, phases: int, rows: int) -> dict[str, tuple[int, ...
 
 
 def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
-    """Set fields of one or more mechanisms; a name in HINGE_ROWS, such as "hip", sets the laws of those hinges."""
+    """Set fields of one or more mechanisms. A name in HINGE_ROWS, such as "hip", sets the laws of those hinges."""
     for name, value in fields.items():
         if name in HINGE_ROWS:
             mechanisms["laws"][..., HINGE_ROWS[name], :] = value
@@ -105,7 +105,9 @@ def write_fields(mechanisms: Any, fields: Mapping[str, Any]) -> None:
 
 @forced_inline
 def sines_cosines(tree: Any, n: int, theta: Any, s: Any, c: Any) -> None:
-    """Write sines and cosines (n,) of angles from the slope's normal into s and c; theta (n,) is from the vertical."""
+    """Write sines and cosines (n,) of angles from the slope's normal into s and c. `theta` (n,) is from the
+    vertical.
+    """
     for k in range(n):
         s[k], c[k] = sine_cosine(theta[k] + tree.slope)
 
@@ -133,7 +135,7 @@ def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any)
 
 @forced_inline
 def add_gravity(tree: Any, n: int, F: Any, U: Any, r: Any) -> None:
-    """Add the torques of gravity (N m) about a root at rest to r (n,); F and U (n,) are the projected first moments."""
+    """Add the torques of gravity (N m) about a root at rest to r (n,). F and U (n,) are the projected first moments."""
     for k in range(n):
         r[k] -= tree.gravity_along * U[k] + tree.gravity_down * F[k]
 

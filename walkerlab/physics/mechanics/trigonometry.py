@@ -50,7 +50,9 @@ def lanes_sine_cosine(x: Lanes) -> tuple[Lanes, Lanes]:
 
 @kernel_part
 def half_turn(x: Lanes) -> tuple[Lanes, Lanes]:
-    """Compute (sin x, cos x) for |x| up to pi/2 by Chebyshev interpolation in x^2; truncation errors below 1e-16."""
+    """Compute (sin x, cos x) for |x| up to pi/2 by Chebyshev interpolation in x^2. Truncation errors are
+    below 1e-16.
+    """
     z = x * x
     w = z * z
     v = w * w

@@ -129,7 +129,7 @@ def leave_by_flip(step_map: StepMap, gait: Cycle, transient: int, steps: int) ->
 
 
 def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int, steps: int) -> Lyapunov | None:
-    """Return the largest Lyapunov exponent of the attractor reached from z; None if the walk fails."""
+    """Return the largest Lyapunov exponent of the attractor reached from z, or None if the walk fails."""
     # Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
     # tangent grows is therefore pushed off the gait, and a walk whose halves differ in mean growth is continued.
     for _ in range(MAX_WALKS):
@@ -168,7 +168,7 @@ def standard_error(series: Floats, blocks: int) -> float:
 
 
 def feigenbaum_ratios(flips: list[float]) -> list[float]:
-    """Return the ratios of successive distances between the flips of a cascade; they tend to 4.669."""
+    """Return the ratios of successive distances between the flips of a cascade. They tend to 4.669."""
     gaps = np.diff(np.array(flips))
     return [float(gap / next_gap) for gap, next_gap in pairwise(gaps)]
 

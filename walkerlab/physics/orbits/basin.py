@@ -82,7 +82,7 @@ class Attractors:
     aperiodic: bool = False  # whether some walks continue without repeating
 
     def capture(self, n: int, most: int, share: float = 1.0) -> Capture:
-        """Return an observer for n walks of at most `most` steps; `share` scales the capture distances."""
+        """Return an observer for n walks of at most `most` steps. `share` scales the capture distances."""
         points = np.concatenate([np.zeros((0, SECTION_SIZE)), *(cycle.points for cycle in self.cycles)])
         owner = np.repeat(np.arange(len(self.cycles)), [cycle.period for cycle in self.cycles])
         reach = np.array([(share * self.cycles[index].reach) ** 2 for index in owner])
@@ -149,16 +149,16 @@ def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
     """Find the attractors that the unit walker reaches from section coordinates `starts` (n, 3)."""
     # The first starts walk the full length; later starts do so only if they reach no attractor known by then.
 
-    def with_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
+    def add_reaches(cycles: Sequence[Floats]) -> tuple[PeriodicAttractor, ...]:
         generator = np.random.default_rng(seed)
         return tuple(PeriodicAttractor(points, find_reach(walker, points, cycles, generator)) for points in cycles)
 
     cycles, aperiodic = find_cycles(walker, starts[:FIRST_STARTS], Attractors())
-    reached = with_reaches(cycles)
+    reached = add_reaches(cycles)
     more, also_aperiodic = find_cycles(walker, starts[FIRST_STARTS:], Attractors(reached))
     new = [cycle for cycle in more if not any(same_cycle(cycle, cycle_before) for cycle_before in cycles)]
     if new:
-        reached = with_reaches(order_cycles([*cycles, *new]))
+        reached = add_reaches(order_cycles([*cycles, *new]))
     return Attractors(reached, aperiodic or also_aperiodic)
 
 
@@ -187,7 +187,7 @@ def order_cycles(cycles: Sequence[Floats]) -> list[Floats]:
 
 
 def cycle_through(walker: Walker, point: Floats) -> Floats | None:
-    """Return the cycle (period, 3) through a point (3,), smallest angle first; None if the walk does not return."""
+    """Return the cycle (period, 3) through a point (3,), smallest angle first, or None if the walk does not return."""
     orbit = [point]
     for _ in range(MAX_CYCLE_PERIOD):
         step = walk_to_attractor(walker, Attractors(), orbit[-1][None, :], 1, tolerances=(CYCLE_RTOL, CYCLE_ATOL))
@@ -236,7 +236,7 @@ class Window:
     def size(self) -> int:
         return int(np.prod(self.cells))
 
-    def along(self, axis: int) -> Floats:
+    def cell_centres(self, axis: int) -> Floats:
         """Return the cell centres along the axis with this index in `axes`."""
         width = (self.upper[axis] - self.lower[axis]) / self.cells[axis]
         middles: Floats = np.arange(self.cells[axis], dtype=np.float64) + 0.5

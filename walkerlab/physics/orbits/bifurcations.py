@@ -42,7 +42,7 @@ class GaitEquations:
         return self.scale * float(x[-1])
 
 
-def on_pairs(DP: Floats) -> Floats:
+def bialternate_product(DP: Floats) -> Floats:
     """Return the bialternate product of DP (d, d) with itself, a square matrix of size d (d - 1) / 2."""
     first, second = np.triu_indices(DP.shape[0], 1)
     straight = DP[np.ix_(first, first)] * DP[np.ix_(second, second)]
@@ -51,7 +51,7 @@ def on_pairs(DP: Floats) -> Floats:
 
 
 def critical_value(kind: Kind, DP: Floats) -> float:
-    acting = on_pairs(DP) if kind == "torus" else DP
+    acting = bialternate_product(DP) if kind == "torus" else DP
     return float(np.linalg.det(acting + (1.0 if kind == "flip" else -1.0) * np.eye(len(acting))))
 
 
@@ -113,7 +113,7 @@ def eigenvector(A: Floats, value: float) -> Floats:
 
 
 def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
-    """Compute the normal form at a flip from differences of exact steps; None if a probe fails."""
+    """Compute the normal form at a flip from differences of exact steps, or return None if a probe fails."""
     A = flip.point.evaluated.data.DP
     v, w = eigenvector(A, -1.0), eigenvector(A.T, -1.0)
     w = w / (w @ v)
@@ -163,7 +163,9 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 
 
 def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
-    """Predict a point x (d + 1,) of the doubled branch; also return the correction plane's normal and the amplitude."""
+    """Predict a point x (d + 1,) of the doubled branch, and also return the correction plane's normal and
+    the amplitude.
+    """
     xi = share * form.amplitude
     s = form.cubic * xi * xi / form.rate
     guess = flip.point.x + s * flip.point.tangent

@@ -59,7 +59,7 @@ class Follower:
         strides: Strides,
         abscissa: Callable[[float], float] = float,
     ) -> None:
-        """Start from `first`; `solve` returns a solution (m,), smooth in `abscissa(value)`, near a guess; or None."""
+        """Start from `first`. `solve` returns a solution (m,), smooth in `abscissa(value)`, near a guess, or None."""
         self._solve, self._strides, self._abscissa, self._states = solve, strides, abscissa, [first]
 
     def to(self, target: float) -> FollowerState:
@@ -106,12 +106,12 @@ def correct(
 ) -> CurvePoint[Data] | NotConverged:
     """Solve for the point of a curve on the plane through `guess` with this `normal`."""
 
-    def on_plane(x: Floats) -> Evaluated[Data]:
+    def evaluate_on_plane(x: Floats) -> Evaluated[Data]:
         evaluated = equations(x)
         value = np.append(evaluated.value, normal @ (x - guess))
         return evaluated._replace(value=value, jacobian=np.vstack((evaluated.jacobian, normal)))
 
-    solution = newton(on_plane, guess, Effort(tolerance, most))
+    solution = newton(evaluate_on_plane, guess, Effort(tolerance, most))
     if isinstance(solution, NotConverged):
         return solution
     try:
@@ -138,7 +138,7 @@ def step_along(
     acceptable: Callable[[CurvePoint[Data]], bool] = lambda _: True,
     before: CurvePoint[Data] | None = None,
 ) -> tuple[CurvePoint[Data], float] | NotConverged:
-    """Find the next `acceptable` point of a curve and the next step length; the point `before` gives the curvature."""
+    """Find the next `acceptable` point of a curve and the next step length. The point `before` gives the curvature."""
     lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
     if before is not None:
@@ -182,7 +182,7 @@ class _OffTheCurve(Exception):  # noqa: N818 (the end of one search, not an erro
 
 
 def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], float]) -> CurvePoint[Data] | None:
-    """Return the point of a segment where `measure` changes sign, by Brent's method; None if the curve is lost."""
+    """Return the point of a segment where `measure` changes sign, by Brent's method, or None if the curve is lost."""
     # imported late, because only curves need it
     from scipy.optimize import brentq
 

@@ -107,7 +107,9 @@ def is_feasible(problem: DesignProblem, point: Point) -> bool:
 def search_from_starts(
     problem: DesignProblem, own: Floats, starts: int, seed: int, search: Searcher | None = None
 ) -> list[DesignSearch]:
-    """Search from the walker's parameters and from random ones; return successful searches, best feasible one first."""
+    """Search from the walker's parameters and from random ones, and return successful searches, best
+    feasible one first.
+    """
     search = search or (lambda _, start: minimise(problem, start))
     random_starts = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (starts - 1, own.size))
     all_starts = (np.clip(own, problem.lower, problem.upper), *random_starts)

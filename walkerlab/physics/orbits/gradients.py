@@ -45,7 +45,7 @@ LOST_ERROR = 0.1  # relative error above which a derivative is lost in rounding
 
 @dataclass(frozen=True)
 class Gradient:
-    """Derivative and its error; `why` explains a missing derivative, or warns that rounding dominates it."""
+    """Derivative and its error. `why` explains a missing derivative, or warns that rounding dominates it."""
 
     value: float | None
     error: float | None
@@ -60,7 +60,7 @@ class Gradient:
 
 
 def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
-    """Compute the quantities of a gait by name, without norms if it is unstable; None if its step fails."""
+    """Compute the quantities of a gait by name, without norms if it is unstable, or return None if its step fails."""
     # only the quantities in `selection`, because those that need more than a single step are expensive
     step = gait.step_map.step(gait.z, gait.p)
     if step.outcome is not Outcome.WALKED:
@@ -78,7 +78,7 @@ def step_quantities(step: MappedStep) -> tuple[float, float, float]:
 
 
 def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
-    """Return the gait sensitivity norm of the step period for a floor drop, in s/m and scaled; None if unstable."""
+    """Return the gait sensitivity norm of the step period for a floor drop, in s/m and scaled, or None if unstable."""
     answer = response(gait, "floor-drop")
     if answer is None:
         return None
@@ -99,7 +99,9 @@ WALK_QUANTITIES: Final[Mapping[tuple[str, ...], Callable[[GaitOnMap], tuple[floa
 
 
 def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, Gradient]:
-    """Differentiate a gait's quantities with respect to the parameter; empty if the step map fails at nearby values."""
+    """Differentiate a gait's quantities with respect to the parameter, or return nothing if the step map fails at
+    nearby values.
+    """
     h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
         closer = family_direction(gait, part * h, along)
@@ -137,7 +139,7 @@ class Derivatives(NamedTuple):
 
 
 def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
-    """Improve a guess of dz/dp (d,) along the family, using steps in its direction; None if that fails."""
+    """Improve a guess of dz/dp (d,) along the family, using steps in its direction, or None if that fails."""
     # On compliant ground a step from z itself fails if the parameter changes the walker's dimensions: its foot would be
     # in the air or deep in the ground.
 
@@ -150,7 +152,9 @@ def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
 
 
 def differentiate(gait: GaitOnMap, h: float, guess: Floats, selection: Collection[str]) -> Derivatives | None:
-    """Compute difference quotients of step h along the family; None if the step map fails at nearby values."""
+    """Compute difference quotients of step h along the family, or return None if the step map fails at
+    nearby values.
+    """
     along = family_direction(gait, h, guess)
     if along is None:
         return None
@@ -202,5 +206,5 @@ def radius_gradient(A: Floats, change: Floats, error: Floats) -> Gradient:
 
 
 def relative_gradient(value: float, parameter: float, quantity: float) -> float | None:
-    """Return the relative change of a quantity per relative change of the parameter; None if either is zero."""
+    """Return the relative change of a quantity per relative change of the parameter, or None if either is zero."""
     return None if parameter == 0.0 or math.isclose(quantity, 0.0, abs_tol=1e-300) else value * parameter / quantity

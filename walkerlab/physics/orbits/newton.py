@@ -23,7 +23,7 @@ class Evaluated(NamedTuple, Generic[Data]):
 
     @property
     def residual(self) -> float:
-        """Largest absolute component of the value; infinite if there is no value."""
+        """Largest absolute component of the value, or infinity if there is no value."""
         return max(map(abs, self.value.tolist())) if self.outcome is Outcome.WALKED else np.inf
 
 
@@ -55,7 +55,7 @@ class Effort(NamedTuple):
 
 
 def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
-    """Solve m equations from a guess (m,); on failure, return NotConverged with the outcome of the walk."""
+    """Solve m equations from a guess (m,). On failure, return NotConverged with the outcome of the walk."""
     tolerance, most, shortest, growth, rounding = effort
     x, current, corrections, evaluations = guess, equations(guess), 0, 1
     residual = current.residual

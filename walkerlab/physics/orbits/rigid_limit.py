@@ -18,9 +18,9 @@ from walkerlab.physics.hybrid.comparison import (
     PHASES,
     Motion,
     add_strike_samples,
-    between_impacts,
     difference_in_phase,
     difference_in_time,
+    smooth_phases,
 )
 from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
@@ -122,7 +122,7 @@ class Limit:
     def series(
         self, name: str, walker: ContactWalker, gait: Cycle, start: Callable[[ContactWalker], State] | None = None
     ) -> list[Distance]:
-        """Return the distances along a series until a gait is lost; with a `start`, compare walks as well."""
+        """Return the distances along a series until a gait is lost. With a `start`, compare walks as well."""
         # each gait is the guess for the next
         distances: list[Distance] = []
         for setting in series_settings(name, self.every):
@@ -145,7 +145,7 @@ class Limit:
         return distances
 
     def gait(self, walker: ContactWalker, near: Cycle, tolerance: float) -> Cycle | None:
-        """Solve for the gait of this walker near the gait of another setting; None if it fails."""
+        """Solve for the gait of this walker near the gait of another setting, or return None if it fails."""
         pads = OwnPads(lambda _: walker, self.ground, solver_settings(tolerance), near.step.length_m)
         solution = gait_near(pads, near.z, 0.0, SERIES_EFFORT)
         return solution if isinstance(solution, Cycle) else None
@@ -168,7 +168,7 @@ class Limit:
         motion = add_strike_samples(Motion(sampled.samples.time_s, *legs, sampled.touch_time_s, sampled.knee_strikes_s))
         phases = np.linspace(0.0, 1.0, PHASES)
         aligned = difference_in_phase(motion, self.motion, phases)
-        smooth = between_impacts(motion, self.motion, phases)
+        smooth = smooth_phases(motion, self.motion, phases)
         _, raw = difference_in_time(motion, self.motion)
         return replace(
             distance,
@@ -212,7 +212,7 @@ class Extrapolation:
 
 
 def extrapolate(distances: list[Distance]) -> Extrapolation | None:
-    """Extrapolate the period by Aitken's method from the last resolved settings; None if they do not converge."""
+    """Extrapolate the period by Aitken's method from the last resolved settings, or None if they do not converge."""
     # Settings are ignored from the first one whose change of the period is below its numerical error.
     periods = np.array([distance.period for distance in distances])
     errors = np.array([distance.numerical_period for distance in distances])

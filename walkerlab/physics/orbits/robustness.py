@@ -62,7 +62,7 @@ class GaitOnMap(NamedTuple):
 
 
 def derivative(function: Callable[[float], Floats | None], step: float) -> Floats | None:
-    """Differentiate a function at 0 to fourth order, one-sided if one side lacks values; None if both do."""
+    """Differentiate a function at 0 to fourth order, one-sided if one side lacks values, or None if both do."""
     for formula in FORMULAS:
         values = [value for offset, _ in formula if (value := function(offset * step)) is not None]
         if len(values) == len(formula):
@@ -71,7 +71,7 @@ def derivative(function: Callable[[float], Floats | None], step: float) -> Float
 
 
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
-    """Return norms (indicators,) of e' = C z + D d, z' = A z + B d; None for an unstable gait.
+    """Return norms (indicators,) of e' = C z + D d, z' = A z + B d, or None for an unstable gait.
 
     A (d, d), B (d,), C (indicators, d); D (steps, indicators) holds the responses of the first steps.
     """
@@ -105,16 +105,18 @@ def walk_disturbed(gait: GaitOnMap, disturbance: Disturbance, size: float, steps
 
 
 def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None:
-    """Return a gait's sensitivity to a disturbance; None if the gait is unstable or a slightly disturbed step fails."""
+    """Return a gait's sensitivity to a disturbance, or None if the gait is unstable or a slightly disturbed
+    step fails.
+    """
     fine, coarse = (response(gait, disturbance, times) for times in (1.0, 2.0))
     return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return norms and the disturbed step's response (None if either fails); `times` scales the difference step."""
+    """Return norms and the disturbed step's response (None if either fails). `times` scales the difference step."""
     d, h = gait.z.size, times * gait.step_map.probe
 
-    def after(size: float) -> Floats | None:
+    def step_after(size: float) -> Floats | None:
         walk = walk_disturbed(gait, disturbance, size, DIRECT_STEPS)
         return np.append(indicators(walk), walk.z) if walk.outcome is Outcome.WALKED else None
 
@@ -122,7 +124,7 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
         walk = gait.step_map.disturbed(gait.z + move, gait.p, np.zeros(2))
         return indicators(walk)[0] if walk.outcome is Outcome.WALKED else None
 
-    changed = derivative(after, h * gait.unit_of(disturbance))
+    changed = derivative(step_after, h * gait.unit_of(disturbance))
     columns = [derivative(lambda size, unit=unit: next_step(size * unit), h) for unit in np.eye(d)]  # type: ignore[misc]
     if changed is None or any(column is None for column in columns):
         return None

@@ -70,7 +70,9 @@ class ScaledStarts:
         return walk_contact(self.walker, self.ground, False, STANCE_FOOT, start, self.tolerances, self.steps, None)
 
     def settling_steps(self, walk: ContactWalkResult) -> int | None:
-        """Return the number of steps after which periods and lengths match the gait; None if the last step does not."""
+        """Return the number of steps after which periods and lengths match the gait, or None if the last
+        step does not.
+        """
         if self.gait is None:
             return None
         period, length = self.gait
@@ -92,7 +94,7 @@ def scaled_starts(
     steps: int,
     gait: tuple[float, float] | None,
 ) -> ScaledStarts:
-    """Build the scaled starts of a scene; `start_of` is linear in the factors on the two angular velocities."""
+    """Build the scaled starts of a scene. `start_of` is linear in the factors on the two angular velocities."""
     still, swing, stance = start_of(0.0, 0.0), start_of(1.0, 0.0), start_of(0.0, 1.0)
     half = len(still) // 2
     return ScaledStarts(walker, ground, still[:half], swing[half:], stance[half:], steps, gait)
@@ -181,7 +183,7 @@ def smallest_change(
 
 @dataclass(frozen=True)
 class StartMap:
-    """Results of walks over factors on both velocities; each row has one factor on the stance leg's velocity."""
+    """Results of walks over factors on both velocities. Each row has one factor on the stance leg's velocity."""
 
     swing: Floats  # (columns,) factors on the swing leg's velocity
     stance: Floats  # (rows,) factors on the stance leg's velocity
@@ -205,7 +207,7 @@ def contact_row(starts: ScaledStarts, swing: Floats, stance: float) -> Integers:
 
 
 def rigid_map(walker: RigidModel, state: State, swing: Floats, stance: Floats, steps: int) -> StartMap:
-    """Compute the map of starts of the rigid model; if its ground would have to pull, the outcome is `lifted-off`."""
+    """Compute the map of starts of the rigid model. If its ground would have to pull, the outcome is `lifted-off`."""
 
     def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
         walk = take_walk(walker, RIGID_TOLERANCES, with_scaled_rates(walker, state, factor_1, factor_2), steps)

@@ -86,7 +86,9 @@ def follow_curve(
     bifurcation: Bifurcation, period: int, first: ValueSpan, plane: Plane, points: int,
     advance: Callable[[], None], control: StepControl,
 ) -> BifurcationCurve | None:  # fmt: skip
-    """Follow the curve through a bifurcation within both spans, up to `points` points each way; None if that fails."""
+    """Follow the curve through a bifurcation within both spans, up to `points` points each way, or None if
+    that fails.
+    """
     spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)
     equations = critical_gaits(plane.map_at, bifurcation.kind, period, scales)
@@ -168,7 +170,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
-    """Interpolate a period-1 gait from the branches at each value, preferably stable; None if no branch has one."""
+    """Interpolate a period-1 gait from the branches at each value, preferably stable, or None if no branch has one."""
     gaits, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:
@@ -198,7 +200,7 @@ def correct_row(step_map: StepMap, values: Floats, before: Points) -> Row:
 
 
 def settle_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
-    """Return the periods of a row's attractors and a point on each; `before` holds the points of the previous row."""
+    """Return the periods of a row's attractors and a point on each. `before` holds the points of the previous row."""
     periods, points = np.full(len(values), ALL_FAILED, np.int64), list[Floats | None]()
     for index, gait in enumerate(gaits):
         if gait is not None and gait.stable:

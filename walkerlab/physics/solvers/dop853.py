@@ -52,7 +52,7 @@ ERROR_WEIGHTS_5, ERROR_WEIGHTS_3 = np.array(tableau.ERROR_5), np.array(tableau.E
 
 @by_reference
 class Dop853(NamedTuple):
-    """DOP853 with memory for n equations; see `stepping` for the first six fields."""
+    """DOP853 with memory for n equations. See `stepping` for the first six fields."""
 
     rtol: float
     atol: float
@@ -73,7 +73,7 @@ def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
 
 @kernel_part
 def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int, end: int) -> None:
-    """Evaluate stages `first` to `end - 1` of a step of h from `y_old` at time t (s); `at` keeps the last state."""
+    """Evaluate stages `first` to `end - 1` of a step of h from `y_old` at time t (s). `at` keeps the last state."""
     y, at, K = method.y_old, method.at, method.stages
     total = vector(block(system))
     width = len(total)
@@ -94,7 +94,9 @@ def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int,
 
 @kernel_part
 def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
-    """Compute a step of h (s) from `y_old` into `y`; returns its error relative to the tolerance, equation (10.17)."""
+    """Compute a step of h (s) from `y_old` into `y`, and return its error relative to the tolerance,
+    equation (10.17).
+    """
     y_old, y, at, K = method.y_old, method.y, method.at, method.stages
     evaluate_stages(method, system, t, h, 1, LAST_STAGE + 1)
     by_order_5, by_order_3 = vector(block(system)), vector(block(system))
@@ -132,7 +134,7 @@ def scaled_norm(method: Dop853, v: Any) -> float:
 
 @kernel_part
 def change_of_step(error: float) -> float:
-    """Compute the factor for the step size after a step with this error; three square roots give the eighth root."""
+    """Compute the factor for the step size after a step with this error. Three square roots give the eighth root."""
     return max(SHRINK_MOST, SAFETY / math.sqrt(math.sqrt(math.sqrt(error))))
 
 

@@ -119,19 +119,19 @@ def spans_zero(finder: CrossingFinder, event: int) -> bool:
 
 @kernel_part
 def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> int:
-    """Write the coefficients for the whole step to the bottom of the stack; returns their number."""
+    """Write the coefficients for the whole step to the bottom of the stack, and return their number."""
     stack, size = finder.stack, finder.nodes.size
     for i in range(size):
         total = 0.0
         for j in range(size):
             total += finder.to_bernstein[i, j] * finder.values[event, j]
         stack[0, i] = total
-    return without_zero_at_start(stack, size) if zero_at_start else size
+    return divide_out_zero(stack, size) if zero_at_start else size
 
 
 @kernel_part
-def without_zero_at_start(stack: Any, size: int) -> int:
-    """Divide a zero at the start out of the polynomial at the bottom of the stack; returns its new size."""
+def divide_out_zero(stack: Any, size: int) -> int:
+    """Divide a zero at the start out of the polynomial at the bottom of the stack, and return its new size."""
     degree = size - 1
     for i in range(1, size):
         stack[0, i - 1] = stack[0, i] * degree / i
@@ -140,7 +140,9 @@ def without_zero_at_start(stack: Any, size: int) -> int:
 
 @kernel_part
 def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
-    """Return the slope (per step) at which an event function leaves its zero at the start; 0 if not over `clearly`."""
+    """Return the slope (per step) at which an event function leaves its zero at the start, or 0 if not over
+    `clearly`.
+    """
     # The error of the last event's time leaves a small value at the start, which is subtracted.
     size = set_root_piece(finder, event, False)
     for i in range(1, size):
@@ -152,7 +154,7 @@ def way_from_zero(finder: CrossingFinder, event: int, clearly: float) -> float:
 
 @kernel_part
 def sign_changes(stack: Any, piece: int, size: int) -> int:
-    """Count sign changes of a piece's coefficients; zero counts as positive."""
+    """Count sign changes of a piece's coefficients. Zero counts as positive."""
     changes = 0
     for i in range(1, size):
         if (stack[piece, i] < 0.0) != (stack[piece, i - 1] < 0.0):

@@ -9,7 +9,7 @@ from walkerlab.physics.solvers.events import (
     NO_CROSSING,
     CrossingFinder,
     crossing_of_piece,
-    without_zero_at_start,
+    divide_out_zero,
 )
 
 Jet = tuple[float, float, float]
@@ -37,11 +37,11 @@ def hermite(h: float, start: Jet, end: Jet) -> Quintic:
 
 @kernel_part
 def evaluate_quintic(quintic: Quintic, x: float) -> float:
-    return value_and_slope(in_powers(quintic), x)[0]
+    return value_and_slope(power_coefficients(quintic), x)[0]
 
 
 @kernel_part
-def in_powers(quintic: Quintic) -> Quintic:
+def power_coefficients(quintic: Quintic) -> Quintic:
     b0, b1, b2, b3, b4, b5 = quintic
     return (
         b0,
@@ -75,14 +75,14 @@ def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, af
         return only_crossing(quintic) if quintic[0] >= 0.0 else NO_CROSSING
     for i in range(6):
         finder.stack[0, i] = quintic[i]
-    size = without_zero_at_start(finder.stack, 6) if zero_at_start else 6
+    size = divide_out_zero(finder.stack, 6) if zero_at_start else 6
     return crossing_of_piece(finder, size, FALLING, after)
 
 
 @kernel_part
 def only_crossing(quintic: Quintic) -> float:
     """Find the zero of a quintic with a single, falling crossing: Newton from the end, safeguarded by bisection."""
-    powers = in_powers(quintic)
+    powers = power_coefficients(quintic)
     low, high, x = 0.0, 1.0, 1.0
     for _ in range(MAX_ITERATIONS):
         value, slope = value_and_slope(powers, x)

@@ -1,4 +1,4 @@
-"""Steps of DOP853 on states that are tuples of lanes, which stay in registers; see `dop853`."""
+"""Steps of DOP853 on states that are tuples of lanes, which stay in registers. See `dop853`."""
 
 from typing import Any
 
@@ -87,7 +87,7 @@ def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tu
 
 @kernel_part
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
-    """Compute, for each error estimate, the sum of squares of error over tolerance; `method` holds rtol and atol."""
+    """Compute, for each error estimate, the sum of squares of error over tolerance. `method` holds rtol and atol."""
     error_5, error_3 = 0.0, 0.0
     for i in range(len(y)):
         scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))

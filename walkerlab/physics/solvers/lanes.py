@@ -25,7 +25,7 @@ Lanes = Any
 
 
 class LanesType(types.Type):  # type: ignore[misc]
-    """Numba's type of lanes; floats convert to it."""
+    """Numba's type of lanes. Floats convert to it."""
 
     def __init__(self) -> None:
         super().__init__(name="lanes")
@@ -79,7 +79,7 @@ def _is_number(kind: Any) -> bool:
 
 
 def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: Any) -> None:
-    """Extend a scalar function to lanes; `build` receives the IR builder and the arguments as lanes."""
+    """Extend a scalar function to lanes. `build` receives the IR builder and the arguments as lanes."""
 
     class LaneTemplate(AbstractTemplate):  # type: ignore[misc]
         key = function
@@ -131,7 +131,7 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
 
 @functools.cache
 def teach_arithmetic() -> None:
-    """Register arithmetic on lanes with numba; needed before the first kernel with lanes is compiled."""
+    """Register arithmetic on lanes with numba. This is needed before the first kernel with lanes is compiled."""
     # This is not done on import, because it affects everything that the process compiles.
     unary, binary, variadic = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
     for plain, in_place, instruction in (

@@ -12,7 +12,7 @@ def reciprocal(x: Any) -> Any:
 
 
 def complex_reciprocal(x: Any) -> Any:
-    """Compute 1 / x by Smith's formulas, equal to Python's to the last bit; numba's division is a function call."""
+    """Compute 1 / x by Smith's formulas, equal to Python's to the last bit. Numba's division is a function call."""
     if abs(x.real) >= abs(x.imag):
         ratio = x.imag / x.real
         whole = x.real + x.imag * ratio
@@ -33,7 +33,9 @@ def size(x: Any) -> float:
 
 @kernel_part
 def factor(A: Any, pivots: Any, n: int) -> bool:
-    """Compute LU factors of real or complex A[:n, :n] in place, with row exchanges; returns False if it is singular."""
+    """Compute LU factors of real or complex A[:n, :n] in place, with row exchanges, and return False if it
+    is singular.
+    """
     # The diagonal holds the pivots' reciprocals.
     for k in range(n):
         best = k
@@ -58,7 +60,7 @@ def factor(A: Any, pivots: Any, n: int) -> bool:
 
 @kernel_part
 def solve(A: Any, pivots: Any, b: Any, first: int, n: int) -> None:
-    """Solve A x = b with factors from `factor`; x overwrites b[first : first + n]."""
+    """Solve A x = b with factors from `factor`. The solution overwrites b[first : first + n]."""
     for k in range(n):
         best = pivots[k]
         if best != k:

@@ -1,4 +1,4 @@
-"""Radau IIA of order 5: implicit and L-stable, for stiff contact; simplified Newton with an exact Jacobian.
+"""Radau IIA of order 5: implicit and L-stable, for stiff contact. Simplified Newton with an exact Jacobian.
 
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), section IV.8.
 """
@@ -59,7 +59,7 @@ H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = 0, 1, 2, 3, 4, 5, 
 
 @by_reference
 class Radau5(NamedTuple):
-    """Radau IIA with memory for n equations; see `stepping` for the first six fields."""
+    """Radau IIA with memory for n equations. See `stepping` for the first six fields."""
 
     rtol: float
     atol: float
@@ -94,7 +94,7 @@ def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
 
 @kernel_part
 def factor_matrices(method: Radau5, h: float) -> bool:
-    """Factor both matrices of the simplified Newton iteration for step h; returns False if one is singular."""
+    """Factor both matrices of the simplified Newton iteration for step h, and return False if one is singular."""
     size = int(method.control[UNKNOWNS])
     method.control[H_FACTORED] = h
     real = factor_shifted(method.J, size, GAMMA / h, method.real, method.pivots[0])
@@ -118,7 +118,7 @@ def solve_pair(method: Radau5, r: Any) -> None:
 
 @kernel_part
 def first_guess(method: Radau5, h: float) -> None:
-    """Extrapolate the stages from the last step's collocation polynomial; after a start, set them to zero."""
+    """Extrapolate the stages from the last step's collocation polynomial. After a start, set them to zero."""
     ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
     z, w, dense = method.z, method.w, method.dense
     for i in range(method.y.size):
@@ -133,7 +133,7 @@ def first_guess(method: Radau5, h: float) -> None:
 
 @kernel_part
 def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
-    """Do one simplified Newton iteration; returns the size of its correction relative to the tolerance."""
+    """Do one simplified Newton iteration, and return the size of its correction relative to the tolerance."""
     y, z, w, f = method.y, method.z, method.w, method.f
     n = y.size
     for stage in range(3):
@@ -165,7 +165,7 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
 
 @kernel_part
 def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
-    """Iterate until the stages are accurate enough; returns the number of iterations, 0 if they diverge."""
+    """Iterate until the stages are accurate enough, and return the number of iterations, or 0 if they diverge."""
     tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
     first_guess(method, h)
     size_old, rate = 0.0, method.control[RATE]
@@ -202,7 +202,7 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> Non
 
 @kernel_part
 def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> float:
-    """Compute the error relative to the tolerance by (8.19); if `again`, an error over 1 is filtered by (8.20)."""
+    """Compute the error relative to the tolerance by (8.19). If `again`, an error over 1 is filtered by (8.20)."""
     n = method.y.size
     error, z = method.f[0], method.z
     for i in range(n):
@@ -316,7 +316,7 @@ def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
 
 @stepping.rewind.case(Radau5)
 def rewind_radau5(method: Radau5, system: Any) -> None:
-    """Go back to the step's start; the next step's first guess does not use the polynomial."""
+    """Go back to the step's start. The next step's first guess does not use the polynomial."""
     clock, control = method.clock, method.control
     for i in range(method.y.size):
         method.y[i], method.slope[0, i] = method.y_old[i], method.slope[1, i]

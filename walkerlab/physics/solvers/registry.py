@@ -60,7 +60,10 @@ METHODS = {
 
 
 def method_named(name: str) -> Method:
-    """Return a method by name; raise KeyError with all names for an unknown one."""
+    """Return a method by name.
+
+    Raises KeyError with all names for an unknown one.
+    """
     if name in METHODS:
         return METHODS[name]
     if any(method.name == name for method in CVODE_METHODS):
@@ -92,7 +95,7 @@ class Tolerances:
         return method_named(self.method).new(n, self.rtol, self.atol, self.budget)
 
 
-def sharing(method: Any, clock: Any, counts: Any) -> Any:
+def share_counts(method: Any, clock: Any, counts: Any) -> Any:
     """Return the method with the clock and counts of another method, so that both integrate the same walk in turns."""
     if isinstance(method, ScipyMethod):
         method.clock, method.counts = clock, counts

@@ -45,7 +45,7 @@ def jacobian_matrix(system: Any, t: float, y: Any, J: Any) -> None:
 
 
 def entry_point(function: Any, *arguments: Any) -> Callable[..., None]:
-    """Return a kernel's machine code for arguments of these types; calling it avoids the cost of dispatch."""
+    """Return a kernel's machine code for arguments of these types. Calling it avoids the cost of dispatch."""
     types = tuple(numba.typeof(argument) for argument in arguments)
     code: Callable[..., None] = function if numba.config.DISABLE_JIT else function.compile(types)
     return code
@@ -57,7 +57,7 @@ class ScipyMethod:
     def __init__(
         self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
     ) -> None:
-        """Prepare for n equations; `begin` calls `new_solver`, which has the signature of scipy's solvers."""
+        """Prepare for n equations. `begin` calls `new_solver`, which has the signature of scipy's solvers."""
         self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
         self.rtol, self.atol = rtol, atol
         self.clock = np.zeros(3)
@@ -68,7 +68,7 @@ class ScipyMethod:
 
 
 def counting_rhs(counts: Integers, system: Any, n: int) -> Callable[[float, Any], Any]:
-    """Return the compiled right-hand side as libraries call it; it counts calls and raises OutOfBudgetError."""
+    """Return the compiled right-hand side as libraries call it. It counts calls and raises OutOfBudgetError."""
     probe = np.zeros(n)
     code = entry_point(right_hand_side, system, 0.0, probe, probe)
 
@@ -126,7 +126,7 @@ def advance_scipy(method: ScipyMethod, system: Any, t_end: float) -> int:
 
 
 def step_solver(method: ScipyMethod) -> int:
-    """Take one step, whose size the solver chooses; returns a status as `advance` does."""
+    """Take one step, whose size the solver chooses, and return a status as `advance` does."""
     if method.solver is None:
         return OUT_OF_BUDGET
     try:

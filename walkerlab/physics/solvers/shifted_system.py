@@ -29,7 +29,9 @@ def unknowns(J: Any) -> int:
 
 @kernel_part
 def factor_shifted(J: Any, size: int, s: Any, factors: Any, pivots: Any) -> bool:
-    """Factor the reduced matrix for shift s into `factors` (size, size), real or complex; False if it is singular."""
+    """Factor the reduced matrix for shift s into `factors` (size, size), real or complex, or return False if it is
+    singular.
+    """
     n, inverse = J.shape[0], reciprocal(s)
     for i in range(size):
         for j in range(size):

@@ -27,12 +27,12 @@ SMALLEST_STEP = 1e-15
 
 @by_type
 def begin(method: Any, system: Any, t: float, y: Any, h: float) -> None:
-    """Start, or start again after an event, from state y (n,) at time t (s); for h = 0 the method chooses its step."""
+    """Start, or start again after an event, from state y (n,) at time t (s). For h = 0 the method chooses its step."""
 
 
 @by_type
 def advance(method: Any, system: Any, t_end: float) -> int:
-    """Take one accepted step, not beyond t_end (s), and keep the previous state in `y_old`; returns a status."""
+    """Take one accepted step, not beyond t_end (s), and keep the previous state in `y_old`. Return a status."""
 
 
 @by_type

@@ -19,7 +19,7 @@ State = tuple[float, ...]
 
 @by_type
 def block(system: Any) -> Any:
-    """Return a value whose length, fixed at compile time, is the block size of loops over the state; it divides n."""
+    """Return a value whose length, fixed at compile time, is the block size of loops over the state. It divides n."""
 
 
 @by_type
@@ -29,4 +29,4 @@ def derivative(system: Any, t: float, y: Any, f: Any) -> None:
 
 @by_type
 def jacobian(system: Any, t: float, y: Any, J: Any) -> None:
-    """Write the derivatives of dy/dt with respect to y into J (n, n); implicit methods need it."""
+    """Write the derivatives of dy/dt with respect to y into J (n, n). Implicit methods need it."""

@@ -164,7 +164,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
 def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
-        name: Variable(window.along(place), (name,), UNITS[axis], TEXTS[axis])
+        name: Variable(window.cell_centres(place), (name,), UNITS[axis], TEXTS[axis])
         for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
     }
 
