@@ -26,7 +26,7 @@ INPUT_FOLDERS = ("config/builtin", "physics/machine_code")
 
 
 class Sources:
-    """Sources of packages on disk; each file is read and scanned once."""
+    """Sources of packages on disk. Each file is read and scanned once."""
 
     def __init__(self) -> None:
         self._modules: dict[str, Module | None] = {}
@@ -98,7 +98,7 @@ class Module:
 
     @cached_property
     def imports(self) -> list[str]:
-        """Full names of modules that this module may import; see `find_imports`."""
+        """Full names of modules that this module may import. See `find_imports`."""
         return find_imports(self.name, self.is_package, self.text)
 
     @cached_property

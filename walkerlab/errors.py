@@ -1,4 +1,4 @@
-"""Failures that a user can act on, each with its exit code; any other exception is a bug."""
+"""Failures that a user can act on, each with its exit code. Any other exception is a bug."""
 
 import re
 import shlex
@@ -18,7 +18,7 @@ CONTROLS: Final = ("Cc", "Cf", "Zl", "Zp")
 
 
 def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
-    """Append the options that select the run to every command in a message; `options_of` returns those of a command.
+    """Append the options that select the run to every command in a message. `options_of` returns those of a command.
 
     A setting of the command, `--set KEY=VALUE`, replaces those of its key.
     """
@@ -32,7 +32,7 @@ def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
 
 
 def without_key(options: str, key: str) -> str:
-    """Return options, each preceded by a space, without settings of a key; the slope has two keys."""
+    """Return options, each preceded by a space, without settings of a key. The slope has two keys."""
     words, same = shlex.split(options), SLOPES if key in SLOPES else (key,)
     settings = [place for place, word in enumerate(words[:-1]) if word == "--set"]
     dropped = [place for place in settings if words[place + 1].partition("=")[0].strip() in same]
@@ -63,7 +63,7 @@ class WalkerlabError(Exception):
 
 
 class ConfigError(WalkerlabError):
-    """The config (file, `extends`, `--set`) is invalid; nothing was run. `key` is the path of the key at fault."""
+    """The config (file, `extends`, `--set`) is invalid. Nothing was run. `key` is the path of the key at fault."""
 
     exit_code = 3
 
@@ -73,7 +73,7 @@ class ConfigError(WalkerlabError):
 
 
 class NoAnswer(WalkerlabError):  # noqa: N818 (no answer is a result, not an error)
-    """The computation has no answer (no gait found, solver failed, ...); `partial` may hold unfinished results."""
+    """The computation has no answer (no gait found, solver failed, ...). `partial` may hold unfinished results."""
 
     exit_code = 4
 

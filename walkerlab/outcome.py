@@ -1,11 +1,11 @@
-"""Outcomes of walks, each with descriptions, advice and a colour; an outcome is a value, never an exception."""
+"""Outcomes of walks, each with descriptions, advice and a colour. An outcome is a value, never an exception."""
 
 from enum import IntEnum
 from typing import NamedTuple
 
 
 class Outcome(IntEnum):
-    """Outcome of a walk; kernels return its integer."""
+    """Outcome of a walk. Kernels return its integer."""
 
     WALKED = 0
     FELL = 1
@@ -45,7 +45,7 @@ class Outcome(IntEnum):
 
 
 def outcome_of(label: str) -> Outcome | None:
-    """Return the outcome with a label; None if it is unknown."""
+    """Return the outcome with a label, or None if it is unknown."""
     return next((outcome for outcome in Outcome if outcome.label == label), None)
 
 

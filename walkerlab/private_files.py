@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def is_own(status: os.stat_result) -> bool:
-    """Whether a file belongs to this user; always where the system has no owners by number, as on Windows."""
+    """Whether a file belongs to this user. Always where the system has no owners by number, as on Windows."""
     return not hasattr(os, "geteuid") or status.st_uid == os.geteuid()
 
 
@@ -31,7 +31,7 @@ def make_private_folder(folder: Path) -> None:
 
 
 def make_private(path: Path) -> list[Path]:
-    """Close a file, or a folder with all that it holds, to other users; delete and return what may be foreign.
+    """Close a file, or a folder with all that it holds, to other users, and delete and return what may be foreign.
 
     Raises OSError if something that may be foreign cannot be deleted.
     """

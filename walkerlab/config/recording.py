@@ -1,4 +1,4 @@
-"""The recording block: a walk measured or computed elsewhere, to compare with; `identify` shares its keys."""
+"""The recording block: a walk measured or computed elsewhere, to compare with. `identify` shares its keys."""
 
 from typing import Annotated, Literal
 

@@ -79,7 +79,7 @@ class RecordedWalk:
     hip_is_in_m: bool = False  # whether the place of the upper marker has a known unit
 
     def both_legs(self, name: str) -> Array | None:
-        """Return a quantity of both legs (samples, 2); None unless it is recorded for both."""
+        """Return a quantity of both legs (samples, 2), or None unless it is recorded for both."""
         both = [self.quantities.get(f"{name} {leg}") for leg in (1, 2)]
         return None if both[0] is None or both[1] is None else np.stack([both[0], both[1]], axis=1)
 
@@ -264,7 +264,10 @@ def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> 
 def with_lines(
     walk: RecordedWalk, lines: Mapping[str, Line], constants: Mapping[str, float], source: str
 ) -> RecordedWalk:
-    """Add the angles of lines between markers (by quantity) to a walk; raises ConfigError for running."""
+    """Add the angles of lines between markers (by quantity) to a walk.
+
+    Raises ConfigError for running.
+    """
     lines, swaps = swap_lines_back(lines, walk.quantities[SAMPLE], walk.time_s)
     named = {walk.sources[name]: line for name, line in lines.items()}
     off, jumps = body_gaps(named, walk.quantities[SAMPLE], walk.time_s)
@@ -292,13 +295,16 @@ def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
 
 
 def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
-    """Return the two columns of each coordinate of a line's ends; empty if the source is no line."""
+    """Return the two columns of each coordinate of a line's ends, or () if the source is not a line."""
     ends = None if source in recording.columns else LINE.fullmatch(source)
     return line_columns(recording, ends[1], ends[2]) if ends else []
 
 
 def within_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[np.bool_]:
-    """Return which samples are in the part that is asked for; raises ConfigError if there are none."""
+    """Return which samples are in the part that is asked for.
+
+    Raises ConfigError if there are none.
+    """
     begin, end = (-math.inf if asked.from_s is None else asked.from_s), (math.inf if asked.to_s is None else asked.to_s)
     # samples without a time are no part that could be left out
     rows = ~((time < begin) | (time > end))
@@ -406,13 +412,16 @@ def matches(recording: Recording, named: Collection[str]) -> tuple[dict[str, str
 
 
 def leg_names(name: str) -> list[str]:
-    """Return a leg quantity's name in exported models, e.g. leg_1.angle for 'angle 1'; empty for other quantities."""
+    """Return a leg quantity's name in exported models, e.g. leg_1.angle for 'angle 1', or '' for other quantities."""
     quantity, blank, leg = name.rpartition(" ")
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
 
 def find_named(recording: Recording, asked: Recorded) -> dict[str, Source]:
-    """Return the sources that the user names, by quantity; raises ConfigError for an unknown quantity or column."""
+    """Return the sources that the user names, by quantity.
+
+    Raises ConfigError for an unknown quantity or column.
+    """
     known = {plain(name): name for name in QUANTITY_KINDS}
     sources = {TIME: Source(FRAME_TIME)} if FRAME_TIME in recording.columns else {}
     for quantity, text in asked.columns.items():
@@ -428,7 +437,7 @@ def find_named(recording: Recording, asked: Recorded) -> dict[str, Source]:
 
 
 def parse_source(recording: Recording, text: str, kind: str) -> Source:
-    """Return the source that a text such as NAME, -NAME or NAME+90deg names; an exact or quoted column name wins.
+    """Return the source that a text such as NAME, -NAME or NAME+90deg names. An exact or quoted column name wins.
 
     Raises ConfigError for a constant in an unknown unit, and for a line with a sign.
     """
@@ -462,7 +471,10 @@ def named_column(recording: Recording, name: str) -> str:
 
 
 def columns_of(recording: Recording, source: str) -> list[str]:
-    """Return the columns that a source needs: its own, or the coordinates of a line's ends; ConfigError if absent."""
+    """Return the columns that a source needs: its own, or the coordinates of a line's ends.
+
+    Raises ConfigError if absent.
+    """
     if pairs := ends_of(recording, source):
         return [column for pair in pairs for column in pair]
     if source not in recording.columns:
@@ -471,7 +483,10 @@ def columns_of(recording: Recording, source: str) -> list[str]:
 
 
 def line_columns(recording: Recording, top: str, bottom: str) -> list[tuple[str, str]]:
-    """Return the two columns of each coordinate, x, y or z, that both markers have; ConfigError without a marker."""
+    """Return the two columns of each coordinate, x, y or z, that both markers have.
+
+    Raises ConfigError without a marker.
+    """
     ends = [axes_of(recording, marker) for marker in (top, bottom)]
     return [(ends[0][axis], ends[1][axis]) for axis in "xyz" if axis in ends[0] and axis in ends[1]]
 
@@ -495,14 +510,14 @@ def axes_of(recording: Recording, marker: str) -> dict[str, str]:
 
 
 def unknown_column(recording: Recording, column: str) -> ConfigError:
-    """Build the error for a column that the file lacks; it suggests the one with the most similar name."""
+    """Build the error for a column that the file lacks. It suggests the one with the most similar name."""
     near = get_close_matches(column, recording.columns, 1, 0.3)
     advice = f"Did you mean {near[0]!r}?" if near else f"Available: {', '.join(list(recording.columns)[:12])}."
     return ConfigError(f"{recording.path} has no column {column!r}.", advice)
 
 
 def missing(recording: Recording, name: str) -> ConfigError:
-    """Build the error for a quantity without a column; it suggests the column with the most similar name."""
+    """Build the error for a quantity without a column. It suggests the column with the most similar name."""
     there = ", ".join(list(recording.columns)[:12])
     if name == TIME:
         return ConfigError(
@@ -536,7 +551,10 @@ def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Col
 
 
 def unit_value(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> float:
-    """Return the SI value of a column's unit, which the file or the user states; ConfigError if they disagree."""
+    """Return the SI value of a column's unit, which the file or the user states.
+
+    Raises ConfigError if they disagree.
+    """
     unit = stated_unit(recording, name, source, kind, units)
     if not unit:
         raise ConfigError(
@@ -550,7 +568,10 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
 
 
 def stated_unit(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> str:
-    """Return the unit that the file or the user states for a column, or ''; raises ConfigError if they disagree."""
+    """Return the unit that the file or the user states for a column, or ''.
+
+    Raises ConfigError if they disagree.
+    """
     of_user = units.get(source) or units.get(name) or units.get(kind) or rate_unit(units, kind)
     of_file = (
         recording.units.get(source) or recording.kind_units.get(kind) or unit_in_name(source, kind)
@@ -579,13 +600,13 @@ def states_unit(recording: Recording, column: str, units: Mapping[str, str]) -> 
 
 
 def unit_in_name(column: str, kind: str) -> str:
-    """Return the unit at the end of a column's name, such as mm in hip_mm; empty if the name has none."""
+    """Return the unit at the end of a column's name, such as mm in hip_mm, or '' if the name has none."""
     endings = [unit for unit in UNIT_VALUES[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
     return max(endings, key=len, default="")
 
 
 def rate_unit(units: Mapping[str, str], kind: str) -> str:
-    """Derive the unit of velocities from the unit of angles or lengths; empty if that is not stated either."""
+    """Derive the unit of velocities from the unit of angles or lengths, or return '' if that is not stated either."""
     unit = units.get({"rate": "angle", "speed": "length"}.get(kind, ""))
     return f"{unit}/s" if unit else ""
 
@@ -603,7 +624,7 @@ def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units
 def scale_of_line(
     recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]
 ) -> dict[str, float] | None:
-    """Return the SI value of the unit of each column of a line's ends; None if all have the same unknown unit."""
+    """Return the SI value of the unit of each column of a line's ends, or None if all have the same unknown unit."""
     columns = [column for pair in pairs for column in pair]
     stated = {stated_unit(recording, column, column, "length", units) for column in columns}
     if len(stated) == 1 and value_in_si(next(iter(stated)), "length") is None:
@@ -624,7 +645,7 @@ def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return units by kind, quantity or column; a unit alone, such as `deg`, applies to its kind (angles)."""
+    """Return units by kind, quantity or column. A unit alone, such as `deg`, applies to its kind (angles)."""
     pairs, alone = [], {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
         kinds = [kind for kind in UNIT_VALUES if value_in_si(part, kind) is not None]

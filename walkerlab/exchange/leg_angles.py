@@ -162,7 +162,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
 
 
 def find_ways(time: Array, angle: Array) -> list[Way]:
-    """Return the stretches of a walk in one direction; a single passing of the legs the other way does not count."""
+    """Return the stretches of a walk in one direction. A single passing of the legs the other way does not count."""
     spread, total = angle[:, 0] - angle[:, 1], angle.sum(axis=1)
     runs = apart_runs(np.abs(spread) > AHEAD * np.percentile(np.abs(spread), FAR_PERCENT), spread > 0.0)
     trends = [
@@ -185,7 +185,9 @@ def trend(time: Array, values: Array) -> float:
 
 
 def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
-    """Return the sample between two stretches at which the hip turns round; without markers, the one in the middle."""
+    """Return the sample between two stretches at which the hip turns round, or the one in the middle
+    without markers.
+    """
     begin, end = before.passings[-1][1], after.passings[0][0]
     hip = walk.quantities.get(HIP_OF_LINES)
     if hip is None:

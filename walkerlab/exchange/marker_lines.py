@@ -115,7 +115,7 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
 
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
-    """Swap the ends of both legs' lines back where they change places; return the lines, and what was done."""
+    """Swap the ends of both legs' lines back where they change places, and return the lines, and what was done."""
     mended, doubts = dict(lines), list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
         if second not in lines:

@@ -111,7 +111,7 @@ numpy.savez(sys.stdout.buffer, places=content["data"]["points"], rate=rate, labe
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Time series of a recording as stored in the file, before any unit conversion; missing values are nan."""
+    """Time series of a recording as stored in the file, before any unit conversion. Missing values are nan."""
 
     path: Path
     columns: dict[str, Array]  # (samples,) arrays by name
@@ -125,12 +125,14 @@ class Recording:
 
     @property
     def time_name(self) -> str | None:
-        """Name of the time column: the first that matches the first of TIME_NAMES that any matches; None if none."""
+        """Name of the time column: the first that matches the first of TIME_NAMES that any matches, or None
+        if there is none.
+        """
         return next((name for pattern in TIME_NAMES for name in self.columns if pattern.fullmatch(name)), None)
 
 
 def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
-    """Read the columns of a file, in the format of its extension; `key` is the config key that names it, if one does.
+    """Read the columns of a file, in the format of its extension. `key` is the config key that names it, if one does.
 
     Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """
@@ -144,7 +146,10 @@ def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
 
 
 def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, ...] = ()) -> Recording:
-    """Read a regular file; raises ConfigError if there is none, and for a pipe or a device, which might never end."""
+    """Read a regular file.
+
+    Raises ConfigError if there is none, and for a pipe or a device, which might never end.
+    """
     shown = str(path) if len(str(path)) <= LONGEST_PATH else f"{str(path)[:LONGEST_PATH]}..."
     name = f"{'.'.join(key)}: {shown}" if key else shown
     try:
@@ -166,7 +171,7 @@ def build_recording(
     kind_units: Mapping[str, str],
     problems: Iterable[str] = (),
 ) -> Recording:
-    """Build a recording from columns in order; columns without a name are left out.
+    """Build a recording from columns in order. Columns without a name are left out.
 
     problems  reason for each column why it cannot be used, or ''; a name that several columns have is a reason, too
     """
@@ -197,7 +202,7 @@ def read_delimited(path: Path) -> Recording:
 
 
 def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | None:
-    """Return the columns (count, samples) of a table whose cells are all plain numbers; None for another table."""
+    """Return the columns (count, samples) of a table whose cells are all plain numbers, or None for another table."""
     try:
         values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
@@ -227,7 +232,10 @@ def without_blanks(lines: list[str]) -> list[str]:
 
 
 def text_of(path: Path) -> str:
-    """Read a text file: UTF-16, what an XML file declares, UTF-8 or Latin-1; raises ConfigError for binary data."""
+    """Read a text file: UTF-16, what an XML file declares, UTF-8 or Latin-1.
+
+    Raises ConfigError for binary data.
+    """
     data = path.read_bytes()
     declared = match[1].decode() if (match := DECLARED_ENCODING.match(data)) else "utf-8"
     # bytes that can be matched are not in the UTF-16 that some programs declare
@@ -299,7 +307,10 @@ def without_blank_end(cells: list[str], count: int) -> list[str]:
 
 
 def number_of(cell: str) -> float:
-    """Parse a number with a decimal point or comma; raises ValueError for other texts."""
+    """Parse a number with a decimal point or comma.
+
+    Raises ValueError for other texts.
+    """
     return float(cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell)
 
 
@@ -324,7 +335,7 @@ def table_of(
     units: Mapping[str, str] = MappingProxyType({}),
     kind_units: Mapping[str, str] = MappingProxyType({}),
 ) -> Recording:
-    """Build a recording from rows of cells; empty cells become nan, and a cell with text is a problem of its column.
+    """Build a recording from rows of cells. Empty cells become nan, and a cell with text is a problem of its column.
 
     Raises ConfigError for a row with too many or too few cells.
     """
@@ -356,7 +367,7 @@ def table_of(
 
 
 def clock_times(cells: Sequence[str]) -> Array | None:
-    """Return the seconds of clock times, dates with times or durations; None for a column of other cells.
+    """Return the seconds of clock times, dates with times or durations, or None for a column of other cells.
 
     Times of day go on after midnight.
     """
@@ -369,7 +380,7 @@ def clock_times(cells: Sequence[str]) -> Array | None:
 
 
 def seconds_of(cell: str) -> float:
-    """Return a duration, the seconds since midnight or, with a date, since 1970; nan for a cell of another kind."""
+    """Return a duration, the seconds since midnight or, with a date, since 1970. Nan for a cell of another kind."""
     for pattern in CLOCKS:
         if match := pattern.fullmatch(cell.replace(",", ".")):
             days, hours, minutes, seconds = (float(part or 0.0) for part in match.groups())
@@ -382,7 +393,7 @@ def seconds_of(cell: str) -> float:
 
 
 def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callable[[], bool]) -> tuple[Array, str]:
-    """Parse the cells of a column; return the values and '', or values that are incomplete and the reason.
+    """Parse the cells of a column, and return the values and '', or incomplete values and the reason.
 
     lines       line number of each cell
     has_points  returns whether the file has numbers with a decimal point
@@ -521,7 +532,7 @@ def split_at_tabs(line: str) -> list[str]:
 
 
 def read_markers(path: Path) -> Recording:
-    """Read the markers of a .trc file as columns 'name.x', 'name.y', 'name.z'; empty cells become nan."""
+    """Read the markers of a .trc file as columns 'name.x', 'name.y', 'name.z'. Empty cells become nan."""
     lines = text_of(path).splitlines()
     if len(lines) < 5 or not lines[0].startswith("PathFileType"):
         raise ConfigError(
@@ -553,12 +564,12 @@ def read_markers(path: Path) -> Recording:
 
 
 def coordinates(markers: Iterable[str]) -> list[str]:
-    """Return the names of the columns x, y and z of each marker; empty for a marker without a name."""
+    """Return the names of the columns x, y and z of each marker, or () for a marker without a name."""
     return [f"{marker}.{axis}" if marker else "" for marker in markers for axis in "xyz"]
 
 
 def read_c3d(path: Path) -> Recording:
-    """Read the markers of a C3D file as columns 'name.x', 'name.y', 'name.z'; needs the package extra `data`."""
+    """Read the markers of a C3D file as columns 'name.x', 'name.y', 'name.z'. This needs the package extra `data`."""
     if find_spec("ezc3d") is None:
         raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"')
     arrays = c3d_arrays(path)

@@ -90,7 +90,9 @@ def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
 
 
 def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, int]]:
-    """Return times at which the foot ahead falls to the other's level, and its leg; noise may repeat a heel strike."""
+    """Return the time and leg of each candidate heel strike, where the front foot comes down to the level of the rear
+    one. Noise can produce several candidates for one strike.
+    """
     # A recording may end with a heel strike, so its last two samples are continued by half an interval.
     time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
@@ -135,7 +137,9 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
 
 
 def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: int, period: float) -> Touch | None:
-    """Locate the heel strike near a crossing by a fit; None if there are too few samples, or the foot does not fall."""
+    """Locate the heel strike near a crossing by a fit, or return None if there are too few samples, or the foot does
+    not fall.
+    """
     t, y = samples_near(time, angle, near, period)
     farthest = 0.5 * float(np.abs(t).max())
     at, correction, degree, touch = 0.0, 0.0, DEGREES[0], None
@@ -156,7 +160,7 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
 
 
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
-    """Return the samples around an instant (times from it, and angles); more of the step where samples are sparse."""
+    """Return the samples around an instant (times from it, and angles), with more of the step if samples are sparse."""
     away = np.abs(time - near)
     wanted = float(np.partition(away, min(2 * FEWEST, away.size) - 1)[min(2 * FEWEST, away.size) - 1])
     inside = away <= max(WINDOW * period, min(wanted, WIDEST * period))
@@ -193,7 +197,7 @@ def with_bias(fit: Fit, t: Array, y: Array, at: float, degree: int) -> Fit:
 
 
 def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
-    """Fit polynomials that meet at an instant, without a side that has too few samples; None if both have.
+    """Fit polynomials that meet at an instant, without a side that has too few samples, or None if both have.
 
     Few samples on a side, as where a recording begins just before a strike, would bend the other side to a low degree.
     """

@@ -59,7 +59,7 @@ SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, a
 
 @dataclass(frozen=True, eq=False)
 class RecordedSteps:
-    """Recorded walk from its first heel strike on; column 0 is the leg that swings first."""
+    """Recorded walk from its first heel strike on. Column 0 is the leg that swings first."""
 
     time_s: Array  # (samples,) s, from that heel strike; every later heel strike has a sample on each side
     step: NDArray[np.int64]  # (samples,) index of the step

@@ -1,4 +1,4 @@
-"""Interfaces through which stages and the runner report progress; callers decide how to show it."""
+"""Interfaces through which stages and the runner report progress. Callers decide how to show it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class StageReporter(Progress, Protocol):
     """Progress of a stage, as the runner reports it."""
 
     def end(self, said: str) -> None:
-        """End the stage with a closing line; '' if the stage failed, since its error is reported elsewhere."""
+        """End the stage with a closing line, which is '' if the stage failed, since its error is reported elsewhere."""
 
 
 class Reporter(Protocol):

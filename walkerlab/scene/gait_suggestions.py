@@ -85,7 +85,7 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
 
 
 def suggest_gaits(scene: RigidConfig) -> str:
-    """Suggest gaits near a scene that has none, as commands; empty on slopes that do not descend."""
+    """Suggest gaits near a scene that has none, as commands, or return '' on slopes that do not descend."""
     if scene.slope_rad <= 0.0:
         return ""
     config = rigid_alone(scene)

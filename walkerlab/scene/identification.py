@@ -347,7 +347,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter; of the leg for lengths and inertias of zero, and zero for drives of zero."""
+    """Return 1 % of a parameter. Of the leg for lengths and inertias of zero, and zero for drives of zero."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)

@@ -21,7 +21,10 @@ class Graph:
     """
 
     def __init__(self, *stages: Stage, at: str = "") -> None:
-        """Store the stages; raises ValueError if two have the same name."""
+        """Store the stages.
+
+        Raises ValueError if two have the same name.
+        """
         self.stages, self.at = stages, at
         self._by_name = {stage.name: stage for stage in stages}
         if len(self._by_name) != len(stages):
@@ -49,7 +52,10 @@ class Graph:
         return tuple(stage for stage in self.stages if stage.name in needed)
 
     def needed_in_memory(self, target: str, config: Config) -> tuple[Stage, ...]:
-        """Return the stages as `needed_for` does; raises ConfigError if one lacks a config block or draws files."""
+        """Return the stages as `needed_for` does.
+
+        Raises ConfigError if one lacks a config block or draws files.
+        """
         stages = self.needed_for(target, config)
         for stage in stages:
             if stage.draws:

@@ -14,7 +14,7 @@ from walkerlab.pipeline.store.key import Identity
 
 
 class Keys:
-    """Builds identities of results; parts that do not depend on the config are computed once per stage."""
+    """Builds identities of results. Parts that do not depend on the config are computed once per stage."""
 
     def __init__(self, graph: Graph = PIPELINE) -> None:
         """Start without digests, which are computed on first use."""
@@ -23,7 +23,7 @@ class Keys:
         self._digests: dict[tuple[str, ...], str] = {}
 
     def of(self, config: Config, target: str) -> dict[str, str]:
-        """Return the keys of a stage and of all its inputs, by stage; raises as `Graph.needed_in_memory` does."""
+        """Return the keys of a stage and of all its inputs, by stage. Raises as `Graph.needed_in_memory` does."""
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
             input_keys = {name: keys[name] for name in stage.inputs(config)}

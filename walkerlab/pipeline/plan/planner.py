@@ -11,7 +11,7 @@ from walkerlab.scene.omissions import LeftOut
 
 
 class Planner:
-    """Decides what to do with some stages under one config; knows the results that exist so far.
+    """Decides what to do with some stages under one config, knowing the results that exist so far.
 
     stages    stages to bring up to date, each after the stages that it needs
     force     run every stage that is not left out, even if its result is current
@@ -31,7 +31,7 @@ class Planner:
         self._keys: dict[str, str] = {}
 
     def plan(self) -> tuple[Step, ...]:
-        """Decide for each stage, assuming that all succeed; changes no file."""
+        """Decide for each stage, assuming that all succeed. This changes no file."""
         steps = []
         for stage in self.stages:
             step = self.decide(stage)

@@ -106,7 +106,9 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
 
 
 def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str], None]) -> None:
-    """Warn if the file of a run's config was edited since; `config`: the run's, None if it cannot be read."""
+    """Warn if the file of a run's config was edited since. `config` is that of the run, or None if it
+    cannot be read.
+    """
     if config is None:
         return
     file, edits = edits_since(config, folder)
@@ -133,7 +135,7 @@ def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
 
 
 def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
-    """Return the run of an artifact and the config stored in it; None if there is no such file."""
+    """Return the run of an artifact and the config stored in it, or None if there is no such file."""
     if path.suffix != SUFFIX or not is_file(path):
         return None
     folder = RunFolder.open_folder(path.parent)
@@ -148,7 +150,7 @@ def artifact_at(path: Path) -> tuple[RunFolder, ConfigFile] | None:
 
 
 def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
-    """Return the run with this name or folder, and its config; None if there is no such run."""
+    """Return the run with this name or folder, and its config, or None if there is no such run."""
     folder = find_run(text, runs)
     if folder is None:
         return None

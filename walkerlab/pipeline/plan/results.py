@@ -58,7 +58,7 @@ class FolderResults:
         self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:
-        """Return a step that reuses a stage's result or runs the stage; with `force` it always runs the stage."""
+        """Return a step that reuses a stage's result or runs the stage. With `force` it always runs the stage."""
         path = self.run.artifact(stage.name)
         verdict = artifact.check(path, identity.key, stage.name)
         stored, damaged = verdict.artifact, path if verdict.damaged else None
@@ -87,7 +87,7 @@ class FolderResults:
                     shutil.copyfile(step.origin, temporary)
 
     def begin(self, step: Step, config: Config, inputs: Mapping[str, Content], force: bool) -> Mapping[str, Any]:
-        """Prepare to store a result; return the optional arguments of the stage, see `call_stage`.
+        """Prepare to store a result, and return the optional arguments of the stage, see `call_stage`.
 
         With `force`, the checkpoint of an interrupted run is dropped.
         """
@@ -101,7 +101,10 @@ class FolderResults:
         return {"checkpoint": checkpoint, "folder": self.folder}
 
     def keep(self, step: Step, answer: Content, awaited: bool) -> Stored:  # noqa: ARG002
-        """Store a result and remove its checkpoint; raises StorageError if that fails."""
+        """Store a result and remove its checkpoint.
+
+        Raises StorageError if that fails.
+        """
         origin, checkpoint = self._begun.pop(step.stage.name)
         assert step.identity is not None, "a stage that is left out does not run"
         path = self.run.artifact(step.stage.name)
@@ -110,7 +113,7 @@ class FolderResults:
         return stored
 
     def _why_outdated(self, stage: Stage, identity: Identity, verdict: Verdict, inputs: Mapping[str, Content]) -> str:
-        """Return the reason why a stage has to run; empty if its result is current."""
+        """Return the reason why a stage has to run, or '' if its result is current."""
         stored = verdict.artifact
         if not verdict.accepted or stored is None:
             changes = changed_parts(stored.identity, identity) if stored is not None else []
@@ -119,7 +122,7 @@ class FolderResults:
 
 
 def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]) -> str:
-    """Name an input whose content has changed since the result was computed; empty if no input has."""
+    """Name an input whose content has changed since the result was computed, or return '' if no input has."""
     for name, result in inputs.items():
         if stored.provenance.input_digests.get(name) != input_digest(stage, result):
             return f"input {name} was recomputed"
@@ -127,12 +130,14 @@ def recomputed_input(stage: Stage, stored: Stored, inputs: Mapping[str, Content]
 
 
 def input_digest(stage: Stage, result: Content) -> str:
-    """Return the digest of an input that a result records; for drawings, which show timings, it covers the file."""
+    """Return the digest of an input that a result records. For drawings, which show timings, it covers the file."""
     return result.seal if stage.draws and isinstance(result, Stored) else result.digest()
 
 
 def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Stored] | None:
-    """Find the file and result for a key in another run folder; None if no folder has it. Damaged files are ignored."""
+    """Find the file and result for a key in another run folder, or return None if no folder has it. Damaged files are
+    ignored.
+    """
     try:
         names = sorted(entry.name for entry in os.scandir(folder.runs_dir) if entry.is_dir())
     except OSError:
@@ -146,7 +151,7 @@ def find_elsewhere(folder: RunFolder, stage: str, key: str) -> tuple[Path, Store
 
 
 def mentions(path: Path, key: str) -> bool:
-    """Whether a file contains a key; a cheap test before the file is read and verified."""
+    """Whether a file contains a key: a cheap test before the file is read and verified."""
     try:
         with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             return data.find(key.encode()) >= 0
@@ -155,7 +160,7 @@ def mentions(path: Path, key: str) -> bool:
 
 
 class LoadedCodeKeys(Keys):
-    """Builds identities for this process only; its code does not change, so they need no code digest."""
+    """Builds identities for this process only. Its code does not change, so they need no code digest."""
 
     def code_digest(self, target: str, added: Set[str] = frozenset()) -> str:  # noqa: ARG002
         return ""

@@ -19,7 +19,7 @@ from walkerlab.pipeline.store.runs import SWEEP, config_of, read_all
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:
-    """Return the step that would bring each stage of a run folder up to date; changes no file."""
+    """Return the step that would bring each stage of a run folder up to date. This changes no file."""
     return Planner(config, FolderResults(folder, graph, elsewhere=False), graph.stages).plan()
 
 
@@ -55,7 +55,10 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
 
 
 def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE) -> dict[str, Stored]:
-    """Return the existing results of these stages; raises StaleError naming all that are unreadable."""
+    """Return the existing results of these stages.
+
+    Raises StaleError naming all that are unreadable.
+    """
     intact, bad = read_all(folder, stages)
     if bad:
         commands = join_words(command(folder, graph[stage]) for stage in bad)
@@ -65,12 +68,18 @@ def results_in(folder: RunFolder, stages: Iterable[str], graph: Graph = PIPELINE
 
 
 def result_in(folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
-    """Return a stage's result; raises StaleError if it is missing or unreadable."""
+    """Return a stage's result.
+
+    Raises StaleError if it is missing or unreadable.
+    """
     return the_result(results_in(folder, [stage], graph), folder, stage, graph)
 
 
 def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, graph: Graph = PIPELINE) -> Stored:
-    """Return a stage's result from the results of its run; raises StaleError if it is missing."""
+    """Return a stage's result from the results of its run.
+
+    Raises StaleError if it is missing.
+    """
     if stage not in results:
         raise StaleError(f"{folder.path} has no result of {stage}.", f"{command(folder, graph[stage])} computes it.")
     return results[stage]
@@ -80,7 +89,7 @@ def the_result(results: Mapping[str, Stored], folder: RunFolder, stage: str, gra
 def results_to_show(
     folder: RunFolder, stages: Iterable[str], warn: Callable[[str], None], graph: Graph = PIPELINE
 ) -> Iterator[dict[str, Stored]]:
-    """Give a `with` block the existing results of these stages; warn of outdated ones.
+    """Give a `with` block the existing results of these stages, and warn of outdated ones.
 
     Raises StaleError as `results_in` does, and if the block reads something that an outdated result lacks.
     """
@@ -93,7 +102,7 @@ def results_to_show(
 
 
 def why_outdated(folder: RunFolder, stages: Collection[str], graph: Graph = PIPELINE) -> dict[str, str]:
-    """Return the reasons why results are outdated, by stage; current results are not listed."""
+    """Return the reasons why results are outdated, by stage. Current results are not listed."""
     config = config_of(folder)
     if config is None:
         return dict.fromkeys(stages, "this version cannot read the config of its run")

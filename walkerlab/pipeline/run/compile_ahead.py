@@ -96,7 +96,7 @@ PARTS: tuple[Callable[[Config], None], ...] = (
 
 
 def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
-    """Compile some kernels of a config; return the names of their files."""
+    """Compile some kernels of a config, and return the names of their files."""
     from walkerlab.physics.compiler import files_in_use
 
     part(config)
@@ -104,7 +104,9 @@ def compile_part(part: Callable[[Config], None], config: Config) -> set[str]:
 
 
 def compile_ahead(configs: Iterable[Config], jobs: int) -> set[str]:
-    """Compile all kernels of some configs that the package and the cache lack; return the names of all their files."""
+    """Compile all kernels of some configs that the package and the cache lack, and return the names of all
+    their files.
+    """
     calls = [partial(compile_part, part, config) for config, part in product(configs, PARTS)]
     return set[str]().union(*in_order(calls, jobs))
 

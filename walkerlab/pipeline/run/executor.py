@@ -50,7 +50,7 @@ class Executor:
         self._total = 0
 
     def carry_out(self, likely: Sequence[Stage] = ()) -> None:
-        """Reuse, run or leave out each stage; `likely` holds the stages that the plan expects to run."""
+        """Reuse, run or leave out each stage. `likely` holds the stages that the plan expects to run."""
         self._waiting, self._left, self._total = (
             list(self.planner.stages),
             [stage.name for stage in likely],
@@ -110,7 +110,7 @@ class Executor:
         self._events.put(lambda: bool(getattr(reporter, call)(*arguments)))
 
     def _ended(self, future: Future[Any]) -> bool:
-        """Handle a finished future; return True, because a process has become free."""
+        """Handle a finished future, and return True, because a process has become free."""
         self._working.remove(future)
         if future in self._running:
             self._finish(future, future.result())
@@ -164,7 +164,8 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Draw what the results so far suffice for; `why`: reason why those of the `unsettled` stages are missing.
+        """Draw what the results so far suffice for. `why` is the reason why those of the `unsettled` stages are
+        missing.
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """

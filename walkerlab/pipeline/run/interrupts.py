@@ -16,7 +16,7 @@ PATIENCE_S = 1.0
 
 
 def raise_on(number: int, error: type[BaseException]) -> None:
-    """Make a signal raise an error; inside an LLVM callback, send the signal again shortly afterwards."""
+    """Make a signal raise an error. Inside an LLVM callback, send the signal again shortly afterwards."""
     again: list[threading.Timer] = []
 
     def arrived(number: int, frame: FrameType | None) -> None:

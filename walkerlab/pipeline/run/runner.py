@@ -124,7 +124,7 @@ def execute(
 def run_and_write(
     run: ResolvedRun, target: str, options: Options = USUAL, reporter: Reporter | None = None, graph: Graph = PIPELINE
 ) -> StageReport:
-    """Execute a stage of a run; if it found parameters, write a config with them and add its file to the summary.
+    """Execute a stage of a run. If it found parameters, write a config with them and add its file to the summary.
 
     Raises the errors of `execute`, and StorageError if the config cannot be written.
     """
@@ -136,7 +136,7 @@ def run_and_write(
 
 
 def write_config(run: ResolvedRun, report: StageReport, name: str) -> Path:
-    """Write the parameters that a stage found as a config of this name; return its file."""
+    """Write the parameters that a stage found as a config of this name, and return its file."""
     summary = report.summary
     values = summary["best"] if "best" in summary else {row["key"]: row["value"] for row in summary["estimates"]}
     found = run.loaded.variant([parse_setting(f"{key}={value!r}") for key, value in values.items()])

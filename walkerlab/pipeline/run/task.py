@@ -23,7 +23,7 @@ Task = Callable[[StageReporter], Content]
 
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> Task:
-    """Build the task of a stage under a config, for this or another process; arguments as in `call_stage`."""
+    """Build the task of a stage under a config, for this or another process. The arguments are as in `call_stage`."""
     return partial(call_stage, stage.module, only(config, stage.takes_under(config)), inputs, offered)
 
 
@@ -64,7 +64,7 @@ def note_compilation(reporter: StageReporter, kernel: str) -> None:
 
 
 class PipeReporter:
-    """Reporter of a stage in a worker; sends each call to the parent process."""
+    """Reporter of a stage in a worker, which sends each call to the parent process."""
 
     def __getattr__(self, call: str) -> Callable[..., None]:
         """Return a function that sends the name of the call and its arguments."""

@@ -50,7 +50,7 @@ class InPlace(SizedExecutor):
     size = 0
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run a call; any error is raised immediately."""
+        """Run a call. Any error is raised immediately."""
         future: Future[Any] = Future()
         future.set_result(fn(*args, **kwargs))
         return future
@@ -67,7 +67,7 @@ class JobEndedError(WalkerlabError):
 
 
 def compute(units: Batch) -> list[Timed]:
-    """Compute units in turn; if the process is about to be ended, return the results so far."""
+    """Compute units in turn. If the process is about to be ended, return the results so far."""
     results: list[Timed] = []
     with contextlib.suppress(JobEndsError):
         for unit in units:
@@ -137,7 +137,7 @@ class Spread:
         self.keep(batch, results)
 
     def _failed(self, batch: Batch, failures: int, error: BaseException) -> None:
-        """Retry a failed batch, then its halves, and give up a unit that keeps failing; re-raises bugs."""
+        """Retry a failed batch, then its halves, and give up a unit that keeps failing. Bugs are raised again."""
         of_worker = isinstance(error, WorkerDiedError | JobEndedError)
         if isinstance(error, BUGS) or (isinstance(error, WalkerlabError) and not of_worker):
             raise error

@@ -115,7 +115,7 @@ class Worker:
         theirs.close()
 
     def do(self, call: Callable[[], R], hear: Hear | None = None, timeout_s: float | None = None) -> R:
-        """Run a call in the worker; return its value or raise its error.
+        """Run a call in the worker, and return its value or raise its error.
 
         hear       function that receives the call's messages
         timeout_s  maximum time between two messages, s
@@ -165,7 +165,7 @@ class Worker:
 
 
 class SizedExecutor(Executor):
-    """Executor that runs `size` calls at the same time; 0 if it runs each call immediately, in this process."""
+    """Executor that runs `size` calls at the same time, or 0 if it runs each call immediately, in this process."""
 
     size: int
 
@@ -174,7 +174,7 @@ class WorkerPool(SizedExecutor):
     """Executor that starts workers as needed, replaces dead ones and ends all of them when it is shut down."""
 
     def __init__(self, size: int, modules: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> None:
-        """Set up at most `size` workers without starting one; `modules` and `environment` as in `Worker`."""
+        """Set up at most `size` workers without starting one. `modules` and `environment` are as in `Worker`."""
         self.size = size
         self._new_worker = partial(Worker, modules, environment)
         self._threads = ThreadPoolExecutor(size)  # each thread waits for one worker
@@ -189,7 +189,7 @@ class WorkerPool(SizedExecutor):
             self._idle += [self._new_worker() for _ in range(self.size - len(self._idle) - len(self._busy))]
 
     def start(self, call: Callable[[], R], hear: Hear | None = None) -> Future[R]:
-        """Run a call in the next free worker; `hear` receives its messages in another thread."""
+        """Run a call in the next free worker. `hear` receives its messages in another thread."""
         return self._threads.submit(self._do, call, hear)
 
     def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
@@ -211,7 +211,7 @@ class WorkerPool(SizedExecutor):
                 self._idle.append(worker)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the workers; with `wait`, only after they have finished their calls."""
+        """End the workers, with `wait` only after they have finished their calls."""
         self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
         with self._lock:
             self._closed = True
@@ -266,7 +266,7 @@ _lines: list[Connection] = []
 
 
 def serve(number: int, modules: Sequence[str]) -> None:
-    """Run calls until a signal ends this process; `number` is the file descriptor of the connection to the parent."""
+    """Run calls until a signal ends this process. `number` is the file descriptor of the connection to the parent."""
     os.set_inheritable(number, False)
     line = Connection(number)
     _lines.append(line)
@@ -292,7 +292,7 @@ def receive(line: Connection, calls: queue.SimpleQueue[bytes]) -> None:
 
 
 def answer(work: bytes) -> bytes:
-    """Run a pickled call and return its pickled answer; a description replaces an error that cannot be pickled."""
+    """Run a pickled call and return its pickled answer. A description replaces an error that cannot be pickled."""
     try:
         return pickle.dumps(Answer(pickle.loads(work)()))
     except Exception as error:

@@ -53,12 +53,15 @@ def digests(config: Config) -> Mapping[str, str]:
 
 
 def read_measured(block: Identify, config: RigidConfig) -> MeasuredWalk:
-    """Read the block's file as steps or angles, as `block.level` says; raises ConfigError if it holds no such walk."""
+    """Read the block's file as steps or angles, as `block.level` says.
+
+    Raises ConfigError if it holds no such walk.
+    """
     return next(read_divisions(block, config))
 
 
 def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWalk]:
-    """Read the file that the block names, and yield its walk in steps; angles may be divided in several ways.
+    """Read the file that the block names, and yield its walk in steps. Angles may be divided in several ways.
 
     They are divided in more than one way only if slope or sensor offset is estimated: heel strikes depend on both.
     Raises ConfigError for a file without a walk.
@@ -110,13 +113,13 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
 
 
 def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredWalk:
-    """Divide the angles in the block's file into steps; at heel strike the sum of the leg angles is `touch_sum_rad`."""
+    """Divide the angles in the block's file into steps. At heel strike the sum of the leg angles is `touch_sum_rad`."""
     walk, resolution = read_angles(block, config.slope_rad)
     return divide_angles(walk, config, block.data, touch_sum_rad, resolution)
 
 
 def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]:
-    """Read the recording in the block's file; return it with the smallest decimal place of its angles (rad).
+    """Read the recording in the block's file, and return it with the smallest decimal place of its angles (rad).
 
     That is 0 for angles that are computed from markers.
     """
@@ -144,7 +147,7 @@ def smallest_decimal(values: Floats) -> float:
 def divide_angles(
     walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float, resolution: float = 0.0
 ) -> MeasuredWalk:
-    """Divide angles of the config's walker into steps; at heel strike the sum of the leg angles is `touch_sum_rad`.
+    """Divide angles of the config's walker into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
 
     resolution  smallest decimal place of the angles, rad
     """
@@ -195,7 +198,7 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
 
 
 def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, float] | None:
-    """Return a quantity (steps,) and its smallest decimal place, both in SI units; None if it has no column.
+    """Return a quantity (steps,) and its smallest decimal place, both in SI units, or None if it has no column.
 
     Raises ConfigError for gaps and bad values.
     """

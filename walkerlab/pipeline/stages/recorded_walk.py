@@ -41,7 +41,10 @@ def digests(config: Config) -> Mapping[str, str]:
 
 
 def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Read the recording and find its steps; raises ConfigError for a file that holds no walk."""
+    """Read the recording and find its steps.
+
+    Raises ConfigError for a file that holds no walk.
+    """
     block = config.recording
     assert block is not None, "the stage requires the block"
     progress.start("recorded-walk", 1)
@@ -83,7 +86,10 @@ def doubts_about(walk: RecordedWalk) -> Iterator[str]:
 
 
 def read_walk(block: RecordedFile, slope_rad: float) -> RecordedWalk:
-    """Read the quantities of a recorded walk in SI units; raises ConfigError for a file that cannot be read."""
+    """Read the quantities of a recorded walk in SI units.
+
+    Raises ConfigError for a file that cannot be read.
+    """
     if not block.file:
         raise ConfigError("recording.file: the recording has no file.", "Name one: --with FILE.", ("recording", "file"))
     path = Path(block.file)
@@ -93,7 +99,10 @@ def read_walk(block: RecordedFile, slope_rad: float) -> RecordedWalk:
 
 
 def read_artifact(path: Path) -> Recording:
-    """Read the trajectory of a stored walk; raises ConfigError if the file has none."""
+    """Read the trajectory of a stored walk.
+
+    Raises ConfigError if the file has none.
+    """
     try:
         groups = artifact.read(path).groups
     except (Damaged, IsADirectoryError) as error:
@@ -116,7 +125,9 @@ def read_artifact(path: Path) -> Recording:
 def content_of(
     block: RecordedFile, config: RecordedWalkConfig, walk: RecordedWalk, steps: RecordedSteps, doubts: Sequence[str]
 ) -> Content:
-    """Build the content, with the same names as for computed walks; energies and forces only if they were recorded."""
+    """Build the content, with the same names as for computed walks. It has energies and forces only if they were
+    recorded.
+    """
     periods = np.diff(steps.touch_time_s, prepend=0.0)
     along = np.cumsum(steps.length_m)
     columns = step_columns(steps.touch_time_s, period_s=periods, length_m=steps.length_m, touch_along_m=along)

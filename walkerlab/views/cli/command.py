@@ -28,7 +28,8 @@ def as_parameter(entry: Field[Any]) -> inspect.Parameter:
 
 
 def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
-    """Convert a stage's own options to settings; `values`: value of each option by flag, None if the user gave none.
+    """Convert a stage's own options to settings. `values` holds the value of each option by flag, or None if the user
+    gave none.
 
     Raises typer.BadParameter for malformed bounds, and for an option given without the options that it needs.
     """
@@ -55,7 +56,10 @@ def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tup
 
 
 def bounds(option: "Option", values: Sequence[str]) -> str:
-    """Convert arguments NAME=A:B (or NAME for null, if allowed) to a YAML block; else typer.BadParameter."""
+    """Convert arguments NAME=A:B (or NAME for null, if allowed) to a YAML block.
+
+    Raises typer.BadParameter for arguments of another form.
+    """
     either = r"([^=]+)(?:=([^:]+):([^:]+))" + ("?" if option.kind == "bounds-or-none" else "")
     parts = [re.fullmatch(either, value) for value in values]
     if None in parts:
@@ -65,7 +69,7 @@ def bounds(option: "Option", values: Sequence[str]) -> str:
 
 
 def pairs(option: "Option", values: Sequence[str]) -> str:
-    """Convert NAME=VALUE,... arguments to YAML; a bare unit applies to all quantities of its kind."""
+    """Convert NAME=VALUE,... arguments to YAML. A bare unit applies to all quantities of its kind."""
     # Imported here: few commands read files of other programs.
     from walkerlab.errors import ConfigError
     from walkerlab.exchange.columns import parse_pairs, parse_units
@@ -93,7 +97,7 @@ class KeysAreNoOptions(TyperCommand):
     """A command that suggests `--set KEY=VALUE` if a user types a config key as an option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the options; if an unknown option is a config key, the error message suggests `--set`."""
+        """Parse the options. If an unknown option is a config key, the error message suggests `--set`."""
         try:
             return super().parse_args(ctx, args)
         except Exception as error:  # click's NoSuchOption; its module depends on typer's version
@@ -120,7 +124,7 @@ class Offer(NamedTuple):
 
 
 def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
-    """Add a command to the program of a graph; errors of its function end it as `exit_on_failure` describes."""
+    """Add a command to the program of a graph. Errors of its function end it as `exit_on_failure` describes."""
     function, shared, name, asks, purpose, sets = offer
     typed = name or function.__name__
     # Flags such as --from cannot be names of parameters.

@@ -1,4 +1,4 @@
-"""Turns a command's expected failures into a message, advice and an exit code; bugs keep their traceback."""
+"""Turns expected failures of a command into a message, advice and an exit code. Bugs keep their traceback."""
 
 import contextlib
 import errno
@@ -20,7 +20,7 @@ FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 @contextlib.contextmanager
 def exit_on_failure(request: Request) -> Iterator[None]:
-    """Turn expected failures into a message on stderr and an exit code; with `--json`, also print a JSON object."""
+    """Turn expected failures into a message on stderr and an exit code. With `--json`, also print a JSON object."""
     raise_on(signal.SIGTERM, KeyboardInterrupt)
     # background jobs of a script ignore SIGINT, and must go on doing so
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -73,7 +73,7 @@ def discard_output() -> None:
 def print_result(
     request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None
 ) -> None:
-    """Print a result as text lines or, with `--json`, as the object `value`; exit non-zero if there is an error."""
+    """Print a result as text lines or, with `--json`, as the object `value`. Exit non-zero if there is an error."""
     if request.as_json:
         print_json(value if error is None else value | {"error": as_json(error, request)})
     else:

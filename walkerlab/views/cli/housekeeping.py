@@ -86,7 +86,7 @@ def clean(
     all_runs: Annotated[bool, typer.Option("--all", help="Clean all runs in the runs folder.")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
 ) -> None:
-    """Delete a run's results and leftovers of killed runs; keep all other files."""
+    """Delete a run's results and leftovers of killed runs, and keep all other files."""
     from walkerlab.views.cli.clean import clean_folders
 
     clean_folders(request, all_runs, request.graph.names, yes)

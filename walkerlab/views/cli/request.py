@@ -50,7 +50,7 @@ def configs_and_files(incomplete: str) -> list[str]:
 
 
 class SetByOption(str):
-    """A setting KEY=VALUE made from a stage's own option; messages quote the option as the user typed it."""
+    """A setting KEY=VALUE made from a stage's own option. Messages quote the option as the user typed it."""
 
     words: tuple[str, ...]  # the option as typed
 
@@ -65,13 +65,13 @@ class SetByOption(str):
 
 
 def option(*flags: str, default: Any = None, **about: Any) -> Any:
-    """Declare a field of a request that commands may offer as an option; `flags` and `about` are typer's arguments."""
+    """Declare a field of a request that commands may offer as an option. `flags` and `about` are typer's arguments."""
     return field(default=default, metadata={"option": typer.Option(*flags, **about)})
 
 
 @dataclass(frozen=True)
 class Request:
-    """Options shared by commands; options that a command does not offer keep their defaults."""
+    """Options shared by commands. Options that a command does not offer keep their defaults."""
 
     command: str  # name of the command as typed
     own: tuple[SetByOption, ...] = ()  # settings made from the command's own options
@@ -147,7 +147,10 @@ class Request:
 
     @cached_property
     def resolved_run(self) -> "ResolvedRun":
-        """Resolve the config and its run folder, and show the config's warnings; ConfigError if it is invalid."""
+        """Resolve the config and its run folder, and show the config's warnings.
+
+        Raises ConfigError if it is invalid.
+        """
         from walkerlab.pipeline.plan.resolve import resolve
 
         run = resolve(self.config, self.settings, self.strides, self.runs, self.name)

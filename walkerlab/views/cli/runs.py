@@ -125,7 +125,7 @@ def differs(pair: Pair) -> bool:
 
 
 def percent(pair: Pair) -> str:
-    """Format a relative change in percent; empty for error measures and for values at rounding level."""
+    """Format a relative change in percent, or return '' for error measures and for values at rounding level."""
     if pair.change is None or IS_ERROR.search(pair.name) or max(abs(pair.first), abs(pair.second)) < ROUNDING_SI:
         return ""
     return f"{100.0 * pair.change:+.3g} %" if differs(pair) else "the same"

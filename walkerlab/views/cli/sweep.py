@@ -153,7 +153,10 @@ def common(request: Request, path: Path, wall_s: float) -> dict[str, Any]:
 
 
 def show_result(request: SweepRequest, swept: "Swept") -> None:
-    """Plot a sweep and print its result; typer.Exit if points failed."""
+    """Plot a sweep and print its result.
+
+    Raises typer.Exit if points failed.
+    """
     from walkerlab.pipeline.store.files import write_atomically
     from walkerlab.pipeline.sweeps.result import as_csv as table_of
     from walkerlab.views.report.sweep_page import draw
