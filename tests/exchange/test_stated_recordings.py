@@ -224,6 +224,21 @@ def test_a_part_of_a_recording_is_read(tmp_path):
     assert "--from-s" in refused.value.advice
 
 
+def test_a_table_without_rows_holds_no_sample(tmp_path):
+    path = tmp_path / "walk.mot"
+    path.write_text("Coordinates\nversion=1\ninDegrees=yes\nendheader\ntime\tangle 1\tangle 2\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="has no sample with values of"):
+        steps_of(path)
+
+
+def test_values_whose_squares_overflow_are_gaps(tmp_path):
+    places = places_of(sampled()[1])
+    places[300:303, 1] = 1e200
+    summary = read_places(tmp_path, places)
+    assert all_steps_are_right(summary)
+    assert "FOOT1.x, FOOT1.y, FOOT1.z at samples 301 to 303" in summary["doubts"][0]
+
+
 # Treadmill
 
 

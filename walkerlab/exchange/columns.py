@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from walkerlab.config.recording import Recorded
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.marker_lines import (
+    HUGE,
     Line,
     body_doubts,
     body_gaps,
@@ -55,7 +56,6 @@ FRAME: Final = re.compile(r"(?i:frames?(?:[\s_]?(?:idx|index|number|no\.?))?#?)"
 """Pattern for the name of a column that counts frames."""
 PAIR: Final = re.compile(r"""(?:[^,"]|"[^"]*")+|"[^,]*""")
 FRAME_TIME: Final = "frame / fps"
-HUGE: Final = 1e50  # size of values that are gaps, because their squares overflow
 SAME_RATE: Final = 0.01  # largest relative difference of two frame rates that are the same
 LIKELIHOOD: Final = r"(?i:[\s._:]+(?:likelihood|confidence|score))"
 UNLIKELY: Final = 0.5  # likelihood below which a marker's place is doubtful
@@ -308,7 +308,7 @@ def within_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
     begin, end = (-math.inf if asked.from_s is None else asked.from_s), (math.inf if asked.to_s is None else asked.to_s)
     # samples without a time are no part that could be left out
     rows = ~((time < begin) | (time > end))
-    if not rows.any():
+    if rows.size and not rows.any():
         raise ConfigError(
             f"{recording.path} has no sample from {begin:g} to {end:g} s; its times go from {np.min(time):g} to "
             f"{np.max(time):g} s.",

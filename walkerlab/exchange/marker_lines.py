@@ -23,6 +23,7 @@ NAMED: Final = 3  # number of stretches of samples that a doubt lists
 JUMP: Final = 8.0  # change of a line's length between samples that is a jump, in standard deviations of all changes
 SMALLEST_JUMP: Final = 0.01  # the same, as a fraction of the length
 NEIGHBOURS: Final = 5  # number of changes whose median a jump differs from
+HUGE: Final = 1e50  # size of values that are gaps, because their squares overflow
 FEWEST_FROZEN: Final = 3  # fewest samples in which a marker freezes
 LONGEST_LEAP: Final = 1.5  # how much faster than before the leap a marker may move behind it
 LENGTH_PARTS: Final = 5  # number of parts of a walk whose lengths of legs are compared
@@ -189,7 +190,7 @@ def unseen_as_gaps(
     pairs  columns of both ends for each coordinate
     """
     ends = list(zip(*pairs, strict=True))
-    places = [np.stack([columns[name] for name in names], axis=1) for names in ends]
+    places = [np.clip(np.stack([columns[name] for name in names], axis=1), -HUGE, HUGE) for names in ends]
     length = np.linalg.norm(places[1] - places[0], axis=1)
     seen = length[np.isfinite(length)]
     gaps, unseen = dict(columns), dict[str, str]()
