@@ -147,7 +147,7 @@ def test_a_damped_knee_takes_the_same_work_from_both_models():
 
 
 @pytest.mark.parametrize("stage", [
-    "tune", "accuracy", "stability", "continuation", "basin", "robustness", "design", "identify", "plan", "engines",
+    "tune", "accuracy", "stability", "basin", "robustness", "design", "identify", "plan", "engines",
 ])  # fmt: skip
 def test_a_stage_that_needs_equal_legs_says_so(stage):
     config = config_of("paper", HEAVY)

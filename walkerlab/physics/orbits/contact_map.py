@@ -390,8 +390,8 @@ class ContactMap(StepMap):
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         site = valid(self._at(p))
         slip, tripped, start = 0.0, 0.0, z
-        for _ in range(steps):
-            step = self._walk(site, start, False)
+        for swing in range(steps):
+            step = self._walk(site, start, False, swing)
             slip, start = max(slip, abs(step.slip_m)), step.z / self._units
             if self._on_pads and steps == 1:
                 on_pads = on_terrain(site, checkerboard(step.length_m, (0.0, 0.0)))

@@ -384,12 +384,11 @@ class RigidMap(StepMap):
             return failed_step(Outcome.NO_HEEL_STRIKE if standing else step.outcome, z.size)
         ahead, period_s, DP = step.z[0], float(step.time[0]) * unit.units.time, step.DP[0]
         angle = float(ahead[0])
-        if unit.walker.legs_differ:
-            model = unit.walker.exchanged if swing % 2 else unit.walker
-            starts, ends = states_on_section(model, z[None]), step.strikes.before[:, : section.basis.shape[1]]
-            length_m = float(step_lengths(model, starts, ends)[0]) * unit.units.length
+        if len(unit.sections) > 1:
+            length = length_of_step(section.walker[0], float(z[0]), step.strikes.before[0])
         else:
-            length_m = unit.step_length(float(z[0]), angle) * unit.units.length
+            length = unit.step_length(float(z[0]), angle)
+        length_m = length * unit.units.length
         return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
@@ -515,6 +514,15 @@ class RigidMap(StepMap):
                 z, tangent = part.z[-1], images[-1] / sizes[-1]
         all_points, periods = np.concatenate(points), np.concatenate(times) * unit.units.time
         return Iterates(outcome, all_points, np.concatenate(growth), periods, all_points[:, 0])
+
+
+def length_of_step(model: Any, before: float, end: Floats) -> float:
+    """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
+    ahead = model["radius"] * (before - end[STANCE])
+    for angle, x, y in zip(end.tolist(), model["foot_x"].tolist(), model["foot_y"].tolist(), strict=False):
+        psi = angle + model["slope"]
+        ahead += math.cos(psi) * x - math.sin(psi) * y
+    return float(ahead)
 
 
 def by_leg(angles: Floats, steps: Integers) -> Floats:

@@ -101,6 +101,7 @@ class StepMap(Stepper, Protocol):
     scale: float  # magnitude of significant changes of the parameter
     tolerances: Tolerances  # solver settings of a step
     probe: float  # size of a disturbance with a linear response, in units of the walker
+    stride: int = 1  # number of steps after which the map repeats: 2 for legs that differ
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
