@@ -32,7 +32,7 @@ def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> Rigi
 
 def steps_of_stride(config: RigidConfig, parameter: Parameter) -> int:
     """Return the number of steps after which a family's step map repeats: 2 if the legs differ, or may differ."""
-    return 2 if parameter.of_second_leg or have_different_legs(config) else 1
+    return 2 if parameter.varies_second_leg or have_different_legs(config) else 1
 
 
 def scene_for(step_length_m: float) -> Callable[[ContactConfig], ContactScene]:

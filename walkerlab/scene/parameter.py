@@ -30,7 +30,7 @@ class Parameter:
     path: tuple[str, ...]
 
     @property
-    def of_second_leg(self) -> bool:
+    def varies_second_leg(self) -> bool:
         return SECOND_LEG in self.path
 
     def value_in(self, config: ContactConfig) -> float:

@@ -279,8 +279,8 @@ class Recorder:
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(blocks) for blocks in (self.strikes, self.before, self.after))
-        starts = np.vstack((self.start, after))[:-1]
-        lengths = by_turns(self.walker, np.arange(len(before)), step_lengths, starts, before)
+        steps = np.arange(len(before))
+        lengths = by_turns(self.walker, steps, step_lengths, np.vstack((self.start, after))[:-1], before)
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(self.walker.mass) * float(
             self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed

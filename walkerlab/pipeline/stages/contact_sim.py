@@ -39,6 +39,7 @@ from walkerlab.scene.contact import (
 )
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.omissions import contact_walk_omissions
+from walkerlab.scene.rigid import have_different_legs
 
 RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
 SCUFFED = (
@@ -53,7 +54,8 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
-    asymmetry = inputs["fixedpoint"].summary["asymmetry"]["step_length"] if "fixedpoint" in inputs else 0.0
+    limps = "fixedpoint" in inputs and have_different_legs(config)
+    asymmetry = inputs["fixedpoint"].summary["asymmetry"]["step_length"] if limps else 0.0
     scene = scene_on_pads(config, rigid_step, rigid_state, asymmetry=asymmetry)
     start, steps = start_state(scene, rigid_state), 2 * config.strides
     tolerances = tolerances_of(config, steps)
