@@ -12,8 +12,8 @@ from walkerlab.exchange.exported import prepare_export
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
 from walkerlab.physics.orbits.contact_map import lengths_between_touches
 from walkerlab.physics.orbits.fixed_point import find_gaits
-from walkerlab.pipeline.graph import PIPELINE
-from walkerlab.pipeline.resolve import resolve
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.scene.contact import contact_gait, scene_on_pads, start_state, tolerances_of
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import have_different_legs, rigid_walker

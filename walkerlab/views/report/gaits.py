@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from walkerlab.labels import unit_by_name, with_unit
+from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.views.report.numbers import MINUS, NONE, drop_rounding, fixed, number, power_of_ten
 from walkerlab.views.report.outcomes import legs_differ
 from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, typeset
@@ -69,7 +69,7 @@ def asymmetry_lines(written: Callable[[Any], str]) -> Iterator[Column]:
     """Yield lines with the period and length of both steps of a gait, and their asymmetries."""
     for place, leg in enumerate(("leg 1", "leg 2")):
         for name, key in (("period", "period_s"), ("length", "length_m")):
-            title = with_unit(f"{name} of the step in which {leg} swings", unit_by_name(key))
+            title = add_unit(f"{name} of the step in which {leg} swings", unit_by_name(key))
             yield Column(title, partial(step_value, place, key), written, numeric=True)
     for name in ("step_period", "step_length"):
         words = f"asymmetry of the {name.replace('_', ' ')} (second minus first, over the mean)"
