@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.files import builtin_config
+from walkerlab.config.reads import only
 from walkerlab.config.walkers import second_of
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.exported import prepare_export
@@ -14,6 +15,8 @@ from walkerlab.physics.orbits.contact_map import lengths_between_touches
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.resolve import resolve
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import continuation
 from walkerlab.scene.contact import contact_gait, scene_on_pads, start_state, tolerances_of
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import have_different_legs, rigid_walker
@@ -156,6 +159,19 @@ def test_a_stage_that_needs_equal_legs_says_so(stage):
         PIPELINE[stage].refuse_unsuited(stage, config)
     assert "fixedpoint, simulate, contact-sim" in refused.value.advice
     assert PIPELINE[stage].why_unsuited(config_of("paper")) is None
+
+
+def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
+    block = "{over: walker.leg_2.leg_mass_kg, from: 4.9, to: 5.1, model: rigid, periods: 2, points: 30}"
+    config = config_of("paper", f"continuation={block}")
+    assert config.walker.leg_2 is None
+    content = continuation.run(only(config, PIPELINE["continuation"].takes), {}, Silent(), again=False)
+    rows = content.summary["branches"]
+    assert [row["period"] for row in rows] == [2, 2]
+    assert sorted(row["stable_range"] is not None for row in rows) == [False, True]
+    for row in rows:
+        assert sorted((row["from"], row["to"])) == pytest.approx([4.9, 5.1])
+    assert content.summary["bifurcations"] == []
 
 
 def test_an_export_of_legs_that_differ_is_refused():
