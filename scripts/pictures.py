@@ -214,6 +214,18 @@ PICTURES: dict[str, FigurePicture | SweepPicture | Film | ExamplePicture | Scree
         },
         {"continuation.from": 5.8, "continuation.to": 6.6, "continuation.points": 5},
     ),
+    "figure-13-leg-mass.png": FigurePicture(
+        "figure-13",
+        "continuation",
+        "prosthesis",
+        {
+            "continuation.over": "walker.leg_2.leg_mass_kg",
+            "continuation.from": 2,
+            "continuation.to": 7,
+            "continuation.model": "rigid",
+        },
+        {"continuation.from": 3.9, "continuation.to": 4.1, "continuation.points": 5},
+    ),
     "figure-13-kneed-cascade.png": FigurePicture(
         "figure-13",
         "continuation",

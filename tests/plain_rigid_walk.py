@@ -51,7 +51,7 @@ def plain_walk(walker, y, heights, nearest=0.0, disturb=lambda y: y, pieces=None
         if outcome is not Outcome.WALKED:
             return np.array(seen).reshape(len(seen), 1 + len(y)), outcome, ahead
         y = np.zeros(len(y))
-        impact.strike(walker, AT_STRIKE, before, y)
+        impact.strike(walker, walker, AT_STRIKE, before, y)
         y = disturb(y)
         seen.append((t, *y))
     return np.array(seen), Outcome.WALKED, ahead
@@ -95,7 +95,7 @@ def swing(walker, t, y, rise, pieces=None):
             return t, y, Outcome.FELL
         if len(met) > 2 and met[2]:
             new = np.zeros(len(y))
-            impact.strike(walker, STRAIGHT, y, new)
+            impact.strike(walker, walker, STRAIGHT, y, new)
             phase, y, left_s = STRAIGHT, new, 0.0
         elif not met[0]:
             return t, y, Outcome.NO_HEEL_STRIKE

@@ -46,7 +46,7 @@ def struck(phase, model, y, columns):
     """The state after a strike, with the images of directions behind it."""
     before = np.concatenate((y, *columns))
     after = np.full(before.size, np.nan)
-    impact.strike(model, phase, before, after)
+    impact.strike(model, model, phase, before, after)
     return tuple(after)
 
 

@@ -20,7 +20,8 @@ def test_built_in_configs_are_listed() -> None:
     others = ("kneed", "kneed-round-feet", "parts", "round-feet", "simplest", "torso")
     papers = ("contact-si", "paper", "paper-as-printed", "rigid-only", "sliding-feet", "slope-3deg")
     driven = ("kneed-level", "kuo", "level")
-    assert builtin_names() == tuple(sorted((*others, *papers, *driven)))
+    different_legs = ("one-knee", "prosthesis")
+    assert builtin_names() == tuple(sorted((*others, *papers, *driven, *different_legs)))
 
 
 @pytest.mark.skipif(not REPOSITORY.is_dir(), reason="the repository's configs/ are not beside the tests")

@@ -12,7 +12,7 @@ from walkerlab.pipeline.plan.resolve import resolve
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("centre_m: [0.0, -0.325]", "centre_m: [0.0, -0.3]", "the two legs differ"),
+        ("locks: true", "locks: false", "no locking knee"),
         ("child: thigh 1", "child: shank 1", "are not hinged together"),
     ],
 )

@@ -24,7 +24,7 @@ from walkerlab.config.problems import (
 )
 from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, plain
-from walkerlab.config.walkers import Kneed, PartsWalker, followers
+from walkerlab.config.walkers import Kneed, PartsWalker, followers, second_of
 from walkerlab.extensions import WORDS, foreign
 
 Location: TypeAlias = tuple[int | str, ...]
@@ -139,8 +139,11 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     walker, bodies = config.walker, len(stated) // 2
     values, following = [0.0 if value is None else value for value in stated], dict[int, FollowingValue]()
     if not isinstance(config.start, MidStep) and not isinstance(walker, PartsWalker):
-        values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
         because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
+        values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
+        if second_of(walker) is not walker:
+            swing = walker.swing_angle(values[1] + config.slope_rad)
+            values[0] = values[0] if swing is None else swing - config.slope_rad
         following[0] = FollowingValue("theta_1", values[0], "rad", because)
         if isinstance(walker, Kneed):
             values[2] = values[0]

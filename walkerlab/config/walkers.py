@@ -1,13 +1,14 @@
 """Types of walkers and their dimensions: keys of the block `walker`."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import lru_cache
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Annotated, Any, Final, Literal, TypeGuard
 
-from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.drives import QUICKEST, Hip, acting_on
@@ -95,10 +96,39 @@ class _Legged(Block):
         ahead = getattr(self, "foot_centre_ahead_m", 0.0)
         return math.atan2(ahead, self.leg_length_m - self.foot_radius_m)
 
+    def swing_angle(self: Any, stance_rad: float) -> float | None:
+        """Return the angle (rad) of leg 1 behind leg 2 at `stance_rad`, with both feet on the ground.
+
+        Angles are from the ground's normal. Returns None if leg 1 cannot reach the ground.
+        """
+        second = second_of(self)
+        if second is self:
+            return float(-2 * self.lean_rad - stance_rad)
+        (own, own_radius), (other, radius) = (
+            (math.hypot(leg.leg_length_m - sole, getattr(leg, "foot_centre_ahead_m", 0.0)), sole)
+            for leg, sole in ((each, 0.0 if each.type == "compass" else each.foot_radius_m) for each in (self, second))
+        )
+        height = radius + other * math.cos(stance_rad + lean_of(second)) - own_radius
+        return None if abs(height) > own else -math.acos(height / own) - lean_of(self)
+
+    @property
+    def foot_radii_m(self: Any) -> tuple[float, float]:
+        """Radius (m) of each leg's foot."""
+        return self.foot_radius_m, second_of(self).foot_radius_m
+
     @property
     def total_mass_kg(self: Any) -> float:
         """Mass of the whole walker, kg."""
-        return float(2 * self.leg_mass_kg + self.hip_mass_kg + torso_mass(self.torso))
+        legs = self.leg_mass_kg + second_of(self).leg_mass_kg
+        return float(legs + self.hip_mass_kg + torso_mass(self.torso))
+
+    @field_validator("hip", check_fields=False)
+    @classmethod
+    def _one_kind_of_damper(cls, value: Hip, info: ValidationInfo) -> Hip:
+        knee = info.data.get("knee")
+        if value.damping_N_m_s_per_rad and knee is not None and knee.damping_N_m_s_per_rad:
+            raise meaning_error("has a damper, and so have the knees: their work could not be told apart")
+        return value
 
     @field_validator("hip", check_fields=False)
     @classmethod
@@ -112,6 +142,102 @@ class _Legged(Block):
                     f"hip, {inertia:.3g} kg m^2, the limits are {most}"
                 )
         return value
+
+
+def second_leg(unit: str, least: float | None = None) -> Any:
+    limits: dict[str, Any] = {} if least is None else {"ge": least}
+    return key(None, unit, "the same of leg 2", bounds="as for leg 1", default_in_words="as for leg 1", **limits)
+
+
+class SecondCompassLeg(Block):
+    """Keys of leg 2 that differ from those of leg 1, which swings first."""
+
+    leg_length_m: float | None = second_leg("m", 1e-3)
+    foot_to_mass_m: float | None = second_leg("m", 0.0)
+    leg_mass_kg: float | None = second_leg("kg", 1e-12)
+    leg_inertia_kg_m2: float | None = second_leg("kg m^2", 0.0)
+    foot_radius_m: float | None = second_leg("m", 0.0)
+
+
+class SecondStraightLeg(Block):
+    """Keys of leg 2 that differ from those of leg 1, which swings first."""
+
+    leg_length_m: float | None = second_leg("m", 1e-3)
+    leg_mass_kg: float | None = second_leg("kg", 1e-12)
+    leg_mass_below_hip_m: float | None = second_leg("m")
+    leg_mass_ahead_m: float | None = second_leg("m")
+    leg_inertia_kg_m2: float | None = second_leg("kg m^2", 0.0)
+    foot_radius_m: float | None = second_leg("m", 0.0)
+    foot_centre_ahead_m: float | None = second_leg("m")
+
+
+def check_second_leg() -> Any:
+    """Validate that the keys of `leg_2` make a leg: both legs like it must make a walker."""
+
+    def makes_a_leg(cls: Any, value: Any, info: ValidationInfo) -> Any:
+        if value is not None and info.data.keys() >= cls.model_fields.keys() - {"leg_2"}:
+            try:
+                alike_second(cls, info.data, value)
+            except ValidationError as error:
+                first = error.errors()[0]
+                raise meaning_error(f"makes no leg: {'.'.join(map(str, first['loc']))} {first['msg']}") from None
+        return value
+
+    return field_validator("leg_2")(classmethod(makes_a_leg))
+
+
+def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
+    """Build the walker whose two legs are both like leg 2; `values` are the keys of the walker by name."""
+    second = {name: value for name, value in values.items() if name != "leg_2"}
+    if getattr(leg, "type", None) is not None:
+        shared = {
+            name: second[name] for name in ("hip_mass_kg", "foot_radius_m", "foot_centre_ahead_m", "torso", "hip")
+        }
+        locked = with_locked_knee(second["thigh"], second["shank"])
+        return StraightLegs.model_validate({**shared, **locked, **leg.model_dump(exclude_none=True)})
+    for name, value in leg.model_dump(exclude_none=True).items():
+        second[name] = {**dict(second[name]), **value} if isinstance(value, dict) else value
+    return kind.model_validate(second)
+
+
+def second_leg_in_words(walker: Any) -> str:
+    """List the keys of leg 2 that a config states, with their values; empty if it states none."""
+    leg = getattr(walker, "leg_2", None)
+    keys = {} if leg is None else leg.model_dump(exclude_none=True)
+    stated = []
+    for name, value in keys.items():
+        inner = value if isinstance(value, dict) else {"": value}
+        stated += [f"{f'{name}.{key}' if key else name}: {each}" for key, each in inner.items()]
+    return ", ".join(stated)
+
+
+def with_locked_knee(thigh: Any, shank: Any) -> dict[str, float]:
+    """Return the keys of a straight leg that is made of a thigh and a shank."""
+    mass = thigh.mass_kg + shank.mass_kg
+    below = thigh.mass_kg * thigh.mass_below_hip_m + shank.mass_kg * (thigh.length_m + shank.mass_below_knee_m)
+    ahead = thigh.mass_kg * thigh.mass_ahead_m + shank.mass_kg * shank.mass_ahead_m
+    apart = (
+        thigh.length_m + shank.mass_below_knee_m - thigh.mass_below_hip_m,
+        shank.mass_ahead_m - thigh.mass_ahead_m,
+    )
+    reduced = thigh.mass_kg * shank.mass_kg / mass
+    return {
+        "leg_length_m": thigh.length_m + shank.length_m,
+        "leg_mass_kg": mass,
+        "leg_mass_below_hip_m": below / mass,
+        "leg_mass_ahead_m": ahead / mass,
+        "leg_inertia_kg_m2": thigh.inertia_kg_m2 + shank.inertia_kg_m2 + reduced * (apart[0] ** 2 + apart[1] ** 2),
+    }
+
+
+def second_of(walker: Any) -> Any:
+    """Return the walker whose two legs are both like leg 2; the walker itself if it has no `leg_2`."""
+    return walker if getattr(walker, "leg_2", None) is None else built_second(walker)
+
+
+@lru_cache
+def built_second(walker: Any) -> Any:
+    return alike_second(type(walker), dict(walker), walker.leg_2)
 
 
 class CompassWalker(_Legged):
@@ -142,7 +268,9 @@ class CompassWalker(_Legged):
     )
     torso: Torso | None = None
     hip: Hip = Hip()
+    leg_2: SecondCompassLeg | None = None
 
+    _second = check_second_leg()
     _arc = check_arc("half of leg_length_m", "leg_length_m", lambda length: length / 2)
 
     _mass = check_against("foot_to_mass_m", "leg_length_m", lambda mass, length: why_off_the_leg(mass, length))
@@ -169,7 +297,9 @@ class StraightLegs(_Legged):
     foot_centre_ahead_m: float = offset(0.0, "the arc's centre ahead of the leg's line", WISSE)
     torso: Torso | None = None
     hip: Hip = Hip()
+    leg_2: SecondStraightLeg | None = None
 
+    _second = check_second_leg()
     _arc = check_arc("leg_length_m", "leg_length_m")
     _inertia = check_inertia(
         "leg_inertia_kg_m2", "the leg's mass is at the hip, so a swing leg", "leg_mass_below_hip_m", "leg_mass_ahead_m"
@@ -200,6 +330,48 @@ class Shank(Block):
     )
 
 
+class SecondThigh(Block):
+    """Keys of the thigh of leg 2 that differ from those of leg 1."""
+
+    length_m: float | None = second_leg("m", 1e-3)
+    mass_kg: float | None = second_leg("kg", 1e-12)
+    mass_below_hip_m: float | None = second_leg("m")
+    mass_ahead_m: float | None = second_leg("m")
+    inertia_kg_m2: float | None = second_leg("kg m^2", 0.0)
+
+
+class SecondShank(Block):
+    """Keys of the shank of leg 2 that differ from those of leg 1."""
+
+    length_m: float | None = second_leg("m", 1e-3)
+    mass_kg: float | None = second_leg("kg", 1e-12)
+    mass_below_knee_m: float | None = second_leg("m")
+    mass_ahead_m: float | None = second_leg("m")
+    inertia_kg_m2: float | None = second_leg("kg m^2", 0.0)
+
+
+class SecondKnee(Block):
+    """Keys of the knee of leg 2 that differ from those of leg 1."""
+
+    damping_N_m_s_per_rad: float | None = second_leg("N m s/rad", 0.0)
+
+
+class SecondKneedLeg(Block):
+    """Keys of leg 2 that differ from those of leg 1, which swings first."""
+
+    thigh: SecondThigh = SecondThigh()
+    shank: SecondShank = SecondShank()
+    knee: SecondKnee = SecondKnee()
+    foot_radius_m: float | None = second_leg("m", 0.0)
+    foot_centre_ahead_m: float | None = second_leg("m")
+
+
+class KneelessLeg(SecondStraightLeg):
+    """A second leg without a knee; keys that it leaves out are those of leg 1 with its knee locked."""
+
+    type: Literal["straight-legs"] = key(..., "", "a leg without a knee")
+
+
 class KneeJoint(Block):
     """How knees lock and are released."""
 
@@ -217,6 +389,9 @@ class KneeJoint(Block):
         "",
         "contact model: the trailing knee is released when the leading foot stops sinking in (compression), or at its "
         "first touch",
+    )
+    damping_N_m_s_per_rad: float = key(
+        0.0, "N m s/rad", "damping of a knee while it bends; not together with a damper at the hip", ge=0.0, le=1e9
     )
     stop_stiffness: float = key(1.0e5, "N m/rad", "stiffness of a compliant stop", ge=1.0, le=1e12)
     stop_damping: float = key(90.0, "N m s/rad", "damping of a compliant stop", ge=0.0, le=1e9)
@@ -238,6 +413,9 @@ class Kneed(_Legged):
     knee: KneeJoint = KneeJoint()
     torso: Torso | None = None
     hip: Hip = Hip()
+    leg_2: SecondKneedLeg | KneelessLeg | None = None
+
+    _second = check_second_leg()
 
     @field_validator("foot_radius_m")
     @classmethod
@@ -336,6 +514,12 @@ class PartsWalker(_Legged):
         return self.feet[0].radius_m
 
     @property
+    def foot_radii_m(self) -> tuple[float, float]:
+        """Radius (m) of each leg's foot."""
+        first, second = self.feet
+        return first.radius_m, second.radius_m
+
+    @property
     def total_mass_kg(self) -> float:
         masses = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
         return sum(masses) + torso_mass(self.torso)
@@ -370,6 +554,11 @@ def why_off_the_leg(mass_m: float, length_m: float) -> str:
     return f"{massless if mass_m == length_m else ''}must be below leg_length_m, {length_m:g}"
 
 
+def lean_of(walker: Any) -> float:
+    """Return `lean_rad` as in the rigid model, in which a compass has point feet."""
+    return 0.0 if walker.type == "compass" else float(walker.lean_rad)
+
+
 def torso_mass(torso: Torso | None) -> float:
     return 0.0 if torso is None else torso.mass_kg
 
@@ -399,8 +588,9 @@ def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
 
 
 def is_passive_compass(config: Any) -> bool:
-    """Whether the config's walker is a passive compass without torso, as in Appendix A."""
-    return bool(config.walker.type == "compass" and config.walker.torso is None and not acting_on(config))
+    """Whether the config's walker is a passive compass without torso and with equal legs, as in Appendix A."""
+    compass = config.walker.type == "compass" and config.walker.torso is None and config.walker.leg_2 is None
+    return bool(compass and not acting_on(config))
 
 
 def leg_inertia(walker: Any) -> float:
@@ -424,6 +614,11 @@ def leg_inertia(walker: Any) -> float:
 
 def why_no_push_off(walker: Any) -> str:
     """Explain why a walker cannot push off along its trailing leg, or return '' if it can."""
+    return why_no_push_on(walker) or why_no_push_on(second_of(walker))
+
+
+def why_no_push_on(walker: Any) -> str:
+    """Explain why a leading leg like the walker's first cannot take a push-off, or return '' if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
         return "cannot act: it needs a locked trailing knee, but walker.knee.at_heel_strike is free" if free else ""
@@ -439,7 +634,10 @@ def why_no_push_off(walker: Any) -> str:
 
 def too_light_for_contact(walker: Any) -> str:
     """Explain why a walker cannot stand on compliant ground, or return '' if it can."""
-    share = walker.leg_mass_kg / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
+    lighter = (
+        min(each.leg_mass_kg for each in (walker, second_of(walker))) if isinstance(walker, CompassWalker) else 1.0
+    )
+    share = lighter / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
     if share >= LIGHTEST_CONTACT:
         return ""
     return (

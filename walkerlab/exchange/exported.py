@@ -22,6 +22,7 @@ from walkerlab.physics.hybrid.contact_result import ContactWalkResult
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import scene_on_pads, tolerances_of
 from walkerlab.scene.footholds import foothold_heights
+from walkerlab.scene.rigid import refuse_different_legs
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -171,6 +172,7 @@ def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: Stat
 
 def refuse(config: Config) -> None:
     """Raise ConfigError for a ground or a walker that no format can express."""
+    refuse_different_legs(config, "Export")
     if config.contact is None:
         raise contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")
     if config.contact.terrain == "after-mid-swing":

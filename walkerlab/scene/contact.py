@@ -23,10 +23,11 @@ from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_cont
 from walkerlab.physics.mechanics.parts import Assembly
 from walkerlab.physics.mechanics.rigid import group_bodies
 from walkerlab.physics.orbits.contact_gait import GaitAnswer, find_gait_from
-from walkerlab.physics.orbits.contact_map import WalkerOnGround
+from walkerlab.physics.orbits.contact_map import WalkerOnGround, lengths_between_touches
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.parts import AnyWalker, assembly_of, drive_parameters
+from walkerlab.scene.parts import AnyWalker, assembly_of, damper, drive_parameters, knee_dampings
+from walkerlab.scene.rigid import have_different_legs
 
 if TYPE_CHECKING:
     from walkerlab.config.contact import Contact
@@ -62,11 +63,14 @@ class ContactScene(WalkerOnGround):
         return walk_contact(self.walker, ground, self.pinned, STANCE_FOOT, start, tolerances, steps, sampling)
 
 
-def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None) -> ContactScene:
+def contact_scene(
+    config: ContactConfig, rigid_step_length_m: float, own_pitch_m: float | None = None, asymmetry: float = 0.0
+) -> ContactScene:
     """Build the scene of a config with a contact block.
 
     rigid_step_length_m  step length of the rigid gait, the reference length for pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
+    asymmetry            difference between the lengths of second and first step over their mean, for the lanes of pads
     """
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
@@ -74,7 +78,7 @@ def contact_scene(config: ContactConfig, rigid_step_length_m: float, own_pitch_m
     laws, rules = (normal_law(contact), friction_law(contact)), knee_rules(config.walker)
     walker = apply_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
-    ground = JudgedGround(TERRAINS[contact.terrain](pitch), frame)
+    ground = JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
     return ContactScene(walker, ground, contact.stance == "pinned", pitch, assembly)
 
 
@@ -84,7 +88,11 @@ def tolerances_of(config: GroundConfig, steps: int) -> Tolerances:
 
 
 def scene_on_pads(
-    config: ContactConfig, rigid_step: float, rigid_state: State, answer: GaitAnswer | None = None
+    config: ContactConfig,
+    rigid_step: float,
+    rigid_state: State,
+    answer: GaitAnswer | None = None,
+    asymmetry: float = 0.0,
 ) -> ContactScene:
     """Build the scene of a config with its pads.
 
@@ -93,17 +101,33 @@ def scene_on_pads(
     Raises NoAnswer if their pitch needs a contact gait and none is found.
     """
     own = None
+    require_known_legs(config)
     if wants_own_pitch(require_contact(config)):
         answer = answer or contact_gait(config, rigid_step, rigid_state)
         if answer.gait is None:
             raise NoAnswer(f"no contact gait to lay the pads for: {answer.reason}", answer.advice)
-        own = answer.gait.step.length_m
-    return contact_scene(config, rigid_step, own)
+        own = float(answer.gait.lengths_m.mean())
+        if len(answer.gait.steps) > 1:
+            first, second = lengths_between_touches(answer.gait)
+            asymmetry = float((second - first) / own)
+    return contact_scene(config, rigid_step, own, asymmetry)
+
+
+def require_known_legs(config: ContactConfig) -> None:
+    """Raise ConfigError for a leg with a knee beside one without, which the contact model does not know."""
+    if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
+        raise ConfigError(
+            "the contact model needs two legs of one kind, both with a knee or both without.",
+            "The rigid model walks with one knee: `walkerlab fixedpoint`, `walkerlab simulate`.",
+            ("walker",),
+        )
 
 
 def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
     pulse = {"push_off_duration": config.push_off.duration_s} if config.push_off.impulse_N_s != 0.0 else {}
-    return changed_forms(walker, **drive_parameters(config), **pulse)
+    dampings = knee_dampings(config.walker)
+    knees = {"knees": tuple(map(damper, dampings))} if any(dampings) else {}
+    return changed_forms(walker, **drive_parameters(config), **pulse, **knees)
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
@@ -116,10 +140,11 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
-TERRAINS: dict[str, Callable[[float], Terrain]] = {
-    "checkerboard": lambda pitch: checkerboard(pitch, (-pitch, 0.0)),
-    "after-mid-swing": after_mid_swing,
-    "plane": plane,
+# Terrains by pitch and asymmetry of the steps. Leg 1 starts as far behind leg 2 as the second step is long.
+TERRAINS: dict[str, Callable[[float, float], Terrain]] = {
+    "checkerboard": lambda pitch, asymmetry: checkerboard(pitch, (-pitch * (1.0 + 0.5 * asymmetry), 0.0)),
+    "after-mid-swing": lambda pitch, _: after_mid_swing(pitch),
+    "plane": lambda pitch, _: plane(pitch),
 }
 
 
@@ -135,7 +160,8 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
     rigid_step_length_m  initial pad pitch
     """
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
-    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start_state(scene, rigid_state))
+    start, legs_differ = start_state(scene, rigid_state), have_different_legs(config)
+    return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, legs_differ)
 
 
 def gait_off_pads(config: Config, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:

@@ -12,10 +12,10 @@ from walkerlab.errors import ConfigError
 from walkerlab.physics.orbits.rigid_map import RigidMap
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.parameter import Parameter, parameter_of
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import have_different_legs, rigid_walker
 
 if TYPE_CHECKING:
-    from walkerlab.config.reads import ContactConfig
+    from walkerlab.config.reads import ContactConfig, RigidConfig
     from walkerlab.physics.orbits.contact_map import ContactMap
     from walkerlab.scene.contact import ContactScene
 
@@ -25,7 +25,14 @@ RELATIVE_CHANGE = 1e-3  # relative change of a parameter, to test whether a mode
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
-    return RigidMap(parameter.over(config, rigid_walker), scale, rigid_walker(config))
+    step_map = RigidMap(parameter.over(config, rigid_walker), scale, rigid_walker(config))
+    step_map.stride = steps_of_stride(config, parameter)
+    return step_map
+
+
+def steps_of_stride(config: RigidConfig, parameter: Parameter) -> int:
+    """Return the number of steps after which a family's step map repeats: 2 if the legs differ, or may differ."""
+    return 2 if parameter.varies_second_leg or have_different_legs(config) else 1
 
 
 def scene_for(step_length_m: float) -> Callable[[ContactConfig], ContactScene]:
@@ -39,7 +46,9 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
     from walkerlab.physics.orbits.contact_map import ContactMap
 
     scene = scene_for(step_length_m)
-    return ContactMap(parameter.over(config, scene), scale, CONTACT_STEP, step_length_m, scene(config))
+    step_map = ContactMap(parameter.over(config, scene), scale, CONTACT_STEP, step_length_m, scene(config))
+    step_map.stride = steps_of_stride(config, parameter)
+    return step_map
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:

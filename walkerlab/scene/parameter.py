@@ -17,6 +17,7 @@ from walkerlab.errors import ConfigError
 
 R = TypeVar("R")
 Key = tuple[int | str, ...]
+SECOND_LEG = "leg_2"
 SLOPE_DEG, SLOPE_RAD = "slope_deg", "slope_rad"
 # Top-level config keys that models depend on.
 MODEL_KEYS = tuple(keys_of(ContactConfig))
@@ -28,8 +29,12 @@ class Parameter:
     unit: str  # unit of its values
     path: tuple[str, ...]
 
+    @property
+    def varies_second_leg(self) -> bool:
+        return SECOND_LEG in self.path
+
     def value_in(self, config: ContactConfig) -> float:
-        value = value_at(config, self.path)
+        value = stated_value(config, self.path)
         return math.degrees(value) if self.key == SLOPE_DEG else float(value)
 
     def config_at(self, config: ContactConfig, value: float) -> Config | None:
@@ -77,12 +82,19 @@ def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Seq
     for parameter, value in zip(parameters, values, strict=True):
         block = data
         for name in parameter.path[:-1]:
-            block = block.setdefault(name, {})
+            block[name] = block.get(name) or {}
+            block = block[name]
         block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value
     return Config.model_validate(data)
 
 
 SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
+
+
+def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
+    """Return the value at a path of keys; a key that the second leg leaves out has the value of the first leg's."""
+    value = value_at(config, path)
+    return value_at(config, [name for name in path if name != SECOND_LEG]) if value is None else value
 
 
 def _keys_set(value: Any) -> Any:
@@ -106,7 +118,9 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    why = why_no_parameter(key, config, own)
+    # only families know legs that differ, so only they vary keys that the config leaves to the first leg
+    left_out = SECOND_LEG in key.split(".") and asker[:1] == ("continuation",)
+    why = why_no_parameter(key, config, own, stated_value if left_out else value_at)
     if why:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {why}", _KEY_ADVICE, asker)
     unit = annotation_of(own[key], "unit") or "1"
@@ -123,7 +137,9 @@ def parameter_keys(config: ContactConfig) -> Iterator[str]:
     yield from (written.get(key, key) for key in own if not why_no_parameter(key, config, own))
 
 
-def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInfo]) -> str:
+def why_no_parameter(
+    key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = value_at
+) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""
     # `own` has the keys that exist for this config's type of walker
     if key not in own:
@@ -139,7 +155,7 @@ def why_no_parameter(key: str, config: ContactConfig, own: Mapping[str, FieldInf
     if "number" not in type_words(own[key].annotation):
         return "is not a number"
     for depth in range(1, len(path) + 1):
-        value, block = value_at(config, path[:depth]), ".".join(path[:depth])
+        value, block = value_of(config, tuple(path[:depth])), ".".join(path[:depth])
         if value is None:
             return f"cannot be used: the config has no block {block}; add it first"
         if isinstance(value, tuple):

@@ -3,10 +3,18 @@
 from typing import Any
 
 from walkerlab.config.reads import RigidConfig
-from walkerlab.config.walkers import LIGHTEST_CONTACT, CompassWalker, Kneed, PartsWalker, StraightLegs, torso_mass
+from walkerlab.config.walkers import (
+    LIGHTEST_CONTACT,
+    CompassWalker,
+    Kneed,
+    PartsWalker,
+    StraightLegs,
+    second_of,
+    torso_mass,
+)
 from walkerlab.errors import ConfigError
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
+from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_second_leg, with_torso
 
 PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
@@ -17,22 +25,27 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
     Raises ConfigError for inconsistent parts.
     """
+    parts, other = legs_of(walker, rigid), second_of(walker)
+    parts = parts if other is walker else with_second_leg(parts, legs_of(other, rigid))
+    torso = walker.torso
+    return parts if torso is None else with_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
+
+
+def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
+    """Return the parts of a walker without its torso, both legs like leg 1."""
     if isinstance(walker, CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
-        parts = straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))
-    elif isinstance(walker, StraightLegs):
+        return straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))
+    if isinstance(walker, StraightLegs):
         centre = walker.leg_mass_below_hip_m, walker.leg_mass_ahead_m
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, *centre, walker.leg_inertia_kg_m2)
-        parts = straight_legs(leg, hip_mass(walker, rigid), Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
-    elif isinstance(walker, Kneed):
+        return straight_legs(leg, hip_mass(walker, rigid), Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
+    if isinstance(walker, Kneed):
         upper, lower = walker.thigh, walker.shank
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
         shank = Limb(lower.length_m, lower.mass_kg, lower.mass_below_knee_m, lower.mass_ahead_m, lower.inertia_kg_m2)
-        parts = kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
-    else:
-        parts = own_parts(walker)
-    torso = walker.torso
-    return parts if torso is None else with_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
+        return kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
+    return own_parts(walker)
 
 
 def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
@@ -62,6 +75,18 @@ def own_parts(walker: PartsWalker) -> Assembly:
 
 def drive_parameters(config: RigidConfig) -> dict[str, Any]:
     return {"hip": tuple(dict(config.walker.hip).values()), "push_off": config.push_off.impulse_N_s}
+
+
+def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
+    """Return the damping (N m s/rad) of each leg's knee; 0 for a leg without a knee."""
+    knees = (getattr(each, "knee", None) for each in (walker, second_of(walker)))
+    first, second = (0.0 if knee is None else knee.damping_N_m_s_per_rad for knee in knees)
+    return first, second
+
+
+def damper(damping: float) -> tuple[float, float, float]:
+    """Return the parameters of a hinge that is only damped."""
+    return 0.0, damping, 0.0
 
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:

@@ -11,12 +11,20 @@ from walkerlab.config.ground import Footholds
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
-from walkerlab.physics.mechanics.rigid import group_bodies, knee_position, on_level_ground
-from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope
+from walkerlab.physics.mechanics.parts import Position
+from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, on_level_ground
+from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope, pair, with_fields
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.footholds import foothold_heights
-from walkerlab.scene.parts import PARTS_DOCS, assembly_of, drive_parameters, knee_locked_at_strike
+from walkerlab.scene.parts import (
+    PARTS_DOCS,
+    assembly_of,
+    damper,
+    drive_parameters,
+    knee_dampings,
+    knee_locked_at_strike,
+)
 from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
@@ -31,7 +39,7 @@ CACHED_LEVEL_WALKERS = 16  # a family over slopes reuses its walker on level gro
 class RigidScene:
     walker: RigidModel
     names: tuple[str, ...]  # names of the state variables
-    knee_m: tuple[float, float] | None  # position of the knee in its thigh's frame
+    knees_m: tuple[Position, ...]  # position of each leg's knee in its thigh's frame; empty without knees
     outputs: tuple[Output, ...]  # outputs to record over time
     ground: Footholds
 
@@ -53,7 +61,7 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
     return RigidScene(
         walker=rigid_walker(config),
         names=state_names(config),
-        knee_m=knee_position(assembly_of(config.walker, rigid=True)),
+        knees_m=knee_positions(assembly_of(config.walker, rigid=True)),
         outputs=outputs,
         ground=ground,
     )
@@ -62,7 +70,17 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
     """Return the rigid walker of a config. `equations` overrides the config's set of equations."""
     passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
-    return replace_equations(passive.changed(**drive_parameters(config)), equations or config.equations)
+    return replace_equations(add_drives(passive, config), equations or config.equations)
+
+
+def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
+    """Return the model with the config's push-off, hip and dampers of the knees."""
+    driven = passive.changed(**drive_parameters(config))
+    first, second = knee_dampings(config.walker)
+    if first == second:
+        return driven.changed(knees=damper(first)) if first else driven
+    models = zip((driven, driven.exchanged), (first, second), strict=True)
+    return pair(*(with_fields(model, {"knees": damper(damping)}) for model, damping in models))
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)
@@ -75,6 +93,20 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
         return on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
     except ValueError as error:
         raise ConfigError(f"walker: {error}", PARTS_DOCS) from None
+
+
+def have_different_legs(config: RigidConfig) -> bool:
+    return rigid_walker(config).legs_differ
+
+
+def refuse_different_legs(config: RigidConfig, request: str) -> None:
+    """Raise ConfigError for a request that needs two equal legs, if those of the config's walker differ."""
+    if have_different_legs(config):
+        raise ConfigError(
+            f"{request} needs two equal legs, but those of this walker differ.",
+            "Leave out walker.leg_2, or ask `walkerlab report`, which shows the walk of legs that differ.",
+            ("walker",),
+        )
 
 
 def state_names(config: RigidConfig) -> tuple[str, ...]:

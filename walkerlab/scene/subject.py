@@ -19,7 +19,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE, Parameter
-from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.rigid import refuse_different_legs, rigid_walker
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
@@ -76,6 +76,7 @@ def find_model_gait(
 
     Raises NoAnswer if it has no gait.
     """
+    refuse_different_legs(config, "A disturbed gait")
     length = float(gait["step_length_m"])
     if model == RIGID:
         z = section_coordinates(rigid_walker(config), gait["state"])

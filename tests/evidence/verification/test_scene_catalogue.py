@@ -105,7 +105,7 @@ def test_heel_strike_conserves_summed_momentum_of_any_walker(name):
     config = config_of(name)
     model, before = start_of(config)
     after = np.zeros(before.size)
-    strike(model, AT_STRIKE, before, after)
+    strike(model, model, AT_STRIKE, before, after)
     masses = RigidMasses(assembly_of(config.walker, rigid=True), config.slope_rad)
     poses = masses.poses(before[None]), masses.poses(after[None])
     assert feet_off_the_slope(poses[0]) < 1e-12

@@ -298,8 +298,8 @@ def compiled(system, y, f, reaction):
 
 @kernel
 def compiled_strikes(model, y, heel, knee):
-    impact.strike(model, AT_STRIKE, y, heel)
-    impact.strike(model, STRAIGHT, y, knee)
+    impact.strike(model, model, AT_STRIKE, y, heel)
+    impact.strike(model, model, STRAIGHT, y, knee)
 
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])

@@ -86,7 +86,7 @@ def test_ground_without_a_gait_is_explained(sets, word):
 def test_failed_search_states_its_reason(gait, monkeypatch):
     backward = replace(gait, steps=(replace(gait.step, length_m=-0.1),))
     monkeypatch.setattr(search, "gait_near", lambda *_: backward)
-    said = solve_gait_on(None, None)
+    said = solve_gait_on(None, None, 1)
     assert said == "it led to a walk that does not advance, with steps of -0.1 m"
     singular = NotConverged(Outcome.WALKED, singular=True)
     monkeypatch.setattr(search, "gait_near", lambda *_: singular)

@@ -27,7 +27,8 @@ from walkerlab.pipeline.sweeps.question import axis, described
 from walkerlab.scene.parameter import MODEL_KEYS, parameter_of
 
 WALKERS = {
-    **dict.fromkeys(builtin_names(), ()),
+    # most questions refuse walkers whose legs differ
+    **dict.fromkeys(sorted({*builtin_names()} - {"one-knee", "prosthesis"}), ()),
     "kneed with compliant stops": ("walker.knee.lock=compliant",),
     "paper with a hip": ("walker.hip={spring_N_m_per_rad: 1, damping_N_m_s_per_rad: 0.1, torque_N_m: 0.01}",),
 }

@@ -129,7 +129,7 @@ def film_frame(result, pads=None, **changed):
 
 
 def test_film_shows_the_arcs_of_round_feet():
-    flat, round_feet = (film_frame(rigid(), radius=radius) for radius in (0.0, 0.2))
+    flat, round_feet = (film_frame(rigid(), radii=(radius, radius)) for radius in (0.0, 0.2))
     for look in LEGS:
         assert coloured(round_feet, look) > coloured(flat, look) + 50
 

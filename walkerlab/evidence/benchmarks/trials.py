@@ -15,7 +15,7 @@ from walkerlab.physics.hybrid.rigid_record import unwatched
 from walkerlab.physics.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
 from walkerlab.physics.hybrid.rigid_walk import new_heel_strikes, walk
 from walkerlab.physics.kernels import uncompiled
-from walkerlab.physics.mechanics.rigid_model import RigidModel
+from walkerlab.physics.mechanics.rigid_model import RigidModel, models_in_turn
 from walkerlab.physics.solvers.registry import METHODS, Tolerances, finder_for
 from walkerlab.physics.solvers.stepping import ACCEPTED, H_NEXT, REJECTED, RHS, clear_counts
 from walkerlab.physics.solvers.system import Floats
@@ -68,7 +68,7 @@ class RigidTrial:
         n, entry = len(self.walker.zero_state), METHODS[method]
         solver = entry.new(n, rtol, atol, budget)
         finder = finder_for(solver, RIGID_EVENTS, n)
-        walker, observer = np.asarray(self.walker), unwatched()
+        walker, observer = models_in_turn(self.walker), unwatched()
         strikes = new_heel_strikes(self.steps, n, self.walker.kneed)
         stride = walk if entry.compiled else uncompiled(walk)
 

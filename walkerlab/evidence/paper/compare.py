@@ -35,10 +35,11 @@ from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
 from walkerlab.physics.hybrid.recorded_walk import as_state
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import last_step
+from walkerlab.pipeline.stages.walk import last_step, mean_step
 from walkerlab.pipeline.store.columns import numbered, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
+from walkerlab.scene.rigid import have_different_legs
 
 START_TOLERANCE = 1e-6  # rad and rad/s; a start farther than this from the fixed point counts as moved
 PAPER_OMISSION = {
@@ -122,10 +123,11 @@ def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dic
     """Summarise the walks of both models and, for kneed walkers, the walks with each knee release."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
     releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
+    step_of = mean_step if have_different_legs(config) else last_step
     return {
         "steps": {
-            "rigid": last_step(rigid),
-            "contact": {**last_step(contact), "slip_m": contact["slip_per_step_m"]},
+            "rigid": step_of(rigid),
+            "contact": {**step_of(contact), "slip_m": contact["slip_per_step_m"]},
             "gait": {
                 "period_s": gait.get("period_s"),
                 "length_m": gait.get("step_length_m"),

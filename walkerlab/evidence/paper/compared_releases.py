@@ -17,7 +17,8 @@ from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.stages.walk import last_step, numbers_of
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.omissions import omission
-from walkerlab.scene.parts import assembly_of, drive_parameters
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import add_drives, have_different_legs
 
 RELEASES = {"compression": False, "touch": True}
 """Whether the knee is released at the leading foot's first touch, by the config's name for the release."""
@@ -33,18 +34,19 @@ LOCK_OMISSION = omission(
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Walk up to 20 steps from a gait with each knee release, or return None for walkers without knees or with a
-    push-off.
+    """Walk up to 20 steps from a gait with each knee release.
+
+    Returns None for walkers without knees, with a push-off or with legs that differ.
     """
     scene = contact_scene(config, pitch_m, pitch_m)
-    if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0:
+    if not scene.walker.kneed or config.push_off.impulse_N_s != 0.0 or have_different_legs(config):
         return None
     releases = {}
     for name, at_touch in RELEASES.items():
         released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
         walk = released.walk(start_state(scene, state), CONTACT_STEPS, CONTACT_TOLERANCES)
         model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch)
-        rigid = take_walk(model.changed(**drive_parameters(config)), RIGID_TOLERANCES, state, RIGID_STEPS)
+        rigid = take_walk(add_drives(model, config), RIGID_TOLERANCES, state, RIGID_STEPS)
         last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
         of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
         releases[name] = {**walk_report(scene, walk), "rigid": of_rigid}

@@ -34,6 +34,7 @@ from walkerlab.physics.hybrid.contact_tangent import new_tangent
 from walkerlab.physics.hybrid.endings import CHANGES_FORM, FALLEN_HIP
 from walkerlab.physics.hybrid.walk_record import DrivenWork, WalkRecord, WalkWork
 from walkerlab.physics.kernels import kernel, uncompiled, vector
+from walkerlab.physics.mechanics.hinges import DAMPING, HIP_ROW
 from walkerlab.physics.mechanics.tree import new_record
 from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_named, share_counts
 from walkerlab.physics.solvers.stepping import BUDGET, RHS, T
@@ -294,7 +295,11 @@ def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances)
 def driven_work(walker: ContactWalker, along: float, up: float, account: Floats) -> DrivenWork:
     """Combine gravity's work for a displacement `along` the slope and `up` (m) with the drives' work in the account."""
     gravity = walker.mass * (walker.gravity_along * along - walker.gravity_down * up)
-    return DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
+    work = DrivenWork(walker.mass * walker.gravity, gravity, *account[PUSH_OFF:].tolist())
+    if not walker.whole.laws[HIP_ROW + 1 :, DAMPING].any():
+        return work
+    # the hip has no damper if the knees have
+    return work._replace(hip=work.hip_torque, knees=work.hip - work.hip_torque)
 
 
 def gather(

@@ -27,12 +27,15 @@ from walkerlab.physics.mechanics.impact import push_off_work
 from walkerlab.physics.mechanics.rigid_model import (
     AT_STRIKE,
     BENT,
+    NO_SHANK,
     STANCE,
     Mode,
     RigidModel,
     apply_couplings,
+    by_turns,
     energies,
     energy_at_touch,
+    models_in_turn,
     step_lengths,
     swing_foot,
 )
@@ -171,7 +174,8 @@ class Recorder:
         self.finder = finder_for(method, EVENTS, len(walker.zero_state))
         # walks with a library's method run in Python
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
-        self.numbers, self.kneed = len(walker.zero_state), walker.kneed
+        self.numbers, self.kneed = len(walker.zero_state), walker.kneed or walker.exchanged.kneed
+        self.models = models_in_turn(walker)
         self.seen = new_observer(np.zeros(0), self.numbers)
         self.tally: RigidTally = self.seen.tally[()]
         self.counts = np.zeros_like(method.counts)
@@ -191,9 +195,7 @@ class Recorder:
         observer = new_observer(times, self.numbers)
         clear_counts(self.method)
         self.method.counts[BUDGET] = min(steps * BUDGET_OF_A_STEP, self.budget - int(self.counts[RHS]))
-        status, taken = self.walk(
-            np.asarray(self.walker), self.method, self.finder, observer, np.array(self.state), seen
-        )
+        status, taken = self.walk(self.models, self.method, self.finder, observer, np.array(self.state), seen)
         self.counts += self.method.counts
         total, part = self.tally, observer.tally[()]
         for name in ("min_normal_force", "min_impulse"):
@@ -204,6 +206,8 @@ class Recorder:
             total[name] += part[name]
         strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
         knees = np.where(seen.knee_time < 0.0, np.nan, seen.knee_time + self.time)
+        for k, shank in enumerate(self.models["shank"]):
+            knees[k :: self.models.size] = knees[k :: self.models.size] if shank != NO_SHANK else np.nan
         if self.sampled:
             self.pieces.append(self._samples(observer, strikes, before, after, knees))
         for blocks, new in ((self.strikes, strikes), (self.before, before), (self.after, after)):
@@ -217,7 +221,8 @@ class Recorder:
 
     def _mean_energy(self, strikes: Array, after: Array) -> float:
         """Compute the mean energy over time (J); heights are from the contact point at the touch before each step."""
-        zeros = energy_at_touch(self.walker, np.append(self.start[STANCE], after[:, STANCE]))
+        touched = np.append(self.start[STANCE], after[:, STANCE])
+        zeros = by_turns(self.walker, np.arange(touched.size), energy_at_touch, touched)
         if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
         durations = np.diff(strikes, prepend=0.0, append=max(float(self.tally.duration), self.time))
@@ -236,12 +241,19 @@ class Recorder:
         hip = torque - float(np.sum(stored))
         # the energy of the springs is counted as work of the hip
         unsprung = walker.changed(laws=0.0) if walker.sprung else walker
-        ends = [sum(energies(unsprung, y)) - energy_at_touch(unsprung, y[STANCE]) for y in (self.start, self.state)]
+        last = unsprung.exchanged if self.steps % 2 else unsprung
+        ends = [
+            sum(energies(model, y)) - energy_at_touch(model, y[STANCE])
+            for model, y in ((unsprung, self.start), (last, self.state))
+        ]
         residual = float(ends[1] - ends[0] - gravity - hip + self.tally.strike_loss)
-        hip, residual = (hip + residual, 0.0) if any(law.damping for law in laws) else (hip, residual)
-        push = float(push_off_work(walker, before).sum()) if walker.push_off else 0.0
+        knees = residual if walker.damped_knees else None
+        hip = hip + residual if laws[HIP_ROW].damping else hip
+        residual = 0.0 if knees is not None or laws[HIP_ROW].damping else residual
+        pushed = walker.push_off or walker.exchanged.push_off
+        push = float(by_turns(walker, np.arange(len(before)), push_off_work, before).sum()) if pushed else 0.0
         weight, forward = float(walker.mass * walker.gravity), float(self.tally.forward_work)
-        return DrivenWork(weight, gravity, push, hip, torque, forward), abs(residual)
+        return DrivenWork(weight, gravity, push, hip, torque, forward, knees), abs(residual)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:
         """Merge the samples on the grid with samples on both sides of the heel strikes."""
@@ -267,7 +279,8 @@ class Recorder:
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(blocks) for blocks in (self.strikes, self.before, self.after))
-        lengths = step_lengths(self.walker, np.vstack((self.start, after))[:-1], before)
+        steps = np.arange(len(before))
+        lengths = by_turns(self.walker, steps, step_lengths, np.vstack((self.start, after))[:-1], before)
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(self.walker.mass) * float(
             self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed

@@ -304,7 +304,7 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
         return endings.GOES_ON
     y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
     bridge(rows, lane, wait, y)
-    strike(walker.model, AT_STRIKE, y, new)
+    strike(walker.model, walker.model, AT_STRIKE, y, new)
     step, t = slots[STEPS_TAKEN, lane], rows[LANE_TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
     outcome = record_strike(observer, slots[SLOT_OF_START, lane], step, t, new)

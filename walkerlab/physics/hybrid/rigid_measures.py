@@ -10,7 +10,17 @@ from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.hybrid.walk_record import Array
 from walkerlab.physics.kernels import kernel
 from walkerlab.physics.mechanics import rigid_model
-from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, STRAIGHT, SWING, Mode, RigidModel, ground_reaction
+from walkerlab.physics.mechanics.parts import Position
+from walkerlab.physics.mechanics.rigid_model import (
+    BENT,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    Mode,
+    RigidModel,
+    by_turns,
+    ground_reaction,
+)
 
 
 def energies(walker: RigidModel, states: Array) -> Array:
@@ -65,24 +75,31 @@ def footholds_of(walk: RigidWalkResult) -> FootholdsOfWalk:
 
 def places(
     walker: RigidModel,
-    knee_m: tuple[float, float] | None,
+    knees_m: tuple[Position, ...],
     footholds: FootholdsOfWalk,
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute the walker's points at angles (samples, n) in rad, swing leg first; `knee_m` is in the thigh's frame."""
-    psi = angle + walker.slope
-    rolled = -walker.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
-    contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))
-    centre = contact + np.array([0.0, walker.radius])
-    hip = centre + rotate_levers(psi[:, [STANCE]], [walker.hip_x], [walker.hip_y])
-    foot = centre + rotate_levers(psi, walker.foot_x, walker.foot_y) - [0.0, walker.radius]
-    knees = None
-    if knee_m is not None:
-        knees = np.stack(
-            [hip + rotate_levers(psi[:, [leg]], knee_m[:1], knee_m[1:]) for leg in (SWING, STANCE)], axis=1
-        )
-    return Places(contact, hip, foot, knees)
+    """Compute the walker's points at angles (samples, n) in rad, swing leg first, in steps (samples,).
+
+    knees_m  position of each leg's knee in its thigh's frame; empty for legs without knees
+    """
+
+    def points(model: RigidModel, angle: Array, step: NDArray[np.int64]) -> Array:
+        psi = angle + model.slope
+        rolled = -model.radius * (angle[:, STANCE] - footholds.set_down_rad[step])
+        contact = np.column_stack((footholds.along_m[step] + rolled, footholds.height_m[step]))
+        centre = contact + np.array([0.0, model.radius])
+        hip = centre + rotate_levers(psi[:, [STANCE]], [model.hip_x], [model.hip_y])
+        foot = centre + rotate_levers(psi, model.foot_x, model.foot_y) - [0.0, model.swing_radius]
+        by_role = knees_m[::-1] if step.size and step[0] % 2 else knees_m
+        knees = [
+            hip + rotate_levers(psi[:, [leg]], [x], [y]) for leg, (x, y) in zip((SWING, STANCE), by_role, strict=False)
+        ]
+        return np.stack((contact, hip, foot, *knees), axis=1)
+
+    at = by_turns(walker, step, points, angle, step)
+    return Places(at[:, 0], at[:, 1], at[:, 2], at[:, 3:] if knees_m else None)
 
 
 def rotate_levers(psi: Array, lever_x: Any, lever_y: Any) -> Array:

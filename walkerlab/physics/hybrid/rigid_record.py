@@ -8,7 +8,14 @@ from walkerlab.physics.hybrid.hip_work import torque_work
 from walkerlab.physics.kernels import by_reference, kernel_part, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.impact import push_off
-from walkerlab.physics.mechanics.rigid_model import Mode, energies, ground_reaction, momentum, swing_foot
+from walkerlab.physics.mechanics.rigid_model import (
+    Mode,
+    RigidModel,
+    energies,
+    ground_reaction,
+    momentum,
+    swing_foot,
+)
 from walkerlab.physics.mechanics.tree import fast_fields, new_record, record_type
 from walkerlab.physics.solvers.events import CrossingFinder
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
@@ -82,14 +89,18 @@ def observe_start(observer: Observer, mode: Mode, y: Any) -> None:
 
 
 @kernel_part
-def observe_strike(observer: Observer, mode: Mode, heel: bool, before: Any, after: Any) -> None:
-    """Record a strike's energy loss and its impulse on the new stance foot, without the push-off's impulse."""
+def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: bool, before: Any, after: Any) -> None:
+    """Record a strike's energy loss and its impulse on the new stance foot, without the push-off's impulse.
+
+    following  model of the next step; at a knee strike the model stays
+    """
     if observer.watching:
-        model, tally = mode.model, observer.tally[()]
-        along, normal = momentum(model, before)
+        tally = observer.tally[()]
+        along, normal = momentum(mode.model, before)
+        model = following if heel else mode.model
         along_after, normal_after = momentum(model, after)
         along, impulse = along_after - along, normal_after - normal
-        tally.step_strike_loss += energies(model, before)[0] - energies(model, after)[0]
+        tally.step_strike_loss += energies(mode.model, before)[0] - energies(model, after)[0]
         if heel:
             if model.push_off != 0.0:
                 push = push_off(model, after)

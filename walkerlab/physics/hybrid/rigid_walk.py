@@ -100,11 +100,12 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
 def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float, float]:
     """Compute the heel strike's event function, a function that is positive with the swing foot ahead, and their rates.
 
-    For a straight leg on even ground both functions are linear in the angles, so scuffing near mid-swing is not a zero.
-    Otherwise they are the foot's height above its next foothold and its distance ahead. `turn` (n,): rates or a column.
+    For straight legs that are alike, on even ground, both functions are linear in the angles, so scuffing near
+    mid-swing is not a zero. Otherwise they are the foot's height above its next foothold and its distance ahead.
+    `turn` (n,) holds rates or a column.
     """
     model, swing, stance = system.model, turn[SWING], turn[STANCE]
-    if is_bent(system) or system.rise != 0.0:
+    if is_bent(system) or system.rise != 0.0 or not model.alike:
         height, ahead, upward, apart = swing_foot_motion(model, y, turn)
         return height - system.rise, ahead, upward, apart
     return feet_on_slope(model, y[SWING], y[STANCE]), y[SWING] - y[STANCE], swing + stance, swing - stance
@@ -151,13 +152,16 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
 
 @kernel_part
 def take_step(
-    model: RigidModel, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
+    walker: Any, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
     """Take one step, a swing and its heel strike, from time t (s); afterwards y holds the state and tangent columns.
+
+    walker  as in `walk`; of legs that differ, leg 1 swings in even steps
 
     Returns WALKED and the time of the heel strike, with the state before the strike in `method`; if the step fails,
     returns its outcome and the time at which it ended. The time of a knee strike is written into `strikes`.
     """
+    model, following = walker[step % walker.size], walker[(step + 1) % walker.size]
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
     phase = BENT if model.shank != NO_SHANK and strikes.knee_time[step] >= 0.0 else STRAIGHT
     behind, rise = -strikes.rise[step], strikes.rise[step + 1]
@@ -168,8 +172,8 @@ def take_step(
             return status, method.clock[T]
         if status == endings.WALKED and strikes.nearest > 0.0 and swing_foot(model, method.y)[1] < strikes.nearest:
             return endings.FELL, method.clock[T]
-        t = pass_event(method, system, y, strikes, step)
-        observe_strike(observer, system, status == endings.WALKED, method.y, y)
+        t = pass_event(method, system, following, y, strikes, step)
+        observe_strike(observer, system, following, status == endings.WALKED, method.y, y)
         if status == endings.WALKED:
             return endings.WALKED, t
         strikes.knee_time[step] = t
@@ -225,7 +229,7 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
 
 
 @kernel_part
-def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> float:
+def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strikes: Any, step: int) -> float:
     """Apply the strike at the end of a phase, after a last Newton correction of its time; return that time (s).
 
     Afterwards `method` holds the state before the strike, `new` the state after it, and `strikes` how much later each
@@ -256,7 +260,7 @@ def pass_event(method: Any, system: Mode, new: Any, strikes: Any, step: int) -> 
                 wait += lift / upward
             waits[step, column - 1] = wait
             shift_column(y, at, f, wait)
-    strike(model, STRAIGHT if knee else AT_STRIKE, y, new)
+    strike(model, model if knee else following, STRAIGHT if knee else AT_STRIKE, y, new)
     if knee and len(y) > 2 * n:
         for i in range(2 * n):
             before[i] = new[i]
@@ -296,13 +300,12 @@ def walk(
 ) -> tuple[int, int]:
     """Walk until `strikes` is full or the walk ends; return the outcome's number and the number of steps taken.
 
-    walker  RigidModel in an array of shape (), which compiled code receives ten times faster than a tuple
+    walker  models of the first step and, if the legs differ, of the second, from `models_in_turn`
     y       (m,) state at time 0, with tangent columns if the method has room for them; overwritten with the last state
     """
-    model = walker[()]
     t = 0.0
     for step in range(strikes.time.size):
-        status, t = take_step(model, method, finder, observer, t, y, step, strikes)
+        status, t = take_step(walker, method, finder, observer, t, y, step, strikes)
         if status != endings.WALKED:
             return status, step
         strikes.time[step] = t

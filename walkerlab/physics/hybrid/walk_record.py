@@ -29,15 +29,17 @@ class DrivenWork(NamedTuple):
     hip: float  # J, work of the hip's spring, damper and torque
     hip_torque: float  # J, part of the hip's work that the constant torque does
     hip_torque_positive: float  # J, positive work of the constant torque
+    knees: float | None = None  # J, negative work of the knees' dampers; None without them
 
     @property
     def net_work(self) -> float:
-        """Net work of gravity, push-off and hip (J)."""
-        return self.gravity + self.push_off + self.hip
+        """Net work of gravity, push-off, hip and knees (J)."""
+        return self.gravity + self.push_off + self.hip + (self.knees or 0.0)
 
     def per_step(self, steps: int) -> dict[str, float]:
         """Compute the mean work per step (J) by source; the hip's work includes the work of its torque."""
-        return {name: getattr(self, name) / steps for name in self._fields if name != "weight"}
+        works = {name: getattr(self, name) for name in self._fields if name != "weight"}
+        return {name: work / steps for name, work in works.items() if work is not None}
 
     def cost_of_transport(self, distance: float) -> float:
         """Compute the work spent divided by weight times distance (m) along the slope."""

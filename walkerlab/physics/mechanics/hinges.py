@@ -59,7 +59,8 @@ def spring_energy(law: SpringDamper, angle: float) -> float:
     return 0.5 * law.stiffness * angle * angle
 
 
-LAW_NUMBERS, TORQUE = len(SpringDamper._fields), SpringDamper._fields.index("torque")
+LAW_NUMBERS = len(SpringDamper._fields)
+DAMPING, TORQUE = (SpringDamper._fields.index(name) for name in ("damping", "torque"))
 HIP_ROW = 0  # row of the hinge between the legs
 HINGE_ROWS = {"hip": slice(HIP_ROW, HIP_ROW + 1), "knees": slice(HIP_ROW + 1, None)}
 

@@ -32,21 +32,22 @@ from walkerlab.physics.solvers.system import Floats
 
 
 @kernel_part
-def strike(model: RigidModel, phase: int, y: Any, new: Any) -> None:
+def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) -> None:
     """Write the state after a plastic impact under constraints E[phase] into `new`; y is the state before it.
 
-    At a heel strike, AT_STRIKE, the swing foot becomes the stance foot and the legs exchange their roles. Any number of
-    variational columns may follow the state; they are also mapped and written into `new`.
+    At a heel strike, AT_STRIKE, the swing foot becomes the stance foot and the legs exchange their roles: `before` is
+    the model of the swing that ends, `model` that of the next one. Any number of variational columns may follow the
+    state; they are also mapped and written into `new`.
     """
     # E[phase] makes bodies follow others, such as a locked shank its thigh (see links.py).
     like, other_foot = model.arm_x, phase == AT_STRIKE
-    n, R, E = len(like), model.radius, model.E[phase]
+    n, R, R_before, E = len(like), model.radius, before.radius, model.E[phase]
     s, c, F, U, foot_F, foot_U = vector(like), vector(like), vector(like), vector(like), vector(like), vector(like)
     p, jump, turned, M, factors = vector(like), vector(like), vector(like), matrix(like), matrix(like)
-    sines_cosines(model, n, y, s, c)
-    projections(model.foot_x, model.foot_y, n, s, c, foot_F, foot_U)
+    sines_cosines(before, n, y, s, c)
+    projections(before.foot_x, before.foot_y, n, s, c, foot_F, foot_U)
     # velocity of the new stance foot's centre, along the slope and normal to it
-    along, upward = -R * y[n + STANCE], 0.0
+    along, upward = -R_before * y[n + STANCE], 0.0
     if other_foot:
         for l in range(n):
             along -= foot_U[l] * y[n + l]
@@ -69,7 +70,7 @@ def strike(model: RigidModel, phase: int, y: Any, new: Any) -> None:
         new[n + k] = p[k]
     jump_along, jump_upward = -R * p[STANCE] - along, -upward
     for at in range(2 * n, len(y), 2 * n):
-        along, upward = -R * y[at + n + STANCE], 0.0
+        along, upward = -R_before * y[at + n + STANCE], 0.0
         if other_foot:
             for l in range(n):
                 along -= foot_F[l] * y[at + l] * y[n + l] + foot_U[l] * y[at + n + l]
@@ -139,15 +140,15 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     """Compute the push-off at a heel strike from the state `new` just after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
-    R = model.radius
+    R_t, R_l, hip_x, hip_y = model.swing_radius, model.radius, model.swing_hip_x, model.swing_hip_y
     # vector from each foot's contact point to the hip, along the slope and normal to it
-    x_t, y_t = c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + R
-    x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R
+    x_t, y_t = c_t * hip_x - s_t * hip_y, s_t * hip_x + c_t * hip_y + R_t
+    x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R_l
     length = math.hypot(x_t, y_t)
     share = model.push_off / length
     angular = share * (x_l * y_t - y_l * x_t)
-    by_trailing = share * (x_l * x_t + y_l * (y_t - R)) - angular * x_t * R / (length * length)
-    by_leading = -share * ((y_l - R) * y_t + x_l * x_t)
+    by_trailing = share * (x_l * x_t + y_l * (y_t - R_t)) - angular * x_t * R_t / (length * length)
+    by_leading = -share * ((y_l - R_l) * y_t + x_l * x_t)
     return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)
 
 
@@ -162,12 +163,17 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     n, E = len(model.arm_x), model.E[STRAIGHT]
     Z = E[:, np.diag(E) != 0.0]
     A, B, arm_x, arm_y = (each.copy() for each in (model.A, model.B, model.arm_x, model.arm_y))
-    # about the hip, the trailing leg has the same constants as the leading leg and carries no other body
-    leg = [SWING] if model.shank == NO_SHANK else [SWING, int(model.shank)]
-    own = A[np.ix_(leg, leg)].sum()
+    # the trailing leg carries no other body; its constants about the hip are those with which it swings next
+    following = model.exchanged
+    leg = [SWING] if following.shank == NO_SHANK else [SWING, int(following.shank)]
+    own, moment_x, moment_y = (
+        following.A[np.ix_(leg, leg)].sum(),
+        following.arm_x[leg].sum(),
+        following.arm_y[leg].sum(),
+    )
     for pairs in (A, B):
         pairs[STANCE, :], pairs[:, STANCE] = 0.0, 0.0
-    A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = own, arm_x[leg].sum(), arm_y[leg].sum()
+    A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = own, moment_x, moment_y
     psi = before[:, :n] + model.slope
     s, c, turned = np.sin(psi), np.cos(psi), psi[:, None, :] - psi[:, :, None]
     inertia = Z.T @ (A * np.cos(turned) + B * np.sin(turned)) @ Z
@@ -175,7 +181,7 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     apparent = model.mass * np.eye(2) - moments.transpose(0, 2, 1) @ np.linalg.solve(inertia, moments)
     s_t, c_t = s[:, STANCE], c[:, STANCE]
     to_hip = np.stack((c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + model.radius), 1)
-    impulse = model.push_off * to_hip / np.linalg.norm(to_hip, axis=1, keepdims=True)
+    impulse = following.push_off * to_hip / np.linalg.norm(to_hip, axis=1, keepdims=True)
     return np.asarray(0.5 * (impulse[:, None, :] @ np.linalg.solve(apparent, impulse[:, :, None]))[:, 0, 0])
 
 

@@ -1,14 +1,22 @@
 """Construction of the rigid model from parts: groups of bodies, followers, and exchange of roles at heel strike."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from walkerlab.physics.mechanics.assembly import Anchor, followers, levers, reduction, tree_about
-from walkerlab.physics.mechanics.parts import Assembly, Revolute
-from walkerlab.physics.mechanics.rigid_model import NO_SHANK, STANCE, SWING, RigidModel, new_rigid_model, on_slope
+from walkerlab.physics.mechanics.parts import Assembly, Position, Revolute
+from walkerlab.physics.mechanics.rigid_model import (
+    NO_SHANK,
+    STANCE,
+    SWING,
+    RigidModel,
+    new_rigid_model,
+    on_slope,
+    pair,
+)
 from walkerlab.physics.solvers.system import Floats
 
 ALIKE = 1e-12  # relative difference up to which two legs count as equal
@@ -22,6 +30,7 @@ class BodyPlaces:
     members: Floats  # (bodies, n) 1 where an assembly's body is part of a model's body, otherwise 0
     roles: tuple[int, ...]  # body k after a heel strike is body roles[k] before it
     knees: tuple[tuple[int, int], ...]  # indices (shank, thigh) of the swing knee; empty for straight legs
+    lower: int  # number of lower bodies of the swing leg; of unequal legs, the larger number
 
 
 def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
@@ -30,28 +39,46 @@ def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_st
 
 
 def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
-    """Build the rigid model of an assembly; gravity in m/s^2.
+    """Build the rigid model of an assembly, which is a pair of models if the legs differ; gravity in m/s^2.
 
     The trailing knee is released just after the heel strike if `knee_locked_at_strike`, otherwise just before it.
-    Raises ValueError, with a message for the user, if the parts are not a walker with two equal legs.
+    Raises ValueError, with a message for the user, if the parts are not a walker with two legs.
     """
-    check_equal_legs(assembly)
+    check_legs(assembly)
+    models = [
+        swinging_first(each, gravity, knee_locked_at_strike)
+        for each in (assembly, replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1]))
+    ]
+    if have_equal_legs(assembly):
+        return models[0]
+    if not knee_locked_at_strike and models[0].coordinates != models[1].coordinates:
+        raise ValueError(
+            "only one leg has a knee, which must be locked during heel strike (knee.at_heel_strike: locked)"
+        )
+    # lengths and falls are scaled by the length of leg 1, which stands in the second model
+    return pair(models[0].changed(leg_length=models[1].leg_length), models[1])
+
+
+def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+    """Build the model of the steps in which an assembly's first leg swings; arguments as in `on_level_ground`."""
     hip = find_hip(assembly)
     places = group_bodies(assembly)
-    foot = assembly.feet[STANCE]
-    root = Anchor(foot.body, foot.centre_m)
-    to_foot = places.members.T @ levers(
-        assembly, root, Anchor(assembly.feet[SWING].body, assembly.feet[SWING].centre_m)
-    )
-    to_hip = places.members.T @ levers(assembly, root, Anchor(hip.parent, hip.parent_point_m))
-    hanging = -to_hip[STANCE]  # from the hip to the centre of the foot's arc in a straight leg
+    swing_foot, foot = assembly.feet
+    swing_root, root = (Anchor(each.body, each.centre_m) for each in assembly.feet)
+    to_foot = places.members.T @ levers(assembly, root, swing_root)
+    # of straight legs, from the centre of each foot's arc
+    to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m)).sum(axis=0)
+    swing_to_hip = levers(assembly, swing_root, Anchor(hip.child, hip.child_point_m)).sum(axis=0)
+    soles = np.array([[foot.radius_m, *to_hip], [swing_foot.radius_m, *swing_to_hip]])
     n, members = len(places.names), places.members
-    torso = {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
+    coupled = {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
     knees = {shank: np.eye(n)[thigh] for shank, thigh in places.knees}
+    # the place of a shank in a straight leg beside a kneed one stays in line with the leg
+    coupled |= {place: np.eye(n)[SWING] for place in range(n) if not members[:, place].any()}
     free = () if knee_locked_at_strike else tuple(knees)
     section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
-    in_line = {**torso, **knees}
-    reductions = [reduction(rows, n) for rows in (torso, in_line, torso if free else in_line)]
+    in_line = {**coupled, **knees}
+    reductions = [reduction(rows, n) for rows in (coupled, in_line, coupled if free else in_line)]
     shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
     return new_rigid_model(
         n,
@@ -59,17 +86,21 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],
         E=reductions,
-        hinges=[(SWING, STANCE), *places.knees],
+        hinges=[(SWING, STANCE), *((place, SWING) for place in range(2, 2 + places.lower))],
         roles=places.roles,
         section=[*section_indices, *[0] * (n + 1 - len(section_indices))],
         coordinates=len(section_indices),
         thigh=thigh,
         shank=shank,
         radius=foot.radius_m,
-        hip_x=to_hip[STANCE, 0],
-        hip_y=to_hip[STANCE, 1],
-        lean=math.atan2(hanging[0], -hanging[1]),
-        leg_length=foot.radius_m - hanging[1],
+        swing_radius=swing_foot.radius_m,
+        hip_x=to_hip[0],
+        hip_y=to_hip[1],
+        swing_hip_x=swing_to_hip[0],
+        swing_hip_y=swing_to_hip[1],
+        alike=are_equal(*soles),
+        lean=math.atan2(-to_hip[0], to_hip[1]),
+        leg_length=foot.radius_m + to_hip[1],
         gravity=gravity,
         gravity_down=gravity,
     )
@@ -79,18 +110,21 @@ def group_bodies(assembly: Assembly) -> BodyPlaces:
     """Group the bodies in the model's order: swing leg (or thigh), straight stance leg, swing shank, shared bodies."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
-    groups = [(swinging[0],), stance, *((name,) for name in swinging[1:]), *((name,) for name in shared)]
+    more = max(len(swinging), len(stance)) - 1
+    below = [*((name,) for name in swinging[1:]), *[()] * (more + 1 - len(swinging))]
+    groups: list[tuple[str, ...]] = [(swinging[0],), stance, *below, *((name,) for name in shared)]
     members = np.zeros((len(assembly.bodies), len(groups)))
     for place, group in enumerate(groups):
         for name in group:
             members[assembly.index(name), place] = 1.0
-    more = len(swinging) - 1
+    longer = max(swinging, stance, key=len)
     knee_position = {knee.shank: knee.thigh for knee in assembly.knees}
     return BodyPlaces(
-        names=("1", "2", *(f"1_{name.split()[0]}" for name in swinging[1:]), *(name.split()[0] for name in shared)),
+        names=("1", "2", *(f"1_{name.split()[0]}" for name in longer[1:]), *(name.split()[0] for name in shared)),
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
         knees=tuple((2 + k, group_index(groups, knee_position[name])) for k, name in enumerate(swinging[1:])),
+        lower=more,
     )
 
 
@@ -107,16 +141,20 @@ def find_hip(assembly: Assembly) -> Revolute:
     return hinge
 
 
-def knee_position(assembly: Assembly) -> tuple[float, float] | None:
-    """Return the knee's position (m) in the frame of a thigh; None for a walker without knees."""
+def knee_positions(assembly: Assembly) -> tuple[Position, ...]:
+    """Return the position (m) of each leg's knee in the frame of its thigh; empty for a walker without knees."""
+    # The line of a leg without a knee is drawn through the point where the other leg has one.
     hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
-    return next((hinge.parent_point_m for hinge in hinges if hinge is not None), None)
+    positions = tuple(hinge.parent_point_m for hinge in hinges if hinge is not None)
+    return (positions * 2)[:2]
 
 
-def check_equal_legs(assembly: Assembly) -> None:
+def check_legs(assembly: Assembly) -> None:
     first, second = assembly.legs
-    if not first or len(first) != len(second):
-        raise ValueError("both legs need the same number of bodies, listed from the hip down: legs: [[…], […]]")
+    if not first or not second:
+        raise ValueError("both legs need bodies, listed from the hip down: legs: [[…], […]]")
+    if len(first) < len(second):
+        raise ValueError("of two legs of which one has a knee, the leg with the knee is listed first")
     if len(first) > 2:
         raise ValueError("a leg has at most a thigh and a shank, with one knee between them")
     if set(first) & set(second):
@@ -133,19 +171,24 @@ def check_equal_legs(assembly: Assembly) -> None:
     for body in assembly.bodies:
         if body.name not in (*first, *second) and body.name not in coupled:
             raise ValueError(f"body {body.name!r} is in neither leg and has no coupling")
-    one, other = (leg_measures(assembly, k) for k in range(2))
-    if not np.allclose(one, other, rtol=ALIKE, atol=ALIKE * np.abs(one).max()):
-        raise ValueError("the two legs differ; they exchange roles at heel strike, so they must be equal")
 
 
-def leg_measures(assembly: Assembly, k: int) -> Floats:
-    leg, foot = assembly.legs[k], assembly.feet[k]
-    hip = find_hip(assembly)
+def have_equal_legs(assembly: Assembly) -> bool:
+    """Whether both legs of an assembly have the same dimensions and masses."""
+    first, second = assembly.legs
+    return len(first) == len(second) and all(map(are_equal, *(leg_measures(assembly, k) for k in range(2))))
+
+
+def are_equal(one: Floats, other: Floats) -> bool:
+    return bool(np.allclose(one, other, rtol=ALIKE, atol=ALIKE * np.abs(one).max()))
+
+
+def leg_measures(assembly: Assembly, k: int) -> tuple[Floats, ...]:
+    """Return the sole of a leg, and the constants of its bodies about the hip, which do not depend on the hip mass."""
+    leg, foot, hip = assembly.legs[k], assembly.feet[k], find_hip(assembly)
     at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)
     own = [assembly.index(name) for name in leg]
-    measures = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[own].ravel()]
-    for name in leg:
-        body = assembly.bodies[assembly.index(name)]
-        measures += [body.mass_kg, body.inertia_kg_m2]
-        measures += [*levers(assembly, at_hip, Anchor(name, body.centre_m))[own].ravel()]
-    return np.array(measures)
+    sole = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[own].ravel()]
+    tree = tree_about(assembly, at_hip)
+    pairs, arms = (np.stack(each)[..., own] for each in ((tree.A, tree.B), (tree.arm_x, tree.arm_y)))
+    return np.array(sole), pairs[:, own], arms

@@ -11,13 +11,15 @@ that both legs share. Bodies that follow others are eliminated as in links.py.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from walkerlab.physics.kernels import forced_inline, kernel_part, matrix, vector, zeros
 from walkerlab.physics.mechanics import tree
 from walkerlab.physics.mechanics.hinges import (
+    DAMPING,
+    HIP_ROW,
     HingeTorque,
     add_hinge_gradients,
     add_hinge_torque,
@@ -50,7 +52,9 @@ NO_SHANK = -1
 class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     """Constants of the rigid model, SI; a structured scalar whose type fixes the number n of bodies."""
 
-    # E holds three reductions: BENT, STRAIGHT and AT_STRIKE.
+    # E holds three reductions: BENT, STRAIGHT and AT_STRIKE. If the legs differ, `paired_with` is the model in which
+    # the other leg swings. It is no field of the record: a kernel takes both records, see `models_in_turn`.
+    paired_with = cast("RigidModel | None", None)
 
     foot_x: Floats  # (n,) m, levers of the bodies from the stance foot's centre to the swing foot's
     foot_y: Floats
@@ -60,9 +64,13 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     thigh: int  # index of the swing leg's thigh; NO_SHANK without knees
     shank: int  # index of the swing leg's shank; NO_SHANK without knees
     unpaired: float  # kg m^2, coefficient of a torque on the stance leg that has no reaction: see `add_unpaired_torque`
-    radius: float  # [R] m, radius of both feet; 0 for point feet
+    radius: float  # [R] m, radius of the stance foot; 0 for a point foot
+    swing_radius: float  # m, radius of the swing foot
     hip_x: float  # m, lever from the stance foot's centre to the hip, in the stance leg's frame
     hip_y: float
+    swing_hip_x: float  # m, lever from the swing foot's centre to the hip, in the straight swing leg's frame
+    swing_hip_y: float
+    alike: bool  # whether both legs have the same length and sole
     lean: float  # rad, angle from a straight leg's axis to the line from hip to foot centre
     leg_length: float  # [L] m, from hip to sole
     gravity: float  # [g] m/s^2
@@ -82,24 +90,79 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
         """Whether the walker has no drive, spring or damper."""
         return not self.sprung and not self.driven
 
+    @property
+    def damped_knees(self) -> bool:
+        """Whether a knee has a damper."""
+        laws = [model.laws[HIP_ROW + 1 :, DAMPING] for model in (self, self.exchanged)]
+        return bool(np.any(laws))
+
+    @property
+    def legs_differ(self) -> bool:
+        return self.paired_with is not None
+
+    @property
+    def exchanged(self) -> "RigidModel":
+        """Model of the next step, in which the legs have exchanged their roles; this model itself for equal legs."""
+        return self if self.paired_with is None else pair(self.paired_with, self)
+
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, RigidModel) and self.dtype == other.dtype and self.tobytes() == other.tobytes()
+        if not isinstance(other, RigidModel) or self.dtype != other.dtype or self.tobytes() != other.tobytes():
+            return False
+        return bool(self.paired_with == other.paired_with)
 
     def __hash__(self) -> int:
-        return hash(self.tobytes())
+        return hash((self.tobytes(), self.paired_with))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as read-only: kernels would be compiled again for a writable record."""
-        return RigidModel.changed, (np.asarray(self),)
+        return restored, (np.asarray(self), self.paired_with)
 
     def changed(self, **fields: Any) -> "RigidModel":
-        """Return a read-only copy with some fields changed."""
-        memory: Any = np.empty((), self.dtype)
-        memory[()] = self
-        tree.write_fields(memory, fields)
-        memory.flags.writeable = False
-        read_only: RigidModel = memory[()]
-        return read_only
+        """Return a read-only copy with some fields changed; of legs that differ, both models are changed."""
+        model = with_fields(self, fields)
+        return model if self.paired_with is None else pair(model, with_fields(self.paired_with, fields))
+
+
+def with_fields(model: Any, fields: Any) -> RigidModel:
+    """Return a read-only copy of a model without a partner, with some fields changed."""
+    memory: Any = np.empty((), model.dtype)
+    memory[()] = model
+    tree.write_fields(memory, fields)
+    memory.flags.writeable = False
+    read_only: RigidModel = memory[()]
+    return read_only
+
+
+def pair(first: RigidModel, second: RigidModel) -> RigidModel:
+    """Return `first`, in which leg 1 swings, with the model `second`, in which leg 2 swings."""
+    model, other = with_fields(first, {}), with_fields(second, {})
+    object.__setattr__(model, "paired_with", other)
+    return model
+
+
+def restored(record: Any, paired_with: RigidModel | None) -> RigidModel:
+    """Return the model of a pickled record."""
+    model = with_fields(record, {})
+    return model if paired_with is None else pair(model, paired_with)
+
+
+def models_in_turn(model: RigidModel) -> Any:
+    """Return an array of the models of one step after the other, one for equal legs and two otherwise, for kernels."""
+    models = np.array([model] if model.paired_with is None else [model, model.paired_with], model.dtype)
+    models.flags.writeable = False
+    return models
+
+
+def by_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> Floats:
+    """Return compute(model, *rows) of rows (n, ...) in steps (n,); the models of legs that differ take turns."""
+    if model.paired_with is None:
+        return np.asarray(compute(model, *rows))
+    parts = [(step % 2 == k, each) for k, each in enumerate((model, model.exchanged))]
+    values = [compute(each, *(row[chosen] for row in rows)) for chosen, each in parts]
+    merged = np.empty((len(step), *values[0].shape[1:]))
+    for (chosen, _), value in zip(parts, values, strict=True):
+        merged[chosen] = value
+    return merged
 
 
 def new_rigid_model(n: int, **fields: Any) -> RigidModel:
@@ -329,7 +392,7 @@ def swing_foot_motion(model: RigidModel, y: Any, turn: Any) -> tuple[float, floa
     s, c = vector(model.arm_x), vector(model.arm_x)
     sines_cosines(model, n, y, s, c)
     ahead, height, apart, upward = lever_motion(model.foot_x, model.foot_y, n, s, c, turn)
-    return height, ahead, upward, apart
+    return height + (model.radius - model.swing_radius), ahead, upward, apart
 
 
 @kernel_part
@@ -343,8 +406,9 @@ def hip_height(model: RigidModel, y: Any) -> float:
 def feet_on_slope(model: Any, swing: Any, stance: Any) -> Any:
     """Compute the sum (rad) of the straight legs' angles from the slope's normal, zero if both feet are on even ground.
 
-    The sum falls through zero at heel strike. `swing` and `stance` (rad) are scalars, arrays or lanes, measured from
-    the vertical; (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from the normal.
+    For legs that are alike, the sum falls through zero at heel strike. `swing` and `stance` (rad) are scalars, arrays
+    or lanes, measured from the vertical; (9-2) of the paper prints theta_1 = -theta_2, which holds only for angles from
+    the normal.
     """
     return swing + stance + 2.0 * (model.slope + model.lean)
 

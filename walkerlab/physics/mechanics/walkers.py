@@ -51,6 +51,23 @@ def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
     )
 
 
+def with_second_leg(walker: Assembly, other: Assembly) -> Assembly:
+    """Return `walker` with the second leg of `other`; the hip mass is that of `walker`."""
+    legs = walker.legs[0], other.legs[1]
+    sources = (walker, legs[0]), (other, legs[1])
+    names = (legs[0][0], legs[1][0], *legs[0][1:], *legs[1][1:])
+    bodies = {body.name: body for source, leg in sources for body in source.bodies if body.name in leg}
+    knees = tuple(j for source, leg in sources for j in source.joints if {j.parent, j.child} <= {*leg})
+    return Assembly(
+        bodies=tuple(bodies[name] for name in names),
+        joints=(Revolute("hip", names[1], UPPER_END, names[0], UPPER_END), *knees),
+        particles=(Particle("hip", walker.particles[0].mass_kg, names[1], UPPER_END),),
+        feet=(walker.feet[0], other.feet[1]),
+        knees=tuple(knee for source, leg in sources for knee in source.knees if knee.shank in leg),
+        legs=legs,
+    )
+
+
 def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
     at_knee = (0.0, -thigh.length_m)
     knees = tuple(Revolute(f"knee {k + 1}", THIGHS[k], at_knee, SHANKS[k], UPPER_END) for k in range(2))

@@ -4,7 +4,7 @@ If that fails, the gait is followed from nearly rigid ground, where the rigid ga
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -39,19 +39,22 @@ class GaitAnswer:
     advice: str = ""
 
 
-def find_gait_from(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
+def find_gait_from(
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State, legs_differ: bool = False
+) -> GaitAnswer:
     """Search for the contact gait near a free walker's state with both feet on the ground, or state why it fails."""
+    pitches_m = [ground.terrain.pitch] * (2 if legs_differ else 1)
     excluded = why_no_gait(walker)
     if excluded:
         return GaitAnswer(None, *excluded)
     tolerances = replace(tolerances, budget=SEARCH_STEP_BUDGET)
     failure = "from the start, the feet do not even pass each other"
     for steps, z in section_points(walker, ground, tolerances, start):
-        gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, ground.terrain.pitch), z)
+        gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, *pitches_m), z, len(pitches_m))
         if isinstance(gait, Cycle):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
         failure = f"Newton's method found no gait after {steps} steps from the start: {gait}"
-    followed = follow_from_rigid(walker, ground, tolerances, start)
+    followed = follow_from_rigid(walker, ground, tolerances, start, pitches_m)
     if followed.gait is not None:
         return followed
     return GaitAnswer(None, f"{failure}; {followed.reason}", followed.advice)
@@ -91,8 +94,9 @@ def section_points(
             return
 
 
-def solve_gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | str:
-    gait = gait_near(pads, z, rigidity, CONTACT_EFFORT)
+def solve_gait_on(pads: OwnPads, z: Floats, steps: int, rigidity: float = 0.0) -> Cycle | str:
+    """Solve for a gait of some steps near z (d,), or return why there is none."""
+    gait = gait_near(pads, z, rigidity, CONTACT_EFFORT, steps)
     if isinstance(gait, NotConverged):
         if gait.singular:
             return "its matrix is singular, since a multiplier is 1"
@@ -101,8 +105,8 @@ def solve_gait_on(pads: OwnPads, z: Floats, rigidity: float = 0.0) -> Cycle | st
         if gait.outcome is Outcome.REJECTED:
             return "its push-off lasts until the feet pass each other, or longer"
         return f"a step ended as {gait.outcome.label}"
-    if gait.step.length_m <= 0.0:
-        return f"it led to a walk that does not advance, with steps of {gait.step.length_m:.3g} m"
+    if gait.lengths_m.min() <= 0.0:
+        return f"it led to a walk that does not advance, with steps of {gait.lengths_m.min():.3g} m"
     return gait
 
 
@@ -124,13 +128,19 @@ def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
     return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), MAX_CREEP_FACTOR**-rigidity)
 
 
-def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State) -> GaitAnswer:
-    def gait_at(rigidity: float, z: Floats, pitch_m: float) -> Cycle | str:
-        return solve_gait_on(OwnPads(partial(with_rigidity, walker), ground, tolerances, pitch_m), z, rigidity)
+def follow_from_rigid(
+    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, start: State, pitches_m: Sequence[float]
+) -> GaitAnswer:
+    count = len(pitches_m)
+
+    def gait_at(rigidity: float, z: Floats, pitches_m: Sequence[float]) -> Cycle | str:
+        return solve_gait_on(
+            OwnPads(partial(with_rigidity, walker), ground, tolerances, *pitches_m), z, count, rigidity
+        )
 
     points = section_points(with_rigidity(walker, 1.0), ground, tolerances, start)
     hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
-    tried = (gait_at(1.0, z, ground.terrain.pitch) for _, z in points)
+    tried = (gait_at(1.0, z, pitches_m) for _, z in points)
     last = next((gait for gait in tried if isinstance(gait, Cycle)), None)
     if last is None:
         return GaitAnswer(
@@ -141,7 +151,7 @@ def follow_from_rigid(walker: ContactWalker, ground: JudgedGround, tolerances: T
     gaits = {0.0: last}
 
     def softer(state: float, expected: Floats) -> Floats | None:
-        near = gait_at(1.0 - state, expected[:-1], expected[-1])
+        near = gait_at(1.0 - state, expected[:-count], expected[-count:].tolist())
         if not isinstance(near, Cycle):
             return None
         gaits[state] = near

@@ -66,6 +66,8 @@ class SectionStep(MappedStep):
     # net slip over a stance: slip of the landing foot before the section, plus slip of the trailing foot after it
     slip_m: float
     rolling_m: float  # rolling distance over a stance, summed in the same way
+    spacing_m: float  # distance from the stance foot, as it stands on the section, to the touch of the other foot
+    moved_m: float  # distance that the landing foot moves from its touch to the next section
     dissipated_J: Floats  # (5,) losses to damping, friction, pad edges, knee strikes and knee stops
     driven: DrivenWork
     work: NDArray[np.int64]  # counts of right-hand-side evaluations, accepted steps, rejected steps and Jacobians
@@ -166,16 +168,29 @@ def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats
     return along
 
 
+def stance_of(swing: int) -> int:
+    """Return the foot that stands in a walk's step of this number; in step 0 leg 1 swings."""
+    return STANCE_FOOT if swing % 2 == 0 else 1 - STANCE_FOOT
+
+
 def step_from_section(
-    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, pitch_m: float, derived: bool = True
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    z: Floats,
+    pitch_m: float,
+    derived: bool = True,
+    stance: int = STANCE_FOOT,
 ) -> SectionStep:
     """Walk from section to section on pads of pitch `pitch_m`; REJECTED if a push-off lasts beyond the section."""
-    stance, laid = STANCE_FOOT, ground
+    laid = ground
     start = state_on_section(walker, z, stance)
     if ground.terrain.has_pads:  # the stance foot stands in the middle of a pad
         foothold = feet_motion(walker.whole, start)[stance].along
-        laid = JudgedGround(checkerboard(pitch_m, (foothold + pitch_m, foothold)), ground.frame)
-    walk_state = walk_state_on_section(walker, laid, start, 2)
+        lanes = (foothold + pitch_m, foothold) if stance == STANCE_FOOT else (foothold, foothold + pitch_m)
+        laid = JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
+    walk_state = walk_state_on_section(walker, laid, start, 2, stance)
+    standing = float(walk_state.foothold[stance])
     observer = new_observer(walker, walk_state, start, directions=z.size if derived else 0)
     if derived:
         observer.tangent.Phi[:, :] = section_tangents(walker, start, stance)
@@ -208,6 +223,8 @@ def step_from_section(
         float(walk_state.touch_time[0]),
         float(walk_state.slip[0] + slipped),
         float(walk_state.rolling[0] + rolled),
+        float(walk_state.touch_along[0]) - standing,
+        along - float(walk_state.foothold[landed]),
         observer.account[LOSS_ENTRIES].copy(),
         driven_work(walker, advance, rose, observer.account),
         stopped.work,
@@ -287,9 +304,11 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     return tuple(to_full(form, y, walker.size).tolist())
 
 
-def walk_state_on_section(walker: ContactWalker, ground: JudgedGround, start: State, steps: int) -> WalkState:
+def walk_state_on_section(
+    walker: ContactWalker, ground: JudgedGround, start: State, steps: int, stance: int = STANCE_FOOT
+) -> WalkState:
     """Return the walk state that belongs to a start on the section, with room for `steps` touchdowns."""
-    stance, swing = STANCE_FOOT, 1 - STANCE_FOOT
+    swing = 1 - stance
     walk_state = new_walk_state(walker, ground, stance, steps, start)
     feet = feet_motion(walker.whole, start)
     walk_state.at_zero[:] = 0
@@ -354,15 +373,15 @@ class ContactMap(StepMap):
     def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units)
 
-    def _walk(self, site: WalkerOnGround, z: Floats, derived: bool) -> SectionStep:
-        pitch_m = site.ground.terrain.pitch
-        return step_from_section(site.walker, site.ground, self.tolerances, z * self._units, pitch_m, derived)
+    def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, swing: int = 0) -> SectionStep:
+        pitch_m, stance = site.ground.terrain.pitch, stance_of(swing)
+        return step_from_section(site.walker, site.ground, self.tolerances, z * self._units, pitch_m, derived, stance)
 
-    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+    def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         site = self._at(p)
         if site is None:
             return failed_step(None, z.size)
-        step = self._walk(site, z, derived)
+        step = self._walk(site, z, derived, swing)
         if step.outcome is not Outcome.WALKED:
             return failed_step(step.outcome, z.size)
         DP = step.DP * self._units / self._units[:, None] if derived else step.DP
@@ -371,8 +390,8 @@ class ContactMap(StepMap):
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         site = valid(self._at(p))
         slip, tripped, start = 0.0, 0.0, z
-        for _ in range(steps):
-            step = self._walk(site, start, False)
+        for swing in range(steps):
+            step = self._walk(site, start, False, swing)
             slip, start = max(slip, abs(step.slip_m)), step.z / self._units
             if self._on_pads and steps == 1:
                 on_pads = on_terrain(site, checkerboard(step.length_m, (0.0, 0.0)))
@@ -411,18 +430,33 @@ class ContactMap(StepMap):
 
 
 class OwnPads(Stepper):
-    """Stepper (SI) of a walker on compliant ground that sets the pitch of the pads to the length of the last step."""
+    """Stepper (SI) of a walker on compliant ground that sets the pitch of the pads to the length of the last step.
+
+    pitches_m  initial pitch for each step of a gait; legs that differ have one for the steps of each leg
+    """
 
     def __init__(
-        self, walker_at: Callable[[float], ContactWalker], ground: JudgedGround, tolerances: Tolerances, pitch_m: float
+        self,
+        walker_at: Callable[[float], ContactWalker],
+        ground: JudgedGround,
+        tolerances: Tolerances,
+        *pitches_m: float,
     ) -> None:
-        self.walker_at, self.ground, self.tolerances, self.pitch_m = walker_at, ground, tolerances, pitch_m
+        self.walker_at, self.ground, self.tolerances, self.pitches_m = walker_at, ground, tolerances, [*pitches_m]
 
-    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        step = step_from_section(self.walker_at(p), self.ground, self.tolerances, z, self.pitch_m, derived)
+    def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
+        place = swing % len(self.pitches_m)
+        walker, pitch_m = self.walker_at(p), self.pitches_m[place]
+        step = step_from_section(walker, self.ground, self.tolerances, z, pitch_m, derived, stance_of(swing))
         if step.outcome is Outcome.WALKED:
-            self.pitch_m = step.length_m
+            self.pitches_m[place] = step.length_m if len(self.pitches_m) == 1 else step.spacing_m
         return step
+
+
+def lengths_between_touches(gait: Cycle) -> Floats:
+    """Return the lengths (n,) of a gait's steps from touch to touch, in m; `lengths_m` are those between sections."""
+    steps = [step for step in gait.steps if isinstance(step, SectionStep)]
+    return np.array([steps[k - 1].moved_m + step.spacing_m for k, step in enumerate(steps)])
 
 
 def contact_step(gait: Cycle) -> SectionStep:

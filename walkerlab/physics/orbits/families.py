@@ -158,7 +158,7 @@ class BranchFollower:
                 continue
             gait = start.evaluated.data
             like = [branch for branch in branches if branch.period == seed.steps]
-            if steps_to_repeat(gait) < seed.steps or any(self.lies_on(branch, gait) for branch in like):
+            if self.steps_to_repeat(gait) < seed.steps or any(self.lies_on(branch, gait) for branch in like):
                 continue
             rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
             branch_ahead = self.trace(rising, seed.steps)
@@ -234,7 +234,7 @@ class BranchFollower:
         points, before, last, end = [self.point(start)], None, start, None
         bifurcations, crossings = list[Bifurcation](), list[Crossing]()
         step = self.control.first
-        if period > 1:
+        if period > self.step_map.stride:
             step = min(step, 0.5 * float(np.linalg.norm(half_cycle_difference(start.evaluated.data))))
         while end is None:
             if len(points) >= self.most:
@@ -247,7 +247,7 @@ class BranchFollower:
             solved, step, end = following
             if passes_through(Segment(equations, last, solved, self.control.tolerance), start, self.control.turn):
                 end, solved = BranchEnd(points[0].value, CLOSED_LOOP), start
-            if period % 2 == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
+            if period % (2 * self.step_map.stride) == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
                 half = period // 2
                 end = BranchEnd(points[-1].value, f"closes on the gait of {half} {steps_word(half)}", closes=True)
                 break
@@ -281,11 +281,17 @@ class BranchFollower:
             moves = (min(abs(m - new) for new in gait.multipliers) for m in critical)
             if any(move >= MAX_MULTIPLIER_CHANGE for move in moves):
                 return False
-            repeats_after = steps_to_repeat(gait)
+            repeats_after = self.steps_to_repeat(gait)
             at_flip = bool(np.abs(gait.multipliers - 1.0).min() < MAX_MULTIPLIER_CHANGE)
             return repeats_after == len(gait.steps) or (2 * repeats_after == len(gait.steps) and at_flip)
 
         return near
+
+    def steps_to_repeat(self, gait: Cycle) -> int:
+        """Return the number of steps after which a gait repeats, a divisor of the number of steps that it has."""
+        stride = self.step_map.stride
+        strides = enumerate(gait.steps[stride - 1 :: stride], 1)
+        return next(n * stride for n, step in strides if np.abs(step.z - gait.z).max() < SAME_STATE)
 
     def next_point(
         self, equations: GaitEquations, last: CurvePoint[Cycle], step: float, before: CurvePoint[Cycle] | None
@@ -341,11 +347,6 @@ def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float
 
 def steps_word(n: int) -> str:
     return "step" if n == 1 else "steps"
-
-
-def steps_to_repeat(gait: Cycle) -> int:
-    """Return the number of steps after which a gait repeats, a divisor of the number of steps that it has."""
-    return next(n for n, step in enumerate(gait.steps, 1) if np.abs(step.z - gait.z).max() < SAME_STATE)
 
 
 def half_cycle_difference(gait: Cycle) -> Floats:

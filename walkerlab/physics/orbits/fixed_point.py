@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.physics.hybrid.recorded_walk import describe_pulls, take_walk
 from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING
@@ -19,21 +20,26 @@ from walkerlab.physics.mechanics.rigid_model import (
     RigidModel,
     feet_on_slope,
     on_slope,
+    pair,
     swing_foot_motion,
+    with_fields,
 )
 from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides, interpolate
 from walkerlab.physics.orbits.newton import Effort, NotConverged
 from walkerlab.physics.orbits.rigid_map import (
     EXACT_STEPS,
+    MAX_START_EVALUATIONS,
+    NEAR_RESIDUAL,
     NEW_GAIT,
+    SMALLEST_MOVE,
     RigidMap,
     RigidStepper,
     state_on_section,
     strike_section,
 )
-from walkerlab.physics.orbits.similarity import Units, unit_walker
+from walkerlab.physics.orbits.similarity import HIPS, Units, unit_walker
 from walkerlab.physics.orbits.small_slope import SmallSlopeSeed, seeds
-from walkerlab.physics.orbits.step_map import Cycle, Stepper, gait_near
+from walkerlab.physics.orbits.step_map import Cycle, Stepper, gait_near, in_order
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
@@ -62,12 +68,16 @@ START_RANGES = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1
 
 @dataclass(frozen=True)
 class RigidGait:
-    """A gait with the quantities of one of its steps, SI units."""
+    """A gait with the quantities of one of its steps, or their means over a stride if the legs differ; SI units."""
 
     state: State  # just after the heel strike
     period: float  # s
     step_length: float  # m
-    multipliers: tuple[complex, ...]  # eigenvalues of the step map's derivative, largest first
+    multipliers: tuple[
+        complex, ...
+    ]  # eigenvalues of the step map's derivative, largest first; empty if the legs differ
+    stride_multipliers: tuple[complex, ...]  # the same of a stride
+    steps: tuple[tuple[float, float], ...]  # period (s) and length (m) of both steps; leg 1 swings in the first
     residual: float  # rad, largest component of P(x) - x, computed in a separate step, with velocities times sqrt(L/g)
     energy: float  # J, mean over the duration of the step, with heights from the stance foot
     energy_drift: float  # J, maximum minus minimum energy
@@ -92,7 +102,17 @@ class RigidGait:
 
     @property
     def spectral_radius(self) -> float:
-        return abs(self.multipliers[0])
+        """Largest factor by which a small disturbance grows in a step."""
+        return abs(self.multipliers[0]) if self.multipliers else math.sqrt(abs(self.stride_multipliers[0]))
+
+    @property
+    def asymmetry(self) -> dict[str, float]:
+        """Differences between the second and the first step over their mean."""
+        (first_period, first_length), (second_period, second_length) = self.steps
+        return {
+            "step_length": (second_length - first_length) / self.step_length,
+            "step_period": (second_period - first_period) / self.period,
+        }
 
     @property
     def stable(self) -> bool:
@@ -112,26 +132,44 @@ class RigidGait:
 def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     """Whether the swing foot comes down exactly at the stance foot, in states (samples, 2 n) with straight legs."""
     # The step map is discontinuous at such a gait: if the foot came down slightly further ahead, it would strike.
+    if not walker.alike:
+        return False
     over, ahead = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE]), swing[:, SWING] - swing[:, STANCE]
     down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
     where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
     return bool(np.any(np.abs(where) < ANGLE_NOISE * abs(ahead[-1])))
 
 
+def straight_only(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
+    return swing[~bent]
+
+
 def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
-    """Walk one step of a gait of the unit walker and measure it in SI; None if the step fails."""
-    start = state_on_section(walker, gait.z)
-    step = take_walk(walker, EXACT_STEPS, start, 1, sampled=True)
-    if step.steps == 0 or step.samples is None:
+    """Walk the steps of a gait of the unit walker and measure them in SI; None if a step fails."""
+    start, count = state_on_section(walker, gait.z), len(gait.steps)
+    step = take_walk(walker, EXACT_STEPS, start, count, sampled=True)
+    if step.steps < count or step.samples is None:
         return None
-    swing = step.samples.state[step.samples.step == 0]
-    apart = swing[:, SWING] - swing[:, STANCE]
+    models = (walker, walker.exchanged)[:count]
+    swings = [step.samples.state[step.samples.step == k] for k in range(count)]
+    bent = [step.samples.bent[step.samples.step == k] for k in range(count)]
+    apart = [swing[:, SWING] - swing[:, STANCE] for swing in swings]
+    rates = [
+        swing_foot_motion(model, y[0], y[0, y.shape[1] // 2 :])[2] for model, y in zip(models, swings, strict=True)
+    ]
     rate, n = 1.0 / units.time, len(start) // 2
+    multipliers = gait.multipliers
+    sizes = [
+        (float(period) * units.time, float(length) * units.length)
+        for period, length in zip(step.periods_s, step.lengths_m, strict=True)
+    ]
     return RigidGait(
         state=(*start[:n], *(omega * rate for omega in start[n:])),
-        period=float(step.periods_s[0]) * units.time,
-        step_length=float(step.lengths_m[0]) * units.length,
-        multipliers=tuple(gait.multipliers.tolist()),
+        period=math.fsum(period for period, _ in sizes) / count,
+        step_length=math.fsum(length for _, length in sizes) / count,
+        multipliers=tuple(multipliers.tolist()) if count == 1 else (),
+        stride_multipliers=tuple(in_order(multipliers ** (STRIDE // count)).tolist()),
+        steps=tuple(sizes * (STRIDE // count)),
         residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
         energy=step.mean_energy * units.energy,
         energy_drift=step.energy_drift * units.energy,
@@ -140,12 +178,12 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
         max_scuff_depth=step.max_scuff_depth * units.length,
         min_normal_impulse=(step.min_normal_impulse or 0.0) * units.force * units.time,
         max_impulse_ratio=step.max_impulse_ratio or None,
-        trailing_foot_rises=bool(swing_foot_motion(walker, start, start[len(start) // 2 :])[2] >= 0.0),
-        work={name: work * units.energy for name, work in step.driven.per_step(1).items()},
-        cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m[0])),
-        froude=float(step.lengths_m[0] / step.periods_s[0]),
-        swings=int(np.count_nonzero(np.diff(np.signbit(apart)))),
-        feet_meet=feet_meet(walker, swing[~step.samples.bent[step.samples.step == 0]]),
+        trailing_foot_rises=bool(min(rates) >= 0.0),
+        work={name: work * units.energy for name, work in step.driven.per_step(count).items()},
+        cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m.sum())),
+        froude=float(step.lengths_m.sum() / step.periods_s.sum()),
+        swings=max(int(np.count_nonzero(np.diff(np.signbit(each)))) for each in apart),
+        feet_meet=any(feet_meet(*each) for each in zip(models, map(straight_only, swings, bent), strict=True)),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
         z=tuple(gait.z.tolist()),
     )
@@ -158,6 +196,7 @@ class SearchSettings:
 
 
 SEED_SOURCE = "followed from a vanishing slope"
+MEAN_LEGS_SOURCE = "followed from the gaits of the walker with two mean legs"
 PASSIVE_SLOPES = (0.02, 0.05)  # rad, slopes of passive gaits that are followed to a driven gait
 DRIVE_SOURCE = f"followed from passive gaits as a last resort (slopes of {', '.join(map(str, PASSIVE_SLOPES))} rad)"
 
@@ -190,6 +229,8 @@ def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = Sea
     search = Search(walker)
     generator = np.random.default_rng(seed)
     search.follow_seeds()
+    if walker.legs_differ:
+        search.follow_difference(seed, settings)
     search.draw(generator, settings.random_starts)
     if not search.records and not search.walker.passive:
         search.follow_drive(generator, settings.random_starts)
@@ -207,6 +248,11 @@ NO_SEED_TEXT = {
     False: "without its drive this walker has no gait to follow to this slope",
 }
 MAX_DRIVE_POINTS = 60
+STRIDE = 2  # steps
+# fields of a model that depend on its legs
+OF_LEGS = ("A", "B", "arm_x", "arm_y", "foot_x", "foot_y", "laws", "push_off", "radius", "swing_radius", "lean", *HIPS)
+DIFFERENCE_STRIDES = Strides(0.25, 1e-3, 3)
+MAX_DIFFERENCE_JUMP = 0.05  # distance from the prediction; beyond it the gait belongs to another branch
 
 
 class SlopeBranch:
@@ -276,6 +322,20 @@ def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
     return RigidMap(partial(on_slope, walker), 1.0, walker, tolerances)
 
 
+def with_mean_legs(walker: RigidModel, share: float) -> RigidModel:
+    """Return the walker with its legs' differences from their mean times `share`; at 0 it has equal legs."""
+    # The constants of both models enter the equations linearly, so all walkers between them are possible.
+    models = walker, walker.exchanged
+
+    def between(k: int) -> RigidModel:
+        own, other = models[k], models[1 - k]
+        parts = {name: 0.5 * ((1.0 + share) * own[name] + (1.0 - share) * other[name]) for name in OF_LEGS}
+        alike = walker.alike or share == 0.0
+        return with_fields(own, {**parts, "alike": alike})
+
+    return between(0) if share == 0.0 else pair(between(0), between(1))
+
+
 def with_partial_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
     """Return the walker with a fraction `share` of its drive, on a slope (rad) between `slope` and the walker's."""
     parts = {name: share * walker[name] for name in ("laws", "push_off")}
@@ -296,11 +356,13 @@ class Search:
         self.lost: list[str] = []
         self.drawn = 0
         self.followed = SEED_SOURCE if walker.passive else DRIVE_SOURCE
+        if walker.legs_differ:
+            self.followed = MEAN_LEGS_SOURCE
         self.looking = RigidStepper(self.walker, SEARCH_TOLERANCES)
         self.step_map = over_slope(self.walker, EXACT_STEPS)
 
     def follow_seeds(self) -> None:
-        if self.walker.slope <= 0.0 or not self.walker.passive:
+        if self.walker.slope <= 0.0 or not self.walker.passive or self.walker.legs_differ:
             return
         for branch in slope_branches(on_slope(self.walker, 0.0)):
             (slope, z), name = branch.follow(self.walker.slope), branch.seed.name
@@ -308,6 +370,29 @@ class Search:
                 self.lost.append(f"the gait from the {name} is lost at a slope of {slope:.3g} rad")
             elif not self.keep(z, name):
                 self.lost.append(f"the gait from the {name} cannot be solved to rounding")
+
+    def follow_difference(self, seed: int, settings: SearchSettings) -> None:
+        """Follow the gaits of the walker with two mean legs as the difference between the legs grows."""
+        goal = self.walker
+        if goal.shank != goal.exchanged.shank:
+            self.lost.append("one knee alone leaves no mean of the two legs to begin with")
+            return
+        even = with_mean_legs(goal, 0.0)
+        family = RigidMap(partial(with_mean_legs, goal), 1.0, goal, SEARCH_TOLERANCES)
+
+        def gait_at(share: float, expected: Floats) -> Floats | None:
+            effort = Effort(FOLLOWING_TOLERANCE, FOLLOWING_EVALUATIONS, SHORTEST_MOVE)
+            gait = gait_near(family, expected, share, effort, STRIDE)
+            if isinstance(gait, NotConverged) or np.abs(gait.z - expected).max() > MAX_DIFFERENCE_JUMP:
+                return None
+            return gait.z
+
+        for k, gait in enumerate(find_gaits(even, seed, settings).gaits):
+            first = FollowerState(0.0, DIFFERENCE_STRIDES.widest, ((0.0, np.array(gait.z)),))
+            state = Follower(gait_at, first, DIFFERENCE_STRIDES).to(1.0)
+            name = f"gait {k + 1} of the walker with two mean legs"
+            if state.value < 1.0 or not self.keep(state.points[-1][1], name):
+                self.lost.append(f"the {name} is lost at {state.value:.0%} of the difference between the legs")
 
     def follow_drive(self, generator: np.random.Generator, starts: int) -> None:
         # imported late, because it is needed only if other searches fail
@@ -338,6 +423,9 @@ class Search:
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
         starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
+        if self.walker.legs_differ:
+            self.draw_strides(starts)
+            return
         gaits = [(record.cycle.z, record.cycle.DP) for record in self.records]
         results = self.looking.solve_starts(strike_section(self.walker), gaits, starts)
         for z, gait in zip(starts, results, strict=True):
@@ -345,6 +433,15 @@ class Search:
                 self.records[gait].by.append(RANDOM_START)
             elif gait == NEW_GAIT and not self.stands(z):
                 self.keep(z, RANDOM_START)
+
+    def draw_strides(self, starts: Floats) -> None:
+        """Solve the map of a stride from starts (starts, d)."""
+        quick = over_slope(self.walker, SEARCH_TOLERANCES)
+        effort = Effort(NEAR_RESIDUAL, MAX_START_EVALUATIONS, SMALLEST_MOVE)
+        for start in starts:
+            gait = gait_near(quick, start, float(self.walker.slope), effort, STRIDE)
+            if not isinstance(gait, NotConverged) and not self.stands(gait.z):
+                self.keep(gait.z, RANDOM_START)
 
     def stands(self, z: Floats) -> bool:
         return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
@@ -354,7 +451,7 @@ class Search:
         if self.record_hit(z, by):
             return True
         effort = Effort(SOLVED_RESIDUAL, MAX_GAIT_EVALUATIONS, SHORTEST_MOVE, rounding=MAX_RESIDUAL / SOLVED_RESIDUAL)
-        cycle = gait_near(self.step_map, z, float(self.walker.slope), effort)
+        cycle = gait_near(self.step_map, z, float(self.walker.slope), effort, STRIDE if self.walker.legs_differ else 1)
         if isinstance(cycle, NotConverged) or (self.walker.slope == 0.0 and self.stands(cycle.z)):
             return False
         if self.record_hit(cycle.z, by):

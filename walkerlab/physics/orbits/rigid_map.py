@@ -29,7 +29,9 @@ from walkerlab.physics.mechanics.rigid_model import (
     SWING,
     RigidModel,
     feet_on_slope,
+    hip_height,
     mass_matrix,
+    models_in_turn,
     momentum,
     step_length_changes,
     step_lengths,
@@ -78,10 +80,12 @@ NEW_GAIT, NO_GAIT = -1, -2
 class StrikeSection(NamedTuple):
     """States of a walker just after heel strike, y = start + z basis, with scaled-down variational columns."""
 
-    walker: Any  # (), record for compiled code
+    walker: Any  # records for compiled code, from `models_in_turn`
     start: Any  # (2 n (1 + d),) the state at z = 0, with its variational columns
     basis: Any  # (d, 2 n)
     places: Any  # (d (1 + d),) indices of z in the state, then in each column
+    # model whose legs have different lengths or soles, so that the angles on the section are no linear function of z
+    curved: RigidModel | None
 
 
 @lru_cache(CACHE_SIZE)
@@ -94,9 +98,24 @@ def strike_section(walker: RigidModel) -> StrikeSection:
     basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
     basis[1:, n:] = at_strike[:, places[1:] - n].T
     columns = np.add.outer(places, 2 * n * np.arange(1, d + 1))
-    return StrikeSection(
-        np.asarray(walker), np.append(origin, TANGENT_SCALE * basis), basis, np.append(places, columns)
-    )
+    start, curved = np.append(origin, TANGENT_SCALE * basis), None if walker.alike else walker
+    return StrikeSection(models_in_turn(walker), start, basis, np.append(places, columns), curved)
+
+
+def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] | None:
+    """Return the bodies' angles (n,) with both feet on the slope, and their derivatives with respect to `stance` (rad).
+
+    The swing leg is behind. Returns None if it is too short or too long to reach the slope.
+    """
+    psi, straight = stance + walker.slope, walker.E[STRAIGHT]
+    raised = hip_height(walker, np.full(2, stance)) - walker.swing_radius
+    length, ahead = (f(walker.swing_hip_x, walker.swing_hip_y) for f in (math.hypot, math.atan2))
+    if abs(raised) >= length:
+        return None
+    behind = math.acos(raised / length)
+    rate = (math.cos(psi) * walker.hip_x - math.sin(psi) * walker.hip_y) / (length * math.sin(behind))
+    swing = ahead - behind - walker.slope
+    return stance * straight[:, STANCE] + swing * straight[:, SWING], straight[:, STANCE] + rate * straight[:, SWING]
 
 
 def state_on_section(walker: RigidModel, z: Any) -> State:
@@ -107,7 +126,13 @@ def state_on_section(walker: RigidModel, z: Any) -> State:
 def states_on_section(walker: RigidModel, z: Any) -> Floats:
     """Return the states (n, 2 n) at section coordinates z (n, d); also takes a single z (d,)."""
     section = strike_section(walker)
-    return np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
+    states = np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
+    if section.curved is not None:
+        for state, stance in zip(np.atleast_2d(states), np.atleast_2d(z)[:, 0], strict=True):
+            angles = angles_on_slope(walker, float(stance))
+            if angles is not None:
+                state[: len(state) // 2] = angles[0]
+    return states
 
 
 def coordinates_of(walker: RigidModel, y: Any) -> Floats:
@@ -184,6 +209,13 @@ class RigidStepper(local):
         y[:size] = y[:size] + z @ section.basis if start is None else start
         rises, nearest = floor or (None, 0.0)
         strikes: HeelStrikes = new_heel_strikes(steps, y.size, True, rises, nearest, columns)
+        if section.curved is not None and start is None:
+            angles = angles_on_slope(section.curved, float(z[0]))
+            if angles is None:
+                return Steps(Outcome.NO_HEEL_STRIKE, np.zeros(0), np.zeros((0, d)), np.zeros((0, columns, d)), strikes)
+            y[: size // 2] = angles[0]
+            if derived:
+                y[size : size + size // 2] = TANGENT_SCALE * angles[1]
         outcome, completed = self._walk(section, method, observer or self.memory.observer, y, strikes)
         ahead = strikes.after[:completed].take(section.places[: d * (1 + columns)], axis=1)
         DP = ahead[:, d:].reshape(completed, columns, d) / TANGENT_SCALE
@@ -246,18 +278,18 @@ class KnownGaits(NamedTuple):
 @kernel
 def solve_from_starts(section: StrikeSection, memory: Memory, gaits: KnownGaits, starts: Any, results: Any) -> None:
     for k in range(len(starts)):
-        results[k] = solve_from(section.walker[()], section, memory, gaits, starts[k])
+        results[k] = solve_from(section, memory, gaits, starts[k])
 
 
 @kernel_part
-def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
+def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any) -> int:
     """Run Newton's method from z (d,), overwritten with the last point tried.
 
     A correction is halved until it reduces the residual. A start without a heel strike, or at rest, is given up.
     The search stops if a known gait is close and one correction with its derivative would almost reach it.
     """
     method, y, places = memory.varied, memory.y, section.places
-    (d, size), like = section.basis.shape, model.section
+    (d, size), like = section.basis.shape, section.walker[0].section
     best, move, system = vector(like), vector(like), matrix(like)
     least, share = NO_RESIDUAL, 1.0
     clear_counts(method)
@@ -268,7 +300,7 @@ def solve_from(model: RigidModel, section: StrikeSection, memory: Memory, gaits:
             for j in range(d):
                 y[i] += z[j] * section.basis[j, i]
         method.clock[H_NEXT] = 0.0
-        status, t = take_step(model, method, memory.finder, memory.observer, 0.0, y, 0, memory.strikes)
+        status, t = take_step(section.walker, method, memory.finder, memory.observer, 0.0, y, 0, memory.strikes)
         residual = NO_RESIDUAL
         if status == STEP_WALKED and t >= SHORTEST_STEP:
             residual = 0.0
@@ -328,7 +360,9 @@ class RigidMap(StepMap):
             unit, units = unit_walker(walker)
             section, n = strike_section(unit), len(unit.arm_x)
             feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
-            return SimilarWalker(unit, units, section, feet.tolist(), float(unit.radius), float(-section.start[SWING]))
+            sections = (section, strike_section(unit.exchanged)) if unit.legs_differ else (section,)
+            rolling = float(unit.radius), float(-section.start[SWING])
+            return SimilarWalker(unit, units, section, sections, feet.tolist(), *rolling)
 
         self._unit_at = unit_at
         self.scale = scale
@@ -339,17 +373,22 @@ class RigidMap(StepMap):
     def _quick(self) -> RigidStepper:
         return RigidStepper(self._like, LONG_WALKS)
 
-    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
+    def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         unit = self._unit_at(p)
         if unit is None:
             return failed_step(None, z.size)
-        step = self._exact.walk(unit.section, z, derived=derived)
+        section = unit.sections[swing % len(unit.sections)]
+        step = self._exact.walk(section, z, derived=derived)
         if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
             standing = step.outcome is Outcome.WALKED
             return failed_step(Outcome.NO_HEEL_STRIKE if standing else step.outcome, z.size)
         ahead, period_s, DP = step.z[0], float(step.time[0]) * unit.units.time, step.DP[0]
         angle = float(ahead[0])
-        length_m = unit.step_length(float(z[0]), angle) * unit.units.length
+        if len(unit.sections) > 1:
+            length = length_of_step(section.walker[0], float(z[0]), step.strikes.before[0])
+        else:
+            length = unit.step_length(float(z[0]), angle)
+        length_m = length * unit.units.length
         return MappedStep(Outcome.WALKED, ahead, DP, period_s, length_m, angle, period_s)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
@@ -477,6 +516,15 @@ class RigidMap(StepMap):
         return Iterates(outcome, all_points, np.concatenate(growth), periods, all_points[:, 0])
 
 
+def length_of_step(model: Any, before: float, end: Floats) -> float:
+    """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
+    ahead = model["radius"] * (before - end[STANCE])
+    for angle, x, y in zip(end.tolist(), model["foot_x"].tolist(), model["foot_y"].tolist(), strict=False):
+        psi = angle + model["slope"]
+        ahead += math.cos(psi) * x - math.sin(psi) * y
+    return float(ahead)
+
+
 def by_leg(angles: Floats, steps: Integers) -> Floats:
     """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
     swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
@@ -499,6 +547,7 @@ class SimilarWalker(NamedTuple):
     walker: RigidModel
     units: Units
     section: StrikeSection
+    sections: tuple[StrikeSection, ...]  # one for each leg that swings next; a single one for equal legs
     # by body: angle from the slope's normal at z = 0, derivative of that angle with respect to theta_2, and foot levers
     feet: list[list[float]]
     radius: float

@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.physics.mechanics.hinges import SpringDamper
-from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope
+from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope, pair, with_fields
+
+HIPS = ("hip_x", "hip_y", "swing_hip_x", "swing_hip_y")
 
 
 class Units(NamedTuple):
@@ -49,8 +51,12 @@ def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
         **dict.fromkeys(("arm_x", "arm_y"), moment),
         "laws": np.array(SpringDamper(1.0 / units.energy, 1.0 / (units.energy * units.time), 1.0 / units.energy)),
         "push_off": 1.0 / units.impulse,
-        **dict.fromkeys(("radius", "foot_x", "foot_y", "hip_x", "hip_y"), 1.0 / length),
+        **dict.fromkeys(("radius", "swing_radius", "foot_x", "foot_y", *HIPS), 1.0 / length),
     }
-    scaled = {name: scale * walker[name] for name, scale in scales.items()}
-    unit = walker.changed(mass=1.0, leg_length=1.0, gravity=1.0, **scaled)
-    return on_slope(unit, walker.slope), units
+
+    def similar(model: RigidModel) -> RigidModel:
+        scaled = {name: scale * model[name] for name, scale in scales.items()}
+        return on_slope(with_fields(model, {"mass": 1.0, "leg_length": 1.0, "gravity": 1.0, **scaled}), model.slope)
+
+    unit = similar(walker)
+    return unit if walker.paired_with is None else pair(unit, similar(walker.paired_with)), units

@@ -139,7 +139,7 @@ def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
 @np.errstate(divide="raise", invalid="raise")
 def apply_strike(walker: RigidModel, state: State) -> Floats:
     after = np.zeros(len(state))
-    strike(walker, AT_STRIKE, np.array(state), after)
+    strike(walker, walker, AT_STRIKE, np.array(state), after)
     return after
 
 

@@ -86,8 +86,11 @@ class VariedWalk:
 
 
 class Stepper(Protocol):
-    def step(self, z: Floats, p: float, derived: bool = True) -> MappedStep:
-        """Take a step from z (d,) at parameter p, with its derivative; outcome None if p gives no valid walker."""
+    def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
+        """Take a step from z (d,) at parameter p, with its derivative; outcome None if p gives no valid walker.
+
+        swing  number of steps taken before, which matters if the legs differ: leg 1 swings in even steps
+        """
 
 
 class StepMap(Stepper, Protocol):
@@ -98,6 +101,7 @@ class StepMap(Stepper, Protocol):
     scale: float  # magnitude of significant changes of the parameter
     tolerances: Tolerances  # solver settings of a step
     probe: float  # size of a disturbance with a linear response, in units of the walker
+    stride: int = 1  # number of steps after which the map repeats: 2 for legs that differ
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
@@ -154,8 +158,8 @@ class StepMap(Stepper, Protocol):
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """Walk up to `steps` steps, transporting a tangent (d,) if there is one."""
         completed, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
-        for _ in range(steps):
-            step = self.step(z, p, tangent is not None)
+        for swing in range(steps):
+            step = self.step(z, p, tangent is not None, swing)
             outcome = Outcome.REJECTED if step.outcome is None else step.outcome
             if outcome is not Outcome.WALKED:
                 break
@@ -175,12 +179,12 @@ class StepMap(Stepper, Protocol):
         )
 
 
-def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float) -> tuple[Outcome | None, Floats]:
+def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: int = 0) -> tuple[Outcome | None, Floats]:
     """Return the outcome of steps from z (d,) at values near p, and the derivative (d,) of a step with respect to p."""
     # This second-order difference only steers predictors and Newton's method and enters no result.
     h = PARAMETER_STEP * (min(step_map.scale, abs(p)) if p != 0.0 else step_map.scale)
     for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
-        steps = [step_map.step(z, p + offset * h, derived=False) for offset, _ in formula]
+        steps = [step_map.step(z, p + offset * h, False, swing) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
@@ -272,8 +276,8 @@ class Cycle:
 def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
     steps: list[MappedStep] = []
     position, DP = z, identity(z.size)
-    for _ in range(n):
-        step = step_map.step(position, p)
+    for swing in range(n):
+        step = step_map.step(position, p, swing=swing)
         if step.outcome is not Outcome.WALKED:
             return Cycle(step.outcome, p, z, tuple(steps), DP)
         position, DP = step.z, step.DP @ DP if steps else step.DP
@@ -284,8 +288,8 @@ def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
 def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
     """Return the cycle with its derivative `Dp`, or with the outcome if a step fails at a nearby parameter value."""
     position, Dp = cycle.z, 0.0 * cycle.z
-    for step in cycle.steps:
-        outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value)
+    for swing, step in enumerate(cycle.steps):
+        outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value, swing)
         if outcome is not Outcome.WALKED:
             return replace(cycle, outcome=outcome, Dp=Dp)
         position, Dp = step.z, step.DP @ Dp + by_parameter
@@ -300,6 +304,10 @@ def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
     """Return the eigenvalues, largest first; of a complex pair, the one with positive imaginary part first."""
-    values = np.linalg.eigvals(DP).astype(np.complex128)
+    return in_order(np.linalg.eigvals(DP).astype(np.complex128))
+
+
+def in_order(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Sort multipliers as `multipliers_of` returns them."""
     order: Sequence[int] = sorted(range(values.size), key=lambda i: (-abs(values[i]), -values[i].imag))
     return np.asarray(values[list(order)])

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Inputs = Callable[["Config"], tuple[str, ...]]
 WALKED = ("fixedpoint", "simulate", "contact-sim")
 DRAWINGS = ("plot", "report")
+FOR_LEGS_THAT_DIFFER = (*WALKED, "compare", "continuation", *DRAWINGS)
+"""Stages that know legs that differ; every other stage refuses them."""
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[
     "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
@@ -146,7 +148,15 @@ class Stage:
     def why_unsuited(self, config: Config) -> str | None:
         """Return the reason why the stage cannot run under a config; None if it can."""
         missing = (block for block in self.requires if getattr(config, block) is None)
-        return next(map(without_block, missing), None)
+        return next(map(without_block, missing), None) or self.why_no_such_legs(config)
+
+    def why_no_such_legs(self, config: Config) -> str | None:
+        """Return the reason why the stage cannot answer for a config's legs; None if it can."""
+        if self.name in FOR_LEGS_THAT_DIFFER or (config.walker.type != "parts" and config.walker.leg_2 is None):
+            return None
+        from walkerlab.scene.rigid import have_different_legs  # imported here: equal legs need no mechanics
+
+        return "the legs differ" if have_different_legs(config) else None
 
     def refuse_unsuited(self, target: str, config: Config) -> None:
         """Raise ConfigError if this stage, which `target` needs, cannot run under a config."""
@@ -154,6 +164,12 @@ class Stage:
             raise ConfigError(
                 f"{target} needs a recorded walk, and {without_block('recording')}.",
                 "Name its file: walkerlab compare --with FILE.",
+            )
+        if self.why_no_such_legs(config) is not None:
+            known = ", ".join(FOR_LEGS_THAT_DIFFER)
+            raise ConfigError(
+                f"{target} needs two equal legs, but those of this walker differ.",
+                f"Leave out walker.leg_2, or ask one of: {known}.",
             )
         # Imported here: the command line's help needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add

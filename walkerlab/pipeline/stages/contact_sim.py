@@ -9,7 +9,7 @@ import numpy as np
 from walkerlab.config.reads import ContactSimConfig
 from walkerlab.physics.energy_channels import SAMPLED
 from walkerlab.physics.ground.compliant import hinge_point
-from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sample_energies, sample_feet
 from walkerlab.physics.mechanics.walkers import TORSO
@@ -39,6 +39,7 @@ from walkerlab.scene.contact import (
 )
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.omissions import contact_walk_omissions
+from walkerlab.scene.rigid import have_different_legs
 
 RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
 SCUFFED = (
@@ -53,7 +54,9 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
-    scene = scene_on_pads(config, rigid_step, rigid_state)
+    limps = "fixedpoint" in inputs and have_different_legs(config)
+    asymmetry = inputs["fixedpoint"].summary["asymmetry"]["step_length"] if limps else 0.0
+    scene = scene_on_pads(config, rigid_step, rigid_state, asymmetry=asymmetry)
     start, steps = start_state(scene, rigid_state), 2 * config.strides
     tolerances = tolerances_of(config, steps)
     interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
@@ -115,20 +118,22 @@ def groups(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResul
     if walk.steps:
         stored["steps"] = Group(steps_of(walk, slip_m=walk.slip_m, rolling_m=walk.rolling_m))
     if scene.ground.terrain.has_pads:
-        stored["terrain"] = pads_group(scene.ground.terrain.pitch, walk.end_state[0])
+        stored["terrain"] = pads_group(scene.ground.terrain, walk.end_state[0])
     if walk.samples is not None:
         stored["trajectory"] = trajectory_group(config, scene, walk, walk.samples)
     return stored
 
 
-def pads_group(pitch: float, end: float) -> Group:
+def pads_group(terrain: Terrain, end: float) -> Group:
     """Build the group of pads, from behind the start of the walk to beyond its end."""
+    pitch = terrain.pitch
     numbers = np.arange(-2, int(np.ceil(end / pitch)) + 3)
+    centres = numbers * pitch + np.where(numbers % 2, terrain.lanes[0] + pitch, 0.0)
     return Group(
         {
             **numbered(numbers.size, "pad", "pad number"),
-            "left_m": Variable(numbers * pitch - 0.5 * pitch, ("pad",), "m", "start of the pad along the slope"),
-            "right_m": Variable(numbers * pitch + 0.5 * pitch, ("pad",), "m", "end of the pad along the slope"),
+            "left_m": Variable(centres - 0.5 * pitch, ("pad",), "m", "start of the pad along the slope"),
+            "right_m": Variable(centres + 0.5 * pitch, ("pad",), "m", "end of the pad along the slope"),
             "leg": Variable(2 - numbers % 2, ("pad",), "1", "leg whose lane the pad lies in"),
         }
     )

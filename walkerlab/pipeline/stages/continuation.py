@@ -27,7 +27,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.family_groups import groups
 from walkerlab.pipeline.stages.numerical_error import SAMPLE, USUAL, evenly_spread, tightened
 from walkerlab.pipeline.store.content import Content
-from walkerlab.scene.families import contact_map, model_differs, rigid_map, unused_key_error
+from walkerlab.scene.families import contact_map, model_differs, rigid_map, steps_of_stride, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
@@ -53,6 +53,10 @@ class FamilyQuestion:
         own = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
         return [*([own] if own in self.span else []), *(float(value) for value in spread)]
+
+    @property
+    def stride(self) -> int:
+        return steps_of_stride(self.config, self.parameter)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -132,6 +136,12 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     if question.models != (RIGID,) and config.contact is None:
         raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
     question.refuse_ends("continuation")
+    if second is not None and question.stride > 1:
+        raise ConfigError(
+            "continuation.second: curves over a second key need two equal legs, but those of this walker differ.",
+            "Leave out the second key.",
+            ("continuation", "second"),
+        )
     if second is not None:
         second.refuse_ends("continuation", "second")
         own, span, name = second.parameter.value_in(config), second.span, second.parameter.key
@@ -170,7 +180,8 @@ def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
     for value in question.start_values():
         walker = walker_at(value)
         if walker is not None:
-            seeds += [Seed(np.array(gait.z), value) for gait in find_gaits(walker, question.config.seed).gaits]
+            gaits = find_gaits(walker, question.config.seed).gaits
+            seeds += [Seed(np.array(gait.z), value, question.stride) for gait in gaits]
     return seeds, partial(rigid_map, parameter=question.parameter, scale=question.span.size)
 
 
@@ -190,10 +201,9 @@ def contact_seeds(question: FamilyQuestion, progress: Progress) -> Begun | None:
         if answer.gait is None:
             progress.note(f"contact model at {value:g} {question.parameter.unit}: {answer.reason}")
             continue
-        map_of = partial(
-            contact_map, parameter=question.parameter, scale=question.span.size, step_length_m=answer.gait.step.length_m
-        )
-        return [Seed(map_of(question.config).scale_section(answer.gait.z), value)], map_of
+        length_m = float(answer.gait.lengths_m.mean())
+        map_of = partial(contact_map, parameter=question.parameter, scale=question.span.size, step_length_m=length_m)
+        return [Seed(map_of(question.config).scale_section(answer.gait.z), value, question.stride)], map_of
     return None
 
 
@@ -429,6 +439,8 @@ def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> li
         elif model == CONTACT and question.config.continuation.periods > THOROUGHNESS[CONTACT].periods:
             what = f"the contact model's gaits of more than {THOROUGHNESS[CONTACT].periods} steps"
             entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
+    if question.stride > 1:
+        entries.append(("attractors, and gaits of other numbers of steps", "the legs differ"))
     entries += [
         (f"the {family.model} model's plane of both keys", "the second key does not affect this model")
         for family in families

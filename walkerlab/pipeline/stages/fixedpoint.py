@@ -1,6 +1,6 @@
 """Periodic gaits of the rigid model, with the corrected equations and with those printed in the paper."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -120,22 +120,32 @@ def gait_summary(gait: RigidGait) -> dict[str, Any]:
     """Summarise one gait in SI units."""
     return {
         "state": list(gait.state),
-        "multipliers": [[value.real, value.imag] for value in gait.multipliers],
+        **({"multipliers": pairs_of(gait.multipliers)} if gait.multipliers else {}),
+        "stride_multipliers": pairs_of(gait.stride_multipliers),
+        "gait_steps": [{"period_s": period, "length_m": length} for period, length in gait.steps],
+        "asymmetry": gait.asymmetry,
         **values_by_column(gait, numbers_of(gait)),
+        "step_period_s": gait.period,
         "work_per_step_J": gait.work,
         "found_by": list(gait.found_by),
     }
 
 
+def pairs_of(multipliers: Sequence[complex]) -> list[list[float]]:
+    return [[value.real, value.imag] for value in multipliers]
+
+
 def gaits_group(search: GaitSearch, config: RigidConfig) -> Group:
     """Build the group of all gaits, one row each."""
     gaits = search.gaits
-    multipliers = [gait.multipliers for gait in gaits]
+    differ = not gaits[0].multipliers
+    multipliers = [gait.stride_multipliers if differ else gait.multipliers for gait in gaits]
+    text = "multiplier of a stride" if differ else "multiplier"
     found_by = np.array(["; ".join(gait.found_by) for gait in gaits])
     objections = np.array(["; ".join(gait.objections) for gait in gaits])
     variables = {
         **rows_group(gaits, {"state": STATE, **numbers_of(gaits[0])}, GAIT, "gait, shortest period first").variables,
-        **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), "multiplier"),
+        **real_and_imaginary("multiplier", multipliers, (GAIT, "multiplier"), text),
         "coordinate": Variable(np.array(state_names(config)), ("coordinate",), "", "coordinate of the state"),
         "random_hits": Variable(np.array(search.random_hits), (GAIT,), "1", "random starts that found this gait"),
         "found_by": Variable(found_by, (GAIT,), "", "searches that found this gait"),

@@ -269,7 +269,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
         bodies[:, :2] = reorder_by_leg(angle, stance)
         straight = np.array([apply_couplings(walker, STRAIGHT, row) for row in bodies])
         variables = {**over_time(time=time, step=step, stance_leg=stance + 1, angle=angle), **legs()}
-        variables |= place_variables(places(walker, None, footholds, straight, step), stance)
+        variables |= place_variables(places(walker, (), footholds, straight, step), stance)
         groups[f"{name}_motion"] = Group(variables, about)
     return groups
 

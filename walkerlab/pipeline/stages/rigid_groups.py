@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
-from walkerlab.physics.mechanics.rigid_model import STANCE, energy_at_touch
+from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, by_turns, energy_at_touch
 from walkerlab.pipeline.stages.walk import COORDINATE, legs, over_time, steps_of, turning
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.rigid import RigidScene
@@ -17,13 +17,19 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
     stored = {}
     if walk.steps:
         set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
-        rolling = scene.walker.radius * (set_down - walk.before[:, STANCE])
+        turned = set_down - walk.before[:, STANCE]
+        rolling = by_turns(scene.walker, np.arange(walk.steps), rolled, turned)
         columns = steps_of(walk, rolling_m=rolling, state_before=walk.before, state_after=walk.after)
         names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
         stored["steps"] = Group({**columns, COORDINATE: names})
     if walk.samples is not None and walk.samples.time_s.size:
         stored["trajectory"] = trajectory_group(scene, walk, walk.samples)
     return stored
+
+
+def rolled(walker: RigidModel, turned: Any) -> Any:
+    """Return distances (m) rolled by the stance foot as its leg turns back by angles (rad)."""
+    return walker.radius * turned
 
 
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
@@ -34,17 +40,17 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
         variables |= leg_variables(samples)
         variables |= body_variables(scene, samples, stance)
         n = len(scene.names) // 2
-        positions = places(scene.walker, scene.knee_m, footholds_of(walk), samples.state[:, :n], samples.step)
+        positions = places(scene.walker, scene.knees_m, footholds_of(walk), samples.state[:, :n], samples.step)
         variables |= place_variables(positions, stance)
     if "energies" in scene.outputs:
-        kinetic, potential = energies(scene.walker, samples.state).T
+        kinetic, potential = by_turns(scene.walker, samples.step, energies, samples.state).T
         touched = np.append(walk.start[STANCE], walk.after[:, STANCE])
-        potential -= energy_at_touch(scene.walker, touched)[samples.step]
+        potential -= by_turns(scene.walker, np.arange(touched.size), energy_at_touch, touched)[samples.step]
         variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
     if "forces" in scene.outputs:
         friction, normal = (
             reorder_by_leg(np.column_stack((np.zeros_like(force), force)), stance)
-            for force in reactions(scene.walker, samples.state, samples.bent).T
+            for force in by_turns(scene.walker, samples.step, reactions, samples.state, samples.bent).T
         )
         variables |= over_time(normal_force_N=normal, friction_force_N=friction)
     return Group(variables)

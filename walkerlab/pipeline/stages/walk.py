@@ -41,6 +41,8 @@ REPEATED, SETTLED = 1e-5, 1e-2
 """Largest difference between steps that repeat, relative to the first step, and relative to the spread of the steps."""
 ON_GAIT, OFF_GAIT = 1e-6, 1e-2
 """Relative differences from the first step, in period or length, of steps on the same gait and of steps off it."""
+STRIDE: Final = 2
+"""Steps of a stride."""
 STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
 OF_STEPS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
@@ -275,6 +277,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "step_lengths_m": walk.lengths_m.tolist(),
         "touch_times_s": walk.touch_time_s.tolist(),
         **knee_strikes,
+        **last_stride(walk),
         **settling(walk),
         **driven_by(walk),
         "end_time_s": walk.end_time_s,
@@ -282,6 +285,34 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "accepted_steps": walk.work.accepted,
         "rejected_steps": walk.work.rejected,
     }
+
+
+def last_stride(walk: WalkRecord) -> dict[str, Any]:
+    """Return both steps of a walk's last stride and how they differ; empty for a walk without a stride."""
+    if walk.steps < STRIDE:
+        return {}
+    count = walk.steps - walk.steps % STRIDE  # leg 1 swings in the first step of a stride
+    periods, lengths = (values[count - STRIDE : count].tolist() for values in (walk.periods_s, walk.lengths_m))
+    return {
+        "gait_steps": [
+            {"period_s": period, "length_m": length} for period, length in zip(periods, lengths, strict=True)
+        ],
+        "step_period_s": sum(periods) / STRIDE,
+        "step_length_m": sum(lengths) / STRIDE,
+        "asymmetry": {"step_length": asymmetry_of(*lengths), "step_period": asymmetry_of(*periods)},
+    }
+
+
+def asymmetry_of(first: float, second: float) -> float:
+    """Return the difference between two values over their mean."""
+    return (second - first) / (0.5 * (first + second))
+
+
+def mean_step(walk: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the mean period (s) and length (m) of a walk's last stride, or those of its last step if it has none."""
+    if "gait_steps" not in walk:
+        return last_step(walk)
+    return {"period_s": walk["step_period_s"], "length_m": walk["step_length_m"], "of_stride": True}
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:

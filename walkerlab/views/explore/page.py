@@ -43,7 +43,7 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
         configs=choices(base),
         anchor="walk",
         # An empty player, which the script fills.
-        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, 0.0, 1.0, (0, 0, 1, 1)),
+        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, (0.0, 0.0), 1.0, (0, 0, 1, 1)),
         # Markup only for the package's own files; all other texts are escaped.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),

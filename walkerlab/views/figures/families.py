@@ -274,7 +274,9 @@ FARTHEST: Final = 1.6
 def draw_multipliers(results: Results) -> Drawn:
     """Plot multipliers in the complex plane (left) and their magnitudes over the parameter (right)."""
     (figure, (left, right)), largest = panels(3.6, 1, 2), 0.0
-    drawn = [branch for branch in branches_of(results) if branch.period == 1]
+    branches = branches_of(results)
+    shortest = min((branch.period for branch in branches), default=1)  # 2 steps for legs that differ
+    drawn = [branch for branch in branches if branch.period == shortest]
     looks = {model: cycle(zip(colours, DASHES, strict=False)) for model, colours in GAITS.items()}
     key = []
     for branch in drawn:
@@ -298,7 +300,7 @@ def draw_multipliers(results: Results) -> Drawn:
     add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}
     for item in results[STAGE].summary["bifurcations"]:
-        if item["period"] == 1:
+        if item["period"] == shortest:
             found.setdefault((item["model"], item["kind"]), []).append(item["value"])
     bifurcations = {which: sorted(values) for which, values in found.items()}
     return figure, (bifurcations, largest if largest > FARTHEST else None)

@@ -1,7 +1,7 @@
 """Walkers drawn to scale on their slope: stick diagrams of one gait cycle (figures 2 and 6), and animations."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -70,7 +70,7 @@ class Sticks:
     landings: Array  # (1 + steps, 2) positions of the first stance foot and of each landing
     slope: float  # rad
     knees: Array | None = None  # (samples, leg, 2); None for straight legs
-    radius: float = 0.0  # radius of the soles' arcs, m; the feet are their lowest points
+    radii: tuple[float, float] = (0.0, 0.0)  # radius of each sole's arc, m; the feet are their lowest points
     head: Array | None = None  # (samples, 2) centre of mass of the torso; None if there is no torso
     ground: Array | None = None  # (points, 2) outline of the ground; None on even ground
     pushes: bool = False  # whether the trailing foot pushes off as the other one lands
@@ -94,7 +94,7 @@ class Sticks:
 
     @property
     def has_soles(self) -> bool:
-        return self.radius > SMALL_FOOT * self.leg_length
+        return max(self.radii) > SMALL_FOOT * self.leg_length
 
     def leg(self, leg: int) -> Array:
         """Return a leg's line (samples, points, 2) from the hip through any knee to the middle of the sole."""
@@ -107,11 +107,11 @@ class Sticks:
 
     def arc(self, leg: int, above: Array, angles: Array) -> Array:
         """Return points of a sole (samples, angles, 2) at angles (rad) from the line of the leg through its centre."""
-        centre = self.feet[:, leg] + np.array([0.0, self.radius])
+        centre = self.feet[:, leg] + np.array([0.0, self.radii[leg]])
         down = (centre - above) / np.linalg.norm(centre - above, axis=1, keepdims=True)
         ahead = np.stack((-down[:, 1], down[:, 0]), axis=1)
         around = np.cos(angles)[:, None] * down[:, None] + np.sin(angles)[:, None] * ahead[:, None]
-        return np.asarray(centre[:, None] + self.radius * around)
+        return np.asarray(centre[:, None] + self.radii[leg] * around)
 
     def project(self, points: Array) -> Array:
         """Convert points in the slope's frame (..., 2) to horizontal and vertical position (m)."""
@@ -143,9 +143,9 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
         tilted = trajectory["torso_angle"] + slope
         head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
     knees = joints("knee") if "knee_along_m" in trajectory.variables else None
-    radius = float(walker["feet"][0]["radius_m"] if "feet" in walker else walker["foot_radius_m"])
+    radii = radii_of(walker)
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
-        radius = 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
+        radii = 0.0, 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
     levels = ground_levels(steps)
     pushes = asked["push_off"]["impulse_N_s"] != 0.0
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
@@ -157,9 +157,19 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
         outline = np.column_stack((np.append(begins, begins[-1] + FAR_EDGE_M).repeat(2)[1:-1], heights.repeat(2)))
     landings = np.column_stack((landings, heights))
     return Sticks(
-        trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radius, head, outline,
+        trajectory["time"], hip, joints("foot"), steps[TOUCHES], landings, slope, knees, radii, head, outline,
         pushes, ending,
     )  # fmt: skip
+
+
+def radii_of(walker: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the radius (m) of each foot of a stored walker."""
+    if "feet" in walker:
+        first, second = (float(foot["radius_m"]) for foot in walker["feet"])
+        return first, second
+    own = float(walker["foot_radius_m"])
+    other = (walker.get("leg_2") or {}).get("foot_radius_m")
+    return own, own if other is None else float(other)
 
 
 def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
@@ -288,7 +298,7 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
     if stage == RIGID_STAGE:
         return figure, caption_values
     pitch = None if pads is None else result.summary["pitch_m"]
-    return figure, (*caption_values, sticks.radius, result.identity.config_slice["contact"]["terrain"], pitch)
+    return figure, (*caption_values, max(sticks.radii), result.identity.config_slice["contact"]["terrain"], pitch)
 
 
 FILM_NEEDS = {stage: Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)}

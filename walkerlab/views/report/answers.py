@@ -16,7 +16,7 @@ from walkerlab.labels import join_words, unit_by_name
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.report import gaits
 from walkerlab.views.report.numbers import count, decimals_left, fixed, length, number, quantity
-from walkerlab.views.report.outcomes import MODEL_NAMES, WALKED_LABEL, describe_error
+from walkerlab.views.report.outcomes import MODEL_NAMES, WALKED_LABEL, describe_error, describe_limp, legs_differ
 from walkerlab.views.report.outcomes import walks as walk_text
 from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table, table_lines
 from walkerlab.views.report.text import describe_summary, paragraph
@@ -88,7 +88,7 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     head = (
         f"On a slope of {slope}{driven} there is {'a stable' if summary['stable'] else 'an unstable'} gait: steps of "
         f"{fixed(summary['step_length_m'], 4)} m in {fixed(summary['period_s'], 4)} s; "
-        f"the largest multiplier is {fixed(summary['spectral_radius'], 3)}."
+        f"the largest multiplier is {fixed(summary['spectral_radius'], 3)}{describe_limp(summary)}."
     )
     state = [fixed(value, 6) for value in summary["state"]]
     different = {
@@ -98,7 +98,8 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
     }
     sets, names = {summary["equations"]: summary, **different}, summary.get("state_names", gaits.COMPASS_STATE)
     search = f" Method: {summary['sought']}; very unstable gaits may be missed." if summary.get("sought") else ""
-    return [head, gaits.gait_table(sets, names), f"{count(summary['gaits_found'], 'gait')} of one step found.{search}"]
+    steps = "one stride" if legs_differ(summary) else "one step"
+    return [head, gaits.gait_table(sets, names), f"{count(summary['gaits_found'], 'gait')} of {steps} found.{search}"]
 
 
 def walk_row(title: str, key: str, digits: int = 4) -> Column:

@@ -138,7 +138,7 @@ class Player:
     walkers: tuple[Walker, ...]
     slope_rad: float
     leg_m: float
-    foot_radius_m: float
+    foot_radii_m: tuple[float, float]  # of both legs
     closeup_m: float  # height of the close-up of a foot
     view: tuple[int, int, int, int]  # left, top, width and height of the stills (mm, y down), after the slope is tilted
     torso_m: float = 0.0
@@ -157,7 +157,7 @@ class Player:
 
     @property
     def scene(self) -> dict[str, object]:
-        names = ("slope_rad", "leg_m", "foot_radius_m", "torso_m", "ordinary_force", "closeup_m", "pads", "ground")
+        names = ("slope_rad", "leg_m", "foot_radii_m", "torso_m", "ordinary_force", "closeup_m", "pads", "ground")
         return {name: getattr(self, name) for name in names}
 
 

@@ -5,7 +5,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.views.report.numbers import MINUS, NONE, drop_rounding, fixed, number, power_of_ten
+from walkerlab.views.report.outcomes import legs_differ
 from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, typeset
 from walkerlab.views.report.tables import Column, Table, measured, side_by_side
 
@@ -21,14 +23,17 @@ SETS = {"as-printed": "as printed", "corrected": "corrected"}
 def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note: str = "") -> Table:
     """Tabulate fixed points (coordinates `names`) and multipliers, with a column for each set of equations."""
     six = partial(fixed, decimals=6)
-    multipliers = range(max(len(gait["multipliers"]) for gait in sets.values()))
-    titles = [typeset(f"{'' if place else 'multipliers '}lambda_{place + 1}") for place in multipliers]
+    multipliers = range(max(len(multipliers_of(gait)) for gait in sets.values()))
+    differ = any(legs_differ(gait) for gait in sets.values())
+    first = "multipliers of a stride " if differ else "multipliers "
+    titles = [typeset(f"{'' if place else first}lambda_{place + 1}") for place in multipliers]
     lines = [
         *(Column(coordinate(name), partial(state_at, place), six) for place, name in enumerate(names)),
         measured("step period T", "period_s", six),
         measured("step length S", "step_length_m", six),
+        *(asymmetry_lines(six) if differ else ()),
         *(Column(title, partial(multiplier, place)) for place, title in enumerate(titles)),
-        Column("spectral radius", "spectral_radius", partial(fixed, decimals=5)),
+        Column(f"spectral radius{' per step' if differ else ''}", "spectral_radius", partial(fixed, decimals=5)),
         Column("stable", "stable"),
         *works(partial(number, digits=4)),
         measured("speed", "speed_m_s", partial(fixed, decimals=4)),
@@ -50,7 +55,28 @@ def gait_table(sets: Mapping[str, Mapping[str, Any]], names: Sequence[str], note
     return side_by_side(caption, lines, gaits, note=note)
 
 
-WORK_SOURCES = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip"}
+def multipliers_of(gait: Mapping[str, Any]) -> Sequence[Sequence[float]]:
+    """Return the multipliers of a step or, if the legs differ, of a stride."""
+    multipliers: Sequence[Sequence[float]] = gait.get("multipliers", gait.get("stride_multipliers", ()))
+    return multipliers
+
+
+def step_value(place: int, key: str, gait: Mapping[str, Any]) -> float:
+    return float(gait["gait_steps"][place][key])
+
+
+def asymmetry_lines(written: Callable[[Any], str]) -> Iterator[Column]:
+    """Yield lines with the period and length of both steps of a gait, and their asymmetries."""
+    for place, leg in enumerate(("leg 1", "leg 2")):
+        for name, key in (("period", "period_s"), ("length", "length_m")):
+            title = add_unit(f"{name} of the step in which {leg} swings", unit_by_name(key))
+            yield Column(title, partial(step_value, place, key), written, numeric=True)
+    for name in ("step_period", "step_length"):
+        words = f"asymmetry of the {name.replace('_', ' ')} (second minus first, over the mean)"
+        yield Column(words, f"asymmetry/{name}", lambda share: f"{fixed(100.0 * share, 2)} %")
+
+
+WORK_SOURCES = {"gravity": "gravity", "push_off": "the push-off", "hip": "the hip", "knees": "the knees"}
 """Sources of a step's work: stored name and display name."""
 
 
@@ -64,7 +90,11 @@ def works(written: Callable[[Any], str]) -> Iterator[Column]:
 
         def source_work(record: Mapping[str, Any], name: str = name) -> float | None:
             work = record.get("work_per_step_J") or {}
-            return work[name] if work and abs(work[name]) > WORK_ROUNDING * max(map(abs, work.values())) else None
+            return (
+                work[name]
+                if work.get(name) and abs(work[name]) > WORK_ROUNDING * max(map(abs, work.values()))
+                else None
+            )
 
         yield Column(f"work of {source} per step (J)", source_work, written)
 
@@ -96,7 +126,7 @@ def symbol(name: str) -> str:
 
 def multiplier(place: int, gait: Mapping[str, Any]) -> str:
     """Format one multiplier of a gait, or a dash if the gait has fewer multipliers."""
-    multipliers = gait["multipliers"]
+    multipliers = multipliers_of(gait)
     return complex_number(*multipliers[place]) if place < len(multipliers) else NONE
 
 

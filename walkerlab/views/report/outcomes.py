@@ -5,7 +5,7 @@ from typing import Any
 
 from walkerlab.labels import join_words
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
-from walkerlab.views.report.numbers import count, quantity
+from walkerlab.views.report.numbers import count, number, quantity
 from walkerlab.views.report.tables import Tone
 
 RIGID_STAGE, CONTACT_STAGE = "simulate", "contact-sim"
@@ -59,3 +59,25 @@ def describe_error(error: Mapping[str, Any]) -> str:
     if last and last[0] < MUCH_SMALLER * error["step_period_s"]:
         text += f" (in the period of the last step {quantity(last[0], 's', 1)})"
     return f"{text}, by a second walk with {error.get('by', DEFAULT_CHECK)}"
+
+
+def legs_differ(gait: Mapping[str, Any]) -> bool:
+    """Whether a gait's steps are those of legs that differ, so that a single step has no multipliers."""
+    return "gait_steps" in gait and "multipliers" not in gait
+
+
+def describe_limp(gait: Mapping[str, Any]) -> str:
+    """Describe, after a multiplier, by how much the steps of legs that differ differ; empty for equal legs."""
+    if not legs_differ(gait):
+        return ""
+    period, length = (gait["asymmetry"][f"step_{name}"] for name in ("period", "length"))
+    return (
+        f" per step. It limps: the step in which leg 2 swings takes {compare(period, 'more', 'less')} time and is "
+        f"{compare(length, 'longer', 'shorter')} than the step in which leg 1 swings"
+    )
+
+
+def compare(asymmetry: float, more: str, less: str) -> str:
+    """Compare a second value with the first, from their difference over their mean: '5.3 % more'."""
+    percent = 100.0 * ((2.0 + asymmetry) / (2.0 - asymmetry) - 1.0)
+    return f"{number(abs(percent), 2)} % {more if percent > 0.0 else less}"

@@ -2,11 +2,20 @@
 
 from pathlib import Path
 
+from walkerlab.config.walkers import second_leg_in_words
 from walkerlab.labels import join_words
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.prose import Prose, parts
 from walkerlab.views.report import numbers
-from walkerlab.views.report.outcomes import DEFAULT_CHECK, ERRORS, describe_error, ends, walks
+from walkerlab.views.report.outcomes import (
+    DEFAULT_CHECK,
+    ERRORS,
+    describe_error,
+    describe_limp,
+    ends,
+    legs_differ,
+    walks,
+)
 from walkerlab.views.report.symbols import typeset
 
 
@@ -18,6 +27,7 @@ def join_row(text: str) -> str:
 TEMPLATE_FUNCTIONS = (
     *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.format_integer, numbers.span),
     *(numbers.count, join_words, numbers.power_of_ten, join_row, typeset, ends, walks, describe_error, len),
+    *(describe_limp, legs_differ, second_leg_in_words),
 )
 """Functions available to the templates."""
 TEMPLATE_CONSTANTS = {"CHANNELS": CHANNELS, "ERRORS": ERRORS, "DEFAULT_CHECK": DEFAULT_CHECK}

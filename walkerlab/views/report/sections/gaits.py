@@ -7,6 +7,7 @@ from typing import Any
 from walkerlab.views.report.blocks import Paragraph, Section
 from walkerlab.views.report.gaits import COMPASS_STATE, SETS, gait_table, state_at, symbol
 from walkerlab.views.report.numbers import fixed
+from walkerlab.views.report.outcomes import legs_differ
 from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, measured, table
 from walkerlab.views.report.words import words
@@ -43,4 +44,5 @@ def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[
     alone = list(sets) == ["corrected"]
     numbered = {name: [{**gait, "gait": place} for place, gait in enumerate(found, 1)] for name, found in sets.items()}
     gaits = {"" if alone else SETS[name]: found for name, found in numbered.items()}
-    return table("All one-step gaits found", columns, gaits)
+    differ = any(legs_differ(gait) for found in sets.values() for gait in found)
+    return table(f"All {'gaits of one stride' if differ else 'one-step gaits'} found", columns, gaits)

@@ -44,7 +44,7 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
         walkers=tuple(walker(results, stage, track) for stage, track in tracks.items()),
         slope_rad=config.slope_rad,
         leg_m=length,
-        foot_radius_m=config.walker.foot_radius_m,
+        foot_radii_m=config.walker.foot_radii_m,
         torso_m=0.0 if torso is None else torso.above_hip_m,
         ordinary_force=weight(tracks),
         closeup_m=closeup(tracks.get(CONTACT_STAGE), length),
@@ -74,7 +74,7 @@ def overlay(results: Results) -> Player | None:
         walkers=tuple(walkers),
         slope_rad=slope,
         leg_m=leg,
-        foot_radius_m=radius,
+        foot_radii_m=(radius, radius),
         closeup_m=STILL_VIEW_OF_RIGID * leg,
         view=view(tuple(tracks.values()), slope, margin=0.1 * leg),
     )

@@ -174,11 +174,11 @@ function drawWalker(picture, scene, track, colours, scale, index) {
     const path = new Path2D();
     for (const name of bent ? ["h", `k${leg}`] : ["h"]) path.lineTo(...joint(name));
     // The sole is where the leg's direction meets the foot's arc.
-    const [x, y] = toPixels(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radius_m);
-    const radius = scale * scene.foot_radius_m;
+    const [x, y] = toPixels(track.at(`fx${leg}`), track.at(`fy${leg}`) + scene.foot_radii_m[leg]);
+    const radius = scale * scene.foot_radii_m[leg];
     const down = Math.PI / 2 - (track.at(`b${leg}`) ?? track.at(`a${leg}`));
     path.lineTo(x + radius * Math.cos(down), y + radius * Math.sin(down));
-    if (scene.foot_radius_m > 0.01 * scene.leg_m) {
+    if (scene.foot_radii_m[leg] > 0.01 * scene.leg_m) {
       path.moveTo(x + radius * Math.cos(down - 0.6), y + radius * Math.sin(down - 0.6));
       path.arc(x, y, radius, down - 0.6, down + 0.6);
     }
@@ -252,12 +252,12 @@ function drawFoot(picture, scene, track, leg, colours) {
   const slip = track.at(`q${leg}`) ?? 0;
   const x = mark + clamp(scale * slip, -0.42 * width, 0.42 * width);
   const sole = ground - scale * clearance(scene, track, leg);
-  const radius = Math.max(scale * scene.foot_radius_m, 0.02 * height);
+  const radius = Math.max(scale * scene.foot_radii_m[leg], 0.02 * height);
   c.clearRect(0, 0, width, height);
   c.fillStyle = colours.ground;
   c.fillRect(0, ground, width, height - ground);
   const foot = new Path2D();
-  if (scene.foot_radius_m > 0) foot.arc(x, sole - radius, radius, 0, TAU);
+  if (scene.foot_radii_m[leg] > 0) foot.arc(x, sole - radius, radius, 0, TAU);
   else [[x, sole], [x - 0.3 * height, sole - height], [x + 0.3 * height, sole - height]].forEach((corner) => foot.lineTo(...corner));
   const visible = sole > 0;
   if (visible) {

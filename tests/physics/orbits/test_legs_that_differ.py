@@ -1,0 +1,175 @@
+"""Gaits of walkers whose legs differ, checked by a plain integration of both swings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plain_unequal_walk import Leg, Segment, Walker
+
+from walkerlab.physics.hybrid.recorded_walk import take_walk
+from walkerlab.physics.mechanics.hinges import HIP_ROW
+from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid_model import pair, with_fields
+from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_second_leg
+from walkerlab.physics.orbits.fixed_point import SearchSettings, find_gaits, with_mean_legs
+from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, RigidMap
+from walkerlab.physics.orbits.step_map import walk_steps
+
+FEW_STARTS = SearchSettings(20, 100)
+KINDS = ("masses", "straight", "round", "kneed", "kneed and round", "one knee")
+
+
+def varied(draw, leg, share):
+    """The leg with each number changed by up to a share of it."""
+
+    def near(value):
+        return value * draw.uniform(1.0 - share, 1.0 + share)
+
+    segments = tuple(Segment(*map(near, vars(segment).values())) for segment in leg.segments)
+    return Leg(segments, near(leg.radius), leg.centre_ahead)
+
+
+def draw_walker(kind, seed):
+    draw = np.random.default_rng(seed)
+    knees = Leg((Segment(0.5, 0.5, 0.325, 0.0, 0.0), Segment(0.5, 0.05, 0.125, 0.0, 0.0)), 0.0)
+    if kind == "one knee":  # Miandoab and Beigzadeh's
+        kneed = Leg((Segment(0.379, 8.76, 0.143, 0.0, 0.129), Segment(0.388, 2.70, 0.157, 0.0, 0.032)), 0.0)
+        straight = Leg((Segment(0.767, 11.46, 0.235, 0.0, 0.479),), 0.0)
+        legs, hip, slope = (varied(draw, kneed, 2e-3), varied(draw, straight, 2e-3)), 37.08, 0.04
+        return Walker(legs, hip, slope, knee_damping=(draw.uniform(0.0, 0.15), 0.0))
+    if kind.startswith("kneed"):
+        leg, hip, slope = replace(knees, radius=0.1 if "round" in kind else 0.0), 0.5, 0.05
+        return Walker((varied(draw, leg, 4e-3), varied(draw, leg, 4e-3)), hip, slope)
+    leg = Leg((Segment(1.0, 5.0, 0.5, 0.01 if kind == "round" else 0.0, 0.1),), 0.25 if kind == "round" else 0.0)
+    other = varied(draw, leg, 5e-3)
+    if kind == "masses":
+        (own,) = leg.segments
+        other = Leg((replace(own, mass=own.mass * draw.uniform(0.85, 1.15), below=own.below * 1.04),), leg.radius)
+    if kind == "round":
+        leg, other = replace(leg, centre_ahead=0.02), replace(other, centre_ahead=0.025)
+    return Walker((leg, other), 10.0, draw.uniform(0.015, 0.04))
+
+
+def assembly(leg, hip_mass):
+    limbs = [Limb(each.length, each.mass, each.below, each.ahead, each.inertia) for each in leg.segments]
+    build = straight_legs if len(limbs) == 1 else kneed_legs
+    return build(*limbs, hip_mass, Arc(leg.radius, leg.centre_ahead))
+
+
+def model_of(plain):
+    first, second = (assembly(leg, plain.hip_mass) for leg in plain.legs)
+    model = standing(with_second_leg(first, second), plain.gravity, plain.slope)
+    if not any(plain.knee_damping):
+        return model
+    models = zip((model, model.exchanged), plain.knee_damping, strict=True)
+    return pair(*(with_fields(each, {"knees": (0.0, damping, 0.0)}) for each, damping in models))
+
+
+def legs_of(state):
+    """Angles and rates of both legs."""
+    n = len(state) // 2
+    return np.array([*state[:2], *state[n : n + 2]])
+
+
+def best(walker):
+    search = find_gaits(walker, settings=FEW_STARTS)
+    assert search.gait is not None, search.reason
+    return search.gait
+
+
+@pytest.mark.parametrize(("kind", "seed"), [*((kind, 1) for kind in KINDS), ("round", 2), ("one knee", 2)])
+def test_a_gait_returns_after_a_stride_of_plain_integration(kind, seed):
+    plain = draw_walker(kind, seed)
+    gait = best(model_of(plain))
+    steps, end = plain.stride(gait.state)
+    np.testing.assert_allclose(steps, gait.steps, rtol=1e-10)
+    np.testing.assert_allclose(end, legs_of(gait.state), atol=1e-10)
+
+
+def test_multipliers_of_a_stride_are_those_of_differences_by_plain_integration():
+    plain = draw_walker("straight", 1)
+    walker = model_of(plain)
+    gait = best(walker)
+    size, columns = 1e-5, []
+    for rate in (2, 3):
+        ends = [plain.stride(legs_of(gait.state) + sign * size * np.eye(4)[rate])[1] for sign in (1.0, -1.0)]
+        columns.append((ends[0] - ends[1]) / (2.0 * size))
+    exact = RigidMap(lambda _: walker, 1.0, walker)
+    DP = walk_steps(exact, np.array(gait.z), 0.0, 2).DP
+    tau = np.sqrt(walker.leg_length / walker.gravity)
+    scales = np.array([tau, 1.0, 1.0])  # of theta_2 by rates in sqrt(g/L), and of rates by rates
+    np.testing.assert_allclose(DP[:, 1:] * scales[:, None], np.array(columns)[:, [1, 2, 3]].T, atol=1e-7)
+    assert np.abs(np.linalg.eigvals(DP)).max() == pytest.approx(gait.spectral_radius**2)
+
+
+@pytest.mark.parametrize("kind", ["masses", "round", "kneed"])
+def test_exchanged_labels_give_the_same_gait_half_a_stride_later(kind):
+    plain = draw_walker(kind, 3)
+    gait, later = best(model_of(plain)), best(model_of(replace(plain, legs=plain.legs[::-1])))
+    np.testing.assert_allclose(later.steps, gait.steps[::-1], rtol=1e-11)
+    assert later.asymmetry["step_length"] == pytest.approx(-gait.asymmetry["step_length"], abs=1e-11)
+    halfway = take_walk(model_of(plain), EXACT_STEPS, gait.state, 1).final_state
+    np.testing.assert_allclose(later.state, halfway, atol=1e-11)
+    np.testing.assert_allclose(later.stride_multipliers, gait.stride_multipliers, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["round", "kneed and round"])
+def test_equal_legs_written_as_different_walk_alike_with_squared_multipliers(kind):
+    plain = draw_walker(kind, 4)
+    walker = model_of(replace(plain, legs=(plain.legs[0],) * 2))
+    equal = best(walker)
+    assert not walker.legs_differ
+    different = best(pair(walker, walker))
+    np.testing.assert_allclose(different.state, equal.state, atol=1e-12)
+    np.testing.assert_allclose(different.steps, [(equal.period, equal.step_length)] * 2, rtol=1e-12)
+    np.testing.assert_allclose(different.stride_multipliers, equal.stride_multipliers, atol=1e-10)
+    squares = np.sort_complex(np.array(equal.multipliers) ** 2)
+    np.testing.assert_allclose(np.sort_complex(equal.stride_multipliers), squares, atol=1e-15)
+    assert different.spectral_radius == pytest.approx(equal.spectral_radius, rel=1e-10)
+    assert different.multipliers == ()
+    assert different.min_normal_force == pytest.approx(equal.min_normal_force, rel=1e-10)
+    assert different.energy == pytest.approx(equal.energy, rel=1e-10)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_energy_is_balanced_over_the_steps_of_both_legs(kind):
+    walker = model_of(draw_walker(kind, 5))
+    walk = take_walk(walker, EXACT_STEPS, best(walker).state, 3)
+    assert walk.steps == 3
+    assert walk.energy_balance_residual < 1e-10 * walker.mass * walker.gravity
+    assert walk.energy_drift < 1e-10 * walker.mass * walker.gravity or np.any(walker.laws)
+    spent = walk.driven.net_work - walk.lost_in_strikes
+    whole = take_walk(walker, EXACT_STEPS, best(walker).state, 2)
+    assert whole.driven.net_work == pytest.approx(whole.lost_in_strikes, rel=1e-9)
+    assert spent != pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_damped_knee_takes_work_that_the_hip_does_not():
+    walker = model_of(draw_walker("one knee", 6))
+    gait = best(walker)
+    assert gait.work["hip"] == 0.0
+    assert gait.work["knees"] < 0.0
+    undamped = best(walker.changed(knees=(0.0, 0.0, 0.0)))
+    assert "knees" not in undamped.work
+    assert not walker.changed(knees=(0.0, 0.0, 0.0)).laws[HIP_ROW + 1 :].any()
+
+
+def test_the_mean_of_two_legs_is_one_walker_of_equal_legs():
+    walker = model_of(draw_walker("round", 7))
+    even = with_mean_legs(walker, 0.0)
+    assert not even.legs_differ
+    assert even == with_mean_legs(walker.exchanged, 0.0)
+    np.testing.assert_array_equal(with_mean_legs(walker, 1.0).A, walker.A)
+
+
+@pytest.mark.parametrize(("damping", "slope", "walks"), [
+    (0.0, 0.0225, False), (0.0, 0.0245, True), (0.0, 0.046, True),
+    (0.1, 0.0162, False), (0.1, 0.0182, True), (0.1, 0.04, True), (0.1, 0.0495, True),
+])  # fmt: skip
+def test_one_kneed_and_one_straight_leg_walk_stably_on_the_published_slopes(damping, slope, walks):
+    # Miandoab and Beigzadeh, Nonlinear Dynamics 111 (2023): .0235 to .0470 rad, with damping .1 from .0172 to .0505
+    kneed = Leg((Segment(0.379, 8.76, 0.143, 0.0, 0.129), Segment(0.388, 2.70, 0.157, 0.0, 0.032)), 0.0)
+    straight = Leg((Segment(0.767, 11.46, 0.235, 0.0, 0.479),), 0.0)
+    plain = Walker((kneed, straight), 37.08, slope, knee_damping=(damping, 0.0))
+    search = find_gaits(model_of(plain))
+    assert (search.gait is not None and search.gait.stable) is walks

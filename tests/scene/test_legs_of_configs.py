@@ -1,0 +1,199 @@
+"""Configs with `leg_2`: the second leg that they describe, its contact walk, and what needs equal legs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from walkerlab.config.files import builtin_config
+from walkerlab.config.reads import only
+from walkerlab.config.walkers import second_of
+from walkerlab.errors import ConfigError
+from walkerlab.exchange.exported import prepare_export
+from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
+from walkerlab.physics.orbits.contact_map import lengths_between_touches
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.resolve import resolve
+from walkerlab.pipeline.progress import Silent
+from walkerlab.pipeline.stages import continuation
+from walkerlab.scene.contact import contact_gait, scene_on_pads, start_state, tolerances_of
+from walkerlab.scene.parts import assembly_of
+from walkerlab.scene.rigid import have_different_legs, rigid_walker
+
+HEAVY = "walker.leg_2={leg_mass_kg: 5.5}"
+KNEES = "walker.leg_2={shank: {mass_kg: 0.053}, thigh: {length_m: 0.502}}"
+PEG = "{type: straight-legs, leg_length_m: 1.0, leg_mass_kg: 0.55, leg_mass_below_hip_m: 0.35}"
+
+
+def config_of(name, *settings):
+    return resolve(name, list(settings)).loaded.config
+
+
+def gait_of(config):
+    gait = find_gaits(rigid_walker(config)).gait
+    assert gait is not None
+    return gait
+
+
+def test_leg_2_holds_the_keys_that_differ():
+    walker = config_of("paper", "walker.leg_2={leg_mass_kg: 5.5, foot_to_mass_m: 0.48}").walker
+    second = second_of(walker)
+    assert (second.leg_mass_kg, second.foot_to_mass_m, second.leg_length_m) == (5.5, 0.48, 1.0)
+    assert walker.total_mass_kg == 5.0 + 5.5 + 10.0
+    first, other = assembly_of(walker).bodies
+    assert (first.mass_kg, other.mass_kg) == (5.0, 5.5)
+    assert (first.centre_m[1], other.centre_m[1]) == (-0.5, -0.52)
+
+
+def test_parts_of_a_kneed_leg_2_keep_what_it_does_not_say():
+    walker = config_of("kneed", KNEES).walker
+    bodies = {body.name: body for body in assembly_of(walker).bodies}
+    assert (bodies["shank 1"].mass_kg, bodies["shank 2"].mass_kg) == (0.05, 0.053)
+    assert bodies["shank 1"].centre_m == bodies["shank 2"].centre_m
+    assert bodies["thigh 1"].mass_kg == bodies["thigh 2"].mass_kg
+
+
+def test_a_leg_2_that_is_like_leg_1_makes_no_difference():
+    config = config_of("paper", "walker.leg_2={leg_mass_kg: 5.0}")
+    assert not have_different_legs(config)
+    assert rigid_walker(config) == rigid_walker(config_of("paper"))
+
+
+def test_two_descriptions_in_parts_make_legs_that_differ(tmp_path):
+    text = builtin_config("parts").path.read_text()
+    heavier = text.replace("name: shank 2, mass_kg: 0.05", "name: shank 2, mass_kg: 0.06")
+    assert heavier != text
+    file = tmp_path / "mine.yaml"
+    file.write_text(heavier)
+    assert rigid_walker(config_of(str(file))).legs_differ
+
+
+@pytest.mark.parametrize(("settings", "reason"), [
+    (["walker.leg_2={leg_length_m: 0.5}"], "foot_to_mass_m"),
+    (["walker.leg_2={leg_mass_kg: -1}"], "leg_mass_kg"),
+    (["walker.leg_2={mass: 1}"], "mass"),
+    ([HEAVY, "equations=as-printed"], "compass"),
+])  # fmt: skip
+def test_a_leg_2_that_cannot_be_meant_is_refused(settings, reason):
+    with pytest.raises(ConfigError, match=reason):
+        config_of("paper", *settings)
+
+
+def test_dampers_at_hip_and_knees_are_refused_together():
+    with pytest.raises(ConfigError, match="damper"):
+        config_of("kneed", "walker.knee.damping_N_m_s_per_rad=0.1", "walker.hip.damping_N_m_s_per_rad=0.1")
+
+
+@pytest.mark.parametrize(("name", "leg_2"), [
+    ("paper", "{leg_length_m: 1.02}"),
+    ("round-feet", "{leg_length_m: 0.41, foot_radius_m: 0.13, foot_centre_ahead_m: 0.01}"),
+    ("kneed", "{thigh: {length_m: 0.49}, foot_radius_m: 0.05}"),
+])  # fmt: skip
+def test_a_start_is_completed_with_both_feet_of_unequal_legs_on_the_slope(name, leg_2):
+    values = 4 if name != "kneed" else 6
+    start = ["null", "0.25", *["null"] * (values - 4), "-0.4", "-1.0", *["-0.4"] * (values - 4)]
+    start = start if values == 4 else ["null", "0.25", "null", "-0.4", "-1.0", "-0.4"]
+    config = config_of(name, f"walker.leg_2={leg_2}", f"start=[{', '.join(start)}]")
+    walker = rigid_walker(config)
+    assert not walker.alike
+    height, ahead = swing_foot(walker, np.array(config.start))
+    assert height == pytest.approx(0.0, abs=1e-14)
+    assert ahead < 0.0
+    assert config.start[SWING] < config.start[STANCE]
+
+
+@pytest.mark.parametrize("leg_2", ["{leg_mass_kg: 5.5}", "{leg_mass_kg: 5.2, leg_length_m: 1.002}"])
+def test_a_contact_walk_on_pads_limps_into_the_contact_gait(leg_2):
+    config = config_of("paper", f"walker.leg_2={leg_2}", "contact.pad_pitch=own", "strides=14")
+    rigid = gait_of(config)
+    gait = contact_gait(config, rigid.step_length, rigid.state).gait
+    scene = scene_on_pads(config, rigid.step_length, rigid.state)
+    walk = scene.walk(start_state(scene, rigid.state), 28, tolerances_of(config, 28))
+    assert walk.steps == 28
+    np.testing.assert_allclose(walk.periods_s[-2:], gait.periods_s, atol=2e-5)
+    np.testing.assert_allclose(walk.lengths_m[-2:], lengths_between_touches(gait), atol=2e-5)
+    assert abs(np.diff(gait.periods_s)[0]) > 1e-3
+    # each foot comes down in the middle of its pads
+    lanes, pitch = scene.ground.terrain.lanes, scene.ground.terrain.pitch
+    own = walk.touch_along_m[-2:] - np.array(lanes)
+    off = own - 2.0 * pitch * np.round(own / (2.0 * pitch))
+    assert np.abs(off - off.mean()).max() < 1e-4
+
+
+@pytest.mark.parametrize(("name", "first", "second"), [
+    ("paper", "{leg_mass_kg: 5.5, leg_2: {leg_mass_kg: 5.0}}", "{leg_mass_kg: 5.0, leg_2: {leg_mass_kg: 5.5}}"),
+    ("kneed", "{type: kneed, leg_2: {shank: {mass_kg: 0.053}}}",
+     "{type: kneed, shank: {mass_kg: 0.053}, leg_2: {shank: {mass_kg: 0.05}}}"),
+])  # fmt: skip
+def test_exchanged_labels_give_the_same_contact_gait_half_a_stride_later(name, first, second):
+    gaits = []
+    for walker in (first, second):
+        config = config_of(name, f"walker={walker}", "strides=2")
+        rigid = gait_of(config)
+        gaits.append(contact_gait(config, rigid.step_length, rigid.state).gait)
+    one, other = gaits
+    np.testing.assert_allclose(one.periods_s, other.periods_s[::-1], rtol=1e-7)
+    np.testing.assert_allclose(lengths_between_touches(one), lengths_between_touches(other)[::-1], rtol=1e-6)
+    assert abs(one.multipliers[0]) == pytest.approx(abs(other.multipliers[0]), rel=1e-4)
+
+
+def test_a_damped_knee_takes_the_same_work_from_both_models():
+    config = config_of("kneed", "walker.knee.damping_N_m_s_per_rad=0.01", "strides=4")
+    rigid = gait_of(config)
+    scene = scene_on_pads(config, rigid.step_length, rigid.state)
+    walk = scene.walk(start_state(scene, rigid.state), 8, tolerances_of(config, 8))
+    assert walk.steps == 8
+    assert rigid.work["knees"] < 0.0
+    assert walk.driven.per_step(8)["knees"] == pytest.approx(rigid.work["knees"], rel=0.05)
+    assert walk.driven.hip == 0.0
+
+
+@pytest.mark.parametrize("stage", [
+    "tune", "accuracy", "stability", "basin", "robustness", "design", "identify", "plan", "engines",
+])  # fmt: skip
+def test_a_stage_that_needs_equal_legs_says_so(stage):
+    config = config_of("paper", HEAVY)
+    assert PIPELINE[stage].why_unsuited(config) == "the legs differ"
+    with pytest.raises(ConfigError, match="needs two equal legs") as refused:
+        PIPELINE[stage].refuse_unsuited(stage, config)
+    assert "fixedpoint, simulate, contact-sim" in refused.value.advice
+    assert PIPELINE[stage].why_unsuited(config_of("paper")) is None
+
+
+def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
+    block = "{over: walker.leg_2.leg_mass_kg, from: 4.9, to: 5.1, model: rigid, periods: 2, points: 30}"
+    config = config_of("paper", f"continuation={block}")
+    assert config.walker.leg_2 is None
+    content = continuation.run(only(config, PIPELINE["continuation"].takes), {}, Silent(), again=False)
+    rows = content.summary["branches"]
+    assert [row["period"] for row in rows] == [2, 2]
+    assert sorted(row["stable_range"] is not None for row in rows) == [False, True]
+    for row in rows:
+        assert sorted((row["from"], row["to"])) == pytest.approx([4.9, 5.1])
+    assert content.summary["bifurcations"] == []
+
+
+def test_an_export_of_legs_that_differ_is_refused():
+    config = config_of("paper", HEAVY)
+    with pytest.raises(ConfigError, match="needs two equal legs"):
+        prepare_export(config, 0.37, (0.0,) * 4)
+
+
+def test_the_contact_model_refuses_one_knee_beside_a_straight_leg():
+    config = config_of("kneed", f"walker.leg_2={PEG}")
+    assert rigid_walker(config).legs_differ
+    with pytest.raises(ConfigError, match="both with a knee or both without"):
+        scene_on_pads(config, 0.4, (0.0,) * 6)
+
+
+def test_a_peg_leg_is_by_default_the_first_leg_with_its_knee_locked():
+    walker = rigid_walker(config_of("kneed", "walker.leg_2={type: straight-legs}"))
+    assert walker.kneed
+    assert not walker.exchanged.kneed
+    assert math.hypot(walker.hip_x, walker.hip_y) == pytest.approx(1.0)
+    # standing, it is a locked leg; swinging, it has the inertia of one
+    kneed = rigid_walker(config_of("kneed"))
+    np.testing.assert_allclose(walker.A, kneed.A, atol=1e-15)
+    np.testing.assert_allclose(walker.exchanged.A[:2, :2].sum(), kneed.A.sum(), rtol=1e-12)
+    assert walker.exchanged.A[0, 0] == pytest.approx(kneed.A[np.ix_([0, 2], [0, 2])].sum())
