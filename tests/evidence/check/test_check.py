@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 import walkerlab
-from walkerlab.api import with_blocks
+from walkerlab.api.memory import with_blocks
 from walkerlab.config.check import Check, digits_of, parse_printed
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
