@@ -11,7 +11,7 @@ from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
 from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, Part, PlainWalker, Step
 
 DIFFERENCE = 1e-6  # rad, and rad/s times sqrt(L/g)
-MAX_MOVES, SMALLEST_MOVE = 16, 1e-12
+MAX_MOVES, SMALLEST_MOVE = 16, 1e-13
 ROUNDED = 1e-11  # residual that rounding may leave
 SLOW = 0.1  # ratio of two errors above which the derivative is computed anew
 
