@@ -17,6 +17,7 @@ LAYERS = (
     "api",
     "evidence.verification",
     "evidence.benchmarks",
+    "evidence.check",
     "evidence.paper",
     "views.cli",
     "views.explore",

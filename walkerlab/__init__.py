@@ -12,6 +12,7 @@ EXTENSIONS = {
     "study": ".evidence.paper.extension:EXTENSION",
     "benchmarks": ".evidence.benchmarks.extension:EXTENSION",
     "verification": ".evidence.verification.extension:EXTENSION",
+    "check": ".evidence.check.extension:EXTENSION",
     "questions": ".pipeline.stages.table:ASKING",
     "drawings": ".views.report.extension:EXTENSION",
 }

@@ -70,6 +70,7 @@ class Extension:
         yield from (code for key in WORDS for code in self.words(key).values())
         yield from (study.own_walker for study in self.studies)
         yield from (f"{stage.module}:run" for stage in self.stages)
+        yield from (stage.adds_command for stage in self.stages if stage.adds_command)
 
     def views(self) -> Iterator[str]:
         """Yield the code that drawings of results depend on."""

@@ -4,6 +4,7 @@ import warnings
 
 from walkerlab.api.memory import (
     basin,
+    check,
     compass,
     contact,
     continue_gait,
@@ -28,7 +29,7 @@ from walkerlab.extensions import check_names
 check_names(warnings.warn)
 
 __all__ = [
-    "Config", "ConfigError", "Gait", "Result", "Run", "basin", "compass", "contact", "continue_gait", "dataset",
-    "design", "explore", "export_model", "find_gait", "identify", "kneed", "mujoco_model", "open_run",
+    "Config", "ConfigError", "Gait", "Result", "Run", "basin", "check", "compass", "contact", "continue_gait",
+    "dataset", "design", "explore", "export_model", "find_gait", "identify", "kneed", "mujoco_model", "open_run",
     "plan_measurements", "read_walk", "robustness", "run", "simulate", "sweep", "walker",
 ]  # fmt: skip

@@ -370,6 +370,30 @@ def identify(
     return in_memory("identify", with_blocks(config, identify=block))
 
 
+def check(
+    config: str | Path | Config = DEFAULT,
+    printed: Mapping[str, str | float | Sequence[str | float]] | None = None,
+    **keys: Setting,
+) -> Result:
+    """Check a printed gait in memory.
+
+    config   the walker: a Config, a config file or built-in name, or a run
+    printed  values by name, such as {"period_s": "0.60"}; None keeps those of the config's block `check`. Write texts,
+             because their digits count
+    keys     other keys of the block `check`, such as angles, instant, state_before
+
+    Returns a result whose `summary["values"]` has a verdict for each value, and `explanations` why they differ. Raises
+    ConfigError for invalid arguments, and for a config without printed values.
+
+    >>> check("simplest", {"state": ["0.20031", "-0.19983"]}, angles={"from": "slope-normal"}).finding
+    'reproduced'
+    """
+    start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
+    known = {} if start.check is None else start.check.model_dump(mode="json", exclude_none=True, by_alias=True)
+    block = {**known, **keys, **({} if printed is None else {"printed": dict(printed)})}
+    return in_memory("check", with_blocks(start, **({"check": block} if block else {})))
+
+
 def plan_measurements(
     config: str | Path | Config = DEFAULT,
     fit: Sequence[str] = (),

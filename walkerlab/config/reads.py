@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from walkerlab.config import schema
     from walkerlab.config.basin import Basin
+    from walkerlab.config.check import Check
     from walkerlab.config.contact import Contact
     from walkerlab.config.continuation import Continuation
     from walkerlab.config.design import Design
@@ -226,6 +227,13 @@ class IdentifyConfig(FixedPointConfig, ContactConfig, Protocol):
     def identify(self) -> Identify | None: ...
 
 
+class CheckConfig(FixedPointConfig, Protocol):
+    """Keys that `check` reads."""
+
+    @property
+    def check(self) -> Check | None: ...
+
+
 class PlanConfig(FixedPointConfig, ContactConfig, Protocol):
     """Keys that `plan` reads."""
 
@@ -246,9 +254,10 @@ class NamedConfig(Protocol):
 if TYPE_CHECKING:
     OfEachType = tuple[
         SimulateConfig, ContactSimConfig, TuneConfig, CompassCasesConfig, SceneCasesConfig, MapsConfig,
-        ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, IdentifyConfig, PlanConfig, NamedConfig,
+        ContinuationConfig, BasinConfig, RobustnessConfig, DesignConfig, IdentifyConfig, PlanConfig, CheckConfig,
+        NamedConfig,
     ]  # fmt: skip
 
     def check_every_type(config: schema.Config) -> OfEachType:
         """Let mypy check that a config satisfies every type."""
-        return config, config, config, config, config, config, config, config, config, config, config, config, config
+        return (config,) * 14

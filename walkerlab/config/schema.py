@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal, get_args
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from walkerlab.config.basin import Basin
+from walkerlab.config.check import Check
 from walkerlab.config.contact import Contact
 from walkerlab.config.continuation import Continuation
 from walkerlab.config.design import Design
@@ -200,6 +201,7 @@ class Tune(Block):
 
 QUESTIONS: Final = (
     "recording", "stability", "tune", "continuation", "basin", "robustness", "design", "identify", "plan", "sweep",
+    "check",
 )  # fmt: skip
 """Blocks that configure a stage or a sweep rather than the scene."""
 
@@ -273,6 +275,7 @@ class Config(Block):
     identify: Identify | None = None
     plan: Plan | None = None
     sweep: Sweep | None = None
+    check: Check | None = None
     outputs: tuple[Output, ...] = key(OUTPUTS, "", "arrays to store", bounds="a list of states, energies, forces")
     seed: int = key(0, "1", "seed of all random numbers", ge=0, le=2**32 - 1)
 

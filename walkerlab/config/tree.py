@@ -68,3 +68,12 @@ def plain(node: Node) -> Data:
     if isinstance(node, ListNode):
         return [plain(item) for item in node.items]
     return {name: plain(entry) for name, entry in node.entries.items()}
+
+
+def as_typed(node: Node) -> Data:
+    """Convert a node as `plain` does, but keep numbers as text with all their digits."""
+    if isinstance(node, Scalar):
+        return None if node.value is None else node.text
+    if isinstance(node, ListNode):
+        return [as_typed(item) for item in node.items]
+    return {name: as_typed(entry) for name, entry in node.entries.items()}

@@ -23,7 +23,7 @@ from walkerlab.config.problems import (
     problems_error,
 )
 from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
-from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, plain
+from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, as_typed, plain
 from walkerlab.config.walkers import Kneed, PartsWalker, followers, second_of
 from walkerlab.extensions import WORDS, foreign
 
@@ -64,6 +64,8 @@ JUDGED_BY: Final = {
     "friction_velocity": {"stiction_velocity": "set contact.friction_velocity too", **BY_UNITS},
 }
 """Other keys that limit a key of the contact block, and advice if only the other key was changed."""
+DIGITS_COUNT: Final = ("printed", "state_before")
+"""Keys of the block `check` whose values are kept as typed."""
 _FOLLOWS_FROM_ANOTHER: Final = "default_factory_not_called"
 
 
@@ -71,6 +73,8 @@ def validate_tree(tree: BlockNode) -> Config:
     """Convert a tree to a typed config. Raises ConfigError with every problem found."""
     problems: list[Problem] = []
     data: dict[str, Any] = {name: plain(node) for name, node in tree.entries.items()}
+    if isinstance(check := tree.entries.get("check"), BlockNode):
+        data["check"] |= {name: as_typed(check.entries[name]) for name in DIGITS_COUNT if name in check.entries}
     if "slope_deg" in data:
         degrees = data.pop("slope_deg")
         try:

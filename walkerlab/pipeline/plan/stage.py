@@ -129,6 +129,8 @@ class Stage:
     # returns what else the result depends on, by name, such as digests of files and versions of other programs
     depends_on: Callable[[Config], Mapping[str, Any]] = nothing_else
     checks: Callable[[Config], object] = nothing  # raises ConfigError for a config with which no command should run
+    # "module:name" of the `Offer` of the stage's command; empty for the usual one, which works on a run
+    adds_command: str = ""
     needed_by: tuple[str, ...] = ()  # stages of `DRAWINGS` that need this one's result
     shown_by: tuple[str, ...] = ()  # those that show it if it is current
 

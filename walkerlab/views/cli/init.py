@@ -3,6 +3,7 @@
 import json
 import shlex
 from pathlib import Path
+from typing import Final
 
 from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load, safe_name
@@ -16,8 +17,26 @@ from walkerlab.pipeline.store.files import make_folder, write_atomically
 SCHEMA = ".walkerlab-schema.json"
 
 
-def write_config(file: Path, walker: str) -> str:
-    """Write a walker's commented config and schema.
+CHECK_TO_FILL_IN: Final = """
+check:                               # a printed gait; `walkerlab check` says whether it is right, and if not, why
+  source: {title: null, authors: null, year: null, where: null}
+  angles:
+    from: vertical                   # or slope-normal
+    second: absolute                 # or relative: swing leg minus stance leg
+    unit: rad                        # or deg
+    order: [swing, stance]           # as the source lists them
+    layout: angles-first             # or interleaved: angle, rate, angle, rate
+  instant: after-strike              # or before-strike, mid-stance
+  printed:                           # as printed, because its digits count; null for what is not printed
+    state: null                      # [angle, angle, rate, rate], such as [-0.2042, 0.1694, -0.6058, -0.8610]
+    period_s: null
+    step_length_m: null
+    multipliers: null                # such as [0.62, -0.19+0.56i]
+"""
+
+
+def write_config(file: Path, walker: str, checks: bool = False) -> str:
+    """Write a walker's commented config and schema; `checks` adds a block `check` to fill in.
 
     Raises ConfigError for an unknown type, StorageError if writing fails.
     """
@@ -28,6 +47,9 @@ def write_config(file: Path, walker: str) -> str:
     untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
     renamed = config.model_copy(update={"name": safe_name(file.stem), "source": None})
     text = f"# yaml-language-server: $schema={SCHEMA}\n{to_commented_yaml(renamed, untouched)}"
+    text += CHECK_TO_FILL_IN if checks else ""
+    command = f"`walkerlab {'check' if checks else 'report -c'} {shlex.quote(str(file))}`"
+    following = f"fill in what is printed, then {command}" if checks else command
     try:
         make_folder(file.parent)
         write_atomically(file.parent / SCHEMA, json.dumps(as_json_schema(), indent=1).encode() + b"\n")
@@ -37,7 +59,7 @@ def write_config(file: Path, walker: str) -> str:
         raise StorageError(
             f"{file} could not be written: {reason}.", "Choose a file in a writable folder with free space."
         ) from error
-    return f"wrote {file}, with its schema next to it; next: `walkerlab report -c {shlex.quote(str(file))}`"
+    return f"wrote {file}, with its schema next to it; next: {following}"
 
 
 def template(walker: str) -> str:

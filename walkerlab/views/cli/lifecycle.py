@@ -40,11 +40,12 @@ def init(
     walker: Annotated[
         str, typer.Option("--type", metavar="TYPE", help="Type of walker, or name of a built-in config.")
     ] = "compass",
+    checks: Annotated[bool, typer.Option("--check", help="Add a printed gait to fill in for `check`.")] = False,
 ) -> None:
     """Write a commented config to start from, and a schema for checks in editors."""
     from walkerlab.views.cli.init import write_config
 
-    message = write_config(file or Path(f"my-{walker}.yaml"), walker)
+    message = write_config(file or Path(f"my-{walker}.yaml"), walker, checks)
     if not request.quiet:
         print(message)
 

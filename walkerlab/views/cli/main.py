@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 import walkerlab
+from walkerlab.extensions import load
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import STRIDES, Stage
 from walkerlab.pipeline.run.workers import ONE_THREAD
@@ -57,7 +58,7 @@ GROUPS = {
     "Walk": ("simulate", "contact-sim", "animate", "plot", "export"),
     "Explore families of gaits": ("continuation", "sweep", "basin", "robustness", "design"),
     "Measure and compare": (
-        "compare", "diff", "recorded-walk", "identify", "plan", "tune", "engines", "accuracy", "stability",
+        "check", "compare", "diff", "recorded-walk", "identify", "plan", "tune", "engines", "accuracy", "stability",
         "stability-maps", "known-problems",
     ),
     "Keep house": ("status", "show", "schema", "extensions", "rerun", "compile", "clean"),
@@ -92,7 +93,10 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
     )
     app.callback(invoke_without_command=True)(options_of_the_program)
     for stage in graph.stages:
-        add_stage(app, stage, graph)
+        if stage.adds_command:
+            add_command(app, graph, load(stage.adds_command))
+        else:
+            add_stage(app, stage, graph)
     for module in (housekeeping, lifecycle, sweep, whole_runs):
         for offer in module.COMMANDS:
             add_command(app, graph, offer)

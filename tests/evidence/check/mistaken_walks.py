@@ -1,0 +1,257 @@
+"""Gaits of straight-legged walkers with planted mistakes, by an integration of their own.
+
+It shares nothing with the code that judges: the equations are Lagrange's, written out by hand for a walker with round
+feet, and the heel strike balances the momenta of three bodies with vectors.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from walkerlab.config.overlay import tree_of
+from walkerlab.config.tree import NOWHERE
+from walkerlab.config.validation import validate_tree
+from walkerlab.evidence.check.answer import check_gait
+from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.scene.rigid import rigid_walker
+
+UNITS = np.eye(4)
+MISTAKES = {
+    "swing leg's squared rate in the equation of the stance leg": {"stance_sign": -1.0},
+    "stance leg's squared rate in the equation of the swing leg": {"swing_sign": -1.0},
+    "also subtracts I times the rate between the legs": {"extra": (1.0, -1.0)},
+    "also subtracts I times the trailing leg's rate": {"extra": (1.0, 0.0)},
+    "trailing leg keeps its rate": {"keeps_rate": True},
+    "leaves out the foot's rolling": {"strike_radius": 0.0},
+    "inertia is left out of the strike": {"strike_inertia": 0.0},
+    "the legs' inertia is left out": {"inertia": 0.0},
+    "hip's mass counts once for each leg": {"hip": 2.0},
+    "is within 0.001 rad of a touch": {"window": 1e-3},
+    "Euler's method with a step of 0.002 s": {"euler": 2e-3},
+}
+"""Planted mistakes, by words of the sentence that must name them; the hip's is a factor."""
+UNLISTED = {"leak": 0.02, "drag": 0.01}
+"""Mistakes that no list has."""
+
+
+@dataclass(frozen=True)
+class Legs:
+    """A walker with straight legs on a slope, SI units; angles are from the slope's normal, counter-clockwise."""
+
+    length: float
+    mass: float
+    below: float  # centre of mass below the hip
+    inertia: float
+    hip: float
+    radius: float
+    gravity: float
+    slope: float
+    # mistakes
+    stance_sign: float = 1.0  # of the swing leg's centripetal term in the equation of the stance leg
+    swing_sign: float = 1.0  # of the stance leg's in that of the swing leg
+    extra: tuple = (0.0, 0.0)  # weights of I times trailing and leading rate, subtracted about the hip
+    keeps_rate: bool = False
+    strike_radius: float | None = None  # of the foot in the strike only
+    strike_inertia: float | None = None
+    window: float = 0.0
+    euler: float = 0.0
+    leak: float = 0.0  # a mistake that no list has: part of the hip's momentum lost in each strike
+    drag: float = 0.0  # another one: torque on the swing leg in proportion to its rate
+
+
+def rates(legs, state):
+    """Derivative of (swing, stance, their rates), from Lagrange's function written out by hand."""
+    a, b, da, db = state
+    m, M, c, I, R, g = legs.mass, legs.hip, legs.below, legs.inertia, legs.radius, legs.gravity
+    d = legs.length - R  # from the foot's centre to the hip
+    e = d - c  # from the foot's centre to the stance leg's mass
+    # kinetic energy: hip and stance leg turn about the rolling contact, v^2 = w^2 (R^2 + h^2 + 2 R h cos b)
+    hips, own = M + m, m
+    A_bb = hips * (R * R + d * d + 2 * R * d * math.cos(b)) + own * (R * R + e * e + 2 * R * e * math.cos(b)) + I
+    half_slope = -(hips * R * d + own * R * e) * math.sin(b)  # half of dA_bb/db
+    A_ab = -m * c * (d * math.cos(a - b) + R * math.cos(a))
+    A_aa = m * c * c + I
+    # Christoffel terms
+    by_b = m * c * d * math.sin(a - b)  # dA_ab/db is -m c d sin(a - b)
+    by_a = m * c * (d * math.sin(a - b) + R * math.sin(a))  # dA_ab/da
+    force_b = -legs.stance_sign * by_a * da * da - half_slope * db * db
+    force_a = legs.swing_sign * by_b * db * db
+    tilt = legs.slope
+    force_b += hips * g * (d * math.sin(b - tilt) - R * math.sin(tilt))
+    force_b += own * g * (e * math.sin(b - tilt) - R * math.sin(tilt))
+    force_a += -m * g * c * math.sin(a - tilt) - legs.drag * da
+    det = A_aa * A_bb - A_ab * A_ab
+    return np.array([da, db, (A_bb * force_a - A_ab * force_b) / det, (A_aa * force_b - A_ab * force_a) / det])
+
+
+def cross(u, v):
+    return u[0] * v[1] - u[1] * v[0]
+
+
+def strike(legs, before):
+    """State after a heel strike: both bodies' momenta change by impulses at the new contact point and at the hip."""
+    a, b, da, db = before  # swing leg, which lands, and stance leg, which trails
+    m, M, c = legs.mass, legs.hip, legs.below
+    I = legs.inertia if legs.strike_inertia is None else legs.strike_inertia
+    R = legs.radius if legs.strike_radius is None else legs.strike_radius
+    d = legs.length - legs.radius if legs.strike_radius is None else legs.length - R
+
+    def up(angle):
+        return np.array([-math.sin(angle), math.cos(angle)])
+
+    def turn(rate, arm):
+        return rate * np.array([-arm[1], arm[0]])
+
+    # velocities before, about the trailing contact point, which rolls
+    normal = np.array([0.0, 1.0])
+    r = legs.length - legs.radius
+    hip_before = turn(db, legs.radius * normal + r * up(b))
+    trailing_before = turn(db, legs.radius * normal + (r - c) * up(b))
+    landing_before = hip_before + turn(da, -c * up(a))
+    to_hip = R * normal + d * up(a)
+    landing, trailing, hip = to_hip - c * up(a), to_hip - c * up(b), to_hip
+
+    def momenta(w_lead, w_trail, spins):
+        v_hip = turn(w_lead, to_hip)
+        v_lead = turn(w_lead, landing)
+        v_trail = v_hip + turn(w_trail, -c * up(b))
+        whole = m * cross(landing, v_lead) + m * cross(trailing, v_trail) + M * cross(hip, v_hip)
+        about_hip = m * cross(trailing - hip, v_trail)
+        return np.array([whole + I * (spins * w_lead + spins * w_trail), about_hip + I * spins * w_trail])
+
+    columns = np.array([momenta(1.0, 0.0, 1.0), momenta(0.0, 1.0, 1.0)]).T
+    whole = m * cross(landing, landing_before) + m * cross(trailing, trailing_before)
+    whole += M * cross(hip, hip_before) * (1.0 - legs.leak) + I * (da + db)
+    about_hip = m * cross(trailing - hip, trailing_before) + I * db
+    about_hip -= legs.inertia * (legs.extra[0] * db + legs.extra[1] * da)
+    if legs.keeps_rate:
+        columns[1], about_hip = [0.0, 1.0], db
+    lead, trail = np.linalg.solve(columns, [whole, about_hip])
+    return np.array([b, a, trail, lead])
+
+
+def step(legs, start):
+    """State just after the next heel strike, and the period."""
+
+    def touch(_t, state):
+        return state[0] + state[1] - legs.window
+
+    limit = 12.0 * math.sqrt(legs.length / legs.gravity)
+    if legs.euler:
+        state, before = np.array(start), touch(0.0, start)
+        for count in range(int(limit / legs.euler)):
+            old, state = state, state + legs.euler * rates(legs, state)
+            now = touch(0.0, state)
+            if before > 0.0 >= now and state[0] > state[1]:
+                share = before / (before - now)
+                return strike(legs, old + share * (state - old)), legs.euler * (count + share)
+            before = now
+        raise ValueError("no heel strike")
+    touch.direction = -1
+    course = solve_ivp(
+        lambda _t, state: rates(legs, state), (0.0, limit), start, method="DOP853", rtol=1e-12, atol=1e-14,
+        events=touch, max_step=limit / 50,
+    )  # fmt: skip
+    for time, state in zip(course.t_events[0], course.y_events[0], strict=True):
+        if state[0] > state[1] and time > 0.0:
+            return strike(legs, state), float(time)
+    raise ValueError("no heel strike")
+
+
+def gait(legs, guess):
+    """State just after the heel strike of the gait near a guess, and its period; None if there is none."""
+    state = np.array(guess)
+    for _ in range(12):
+        try:
+            error = step(legs, state)[0] - state
+            if np.abs(error).max() < 1e-12:
+                return state, step(legs, state)[1]
+            columns = [
+                (step(legs, state + 1e-6 * unit)[0] - step(legs, state - 1e-6 * unit)[0]) / 2e-6 for unit in UNITS
+            ]
+        except ValueError:
+            return None
+        move = np.linalg.solve(np.array(columns).T - np.eye(4), error)
+        state = state - move * min(1.0, 0.05 / np.abs(move).max())
+    return None
+
+
+def gait_with(legs, start, mistake, parts=4):
+    """Gait with a mistake, followed from the right one as the walker's numbers change in parts; None if it is lost."""
+    found = start, 0.0
+    sized = {name: value for name, value in mistake.items() if name in ("hip", "inertia", "strike_inertia")}
+    for part in range(1, parts + 1) if sized else (1,):
+        share = part / parts if sized else 1.0
+        begin = {"hip": legs.hip, "inertia": legs.inertia, "strike_inertia": legs.inertia}
+        between = {name: begin[name] + share * (value - begin[name]) for name, value in sized.items()}
+        found = gait(replace(legs, **{**mistake, **between}), found[0])
+        if found is None:
+            return None
+    return found
+
+
+def random_legs(generator):
+    """A walker with round feet and inertia that has a gait, more often than not."""
+    return Legs(
+        length=1.0,
+        mass=float(np.round(generator.uniform(0.3, 1.0), 2)),
+        below=float(np.round(generator.uniform(0.35, 0.6), 2)),
+        inertia=float(np.round(generator.uniform(0.01, 0.04), 3)),
+        hip=float(np.round(generator.uniform(0.5, 2.0), 2)),
+        radius=float(np.round(generator.uniform(0.1, 0.3), 2)),
+        gravity=9.81,
+        slope=float(np.round(generator.uniform(0.01, 0.03), 3)),
+    )
+
+
+def config_of(legs):
+    """Config of the right walker, as keys."""
+    return {
+        "walker": {
+            "type": "straight-legs",
+            "leg_length_m": legs.length,
+            "leg_mass_kg": legs.mass,
+            "leg_mass_below_hip_m": legs.below,
+            "leg_inertia_kg_m2": legs.inertia,
+            "hip_mass_kg": legs.hip,
+            "foot_radius_m": legs.radius,
+        },
+        "gravity_m_s2": legs.gravity,
+        "slope_rad": legs.slope,
+    }
+
+
+def printed(numbers, digits):
+    """Numbers rounded to significant digits, as texts."""
+    return [f"{number:.{digits - 1 - math.floor(math.log10(abs(number)))}f}" for number in numbers]
+
+
+def right_gait(legs):
+    """State of the right gait that the package chooses, and its whole config; None if the walker has none."""
+    config = checked_config(legs, None)
+    chosen = find_gaits(rigid_walker(config), 0).gait
+    return (
+        None if chosen is None else np.array([*(angle + legs.slope for angle in chosen.state[:2]), *chosen.state[2:]])
+    )
+
+
+def checked_config(legs, check):
+    block = {} if check is None else {"check": {"angles": {"from": "slope-normal"}, "printed": check}}
+    return validate_tree(tree_of({**config_of(legs), "contact": None, **block}, NOWHERE))
+
+
+def answer_to(legs, state, period, digits):
+    """Answer of the check to a gait of which state and period are printed to some digits."""
+    return check_gait(checked_config(legs, {"state": printed(state, digits), "period_s": printed([period], digits)[0]}))
+
+
+def walkers(seed):
+    """Random walkers that have a gait, with its state."""
+    generator = np.random.default_rng(seed)
+    while True:
+        legs = random_legs(generator)
+        state = right_gait(legs)
+        if state is not None:
+            yield legs, state

@@ -1,0 +1,165 @@
+"""The check block: a gait as printed, with its digits and its conventions."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, create_model, field_validator
+
+from walkerlab.config.fields import Block, Text, key, meaning_error
+
+Body = Literal["swing", "stance", "shank"]
+Instant = Literal["after-strike", "before-strike", "mid-stance"]
+MAX_PRINTED = 64  # characters of a value
+_NUMBER: Final = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
+_SIGNED: Final = rf"[-+]?{_NUMBER}"
+_WORDS: Final = {"zero": "0", "one": "1", "two": "2", "half": "0.5"}
+FORMS: Final = "a number such as 0.1895, 0.62+0.1i, < 1, 0.51 ± 0.02 or 0.4 to 0.6"
+
+
+@dataclass(frozen=True)
+class Digits:
+    """A number as printed: its value, the unit of its last digit, and its significant digits."""
+
+    value: float
+    unit: float
+    count: int
+
+
+@dataclass(frozen=True)
+class PrintedValue:
+    """A printed value: one number, two for a complex one, or bounds."""
+
+    text: str
+    real: Digits
+    imaginary: Digits | None = None
+    bounds: tuple[float, float] | None = None  # of a range, of a value with an uncertainty, or of 'less than'
+    both_signs: bool = False  # whether the imaginary part has both signs
+
+    @property
+    def value(self) -> complex:
+        return complex(self.real.value, 0.0 if self.imaginary is None else self.imaginary.value)
+
+
+def digits_of(text: str) -> Digits:
+    """Read a number with its digits, such as '-.50' (2 digits, unit 0.01)."""
+    mantissa, _, exponent = text.lstrip("+-").partition("e")
+    scale = int(exponent or 0) - len(mantissa.partition(".")[2])
+    figures = mantissa.replace(".", "").lstrip("0")
+    return Digits(float(text), 10.0**scale, max(len(figures), 1))
+
+
+def parse_printed(text: str) -> PrintedValue | None:
+    """Read a printed value; None if it has none of the allowed forms."""
+    plain = text.strip().lower().replace("−", "-").replace("–", "-").replace("\xa0", " ")
+    plain = re.sub(r"\s*[×x·*]\s*10\s*\^?\s*\{?([-+]?\d+)\}?", r"e\1", plain).replace("+/-", "±").replace("+-", "±")
+    plain = re.sub(r"\b(zero|one|two|half)\b", lambda match: _WORDS[match[1]], plain)
+    if re.fullmatch(_SIGNED, plain):
+        return PrintedValue(text, digits_of(plain))
+    compact = plain.replace(" ", "")
+    if match := re.fullmatch(rf"({_SIGNED})([-+±])({_NUMBER})[ij]", compact):
+        sign = "-" if match[2] == "-" else ""
+        return PrintedValue(text, digits_of(match[1]), digits_of(sign + match[3]), both_signs=match[2] == "±")
+    if match := re.fullmatch(rf"([-+±]?)({_NUMBER})[ij]", compact):
+        sign = "-" if match[1] == "-" else ""
+        return PrintedValue(text, Digits(0.0, digits_of(match[2]).unit, 1), digits_of(sign + match[2]))
+    if match := re.fullmatch(rf"({_SIGNED})±({_NUMBER})", compact):
+        value, error = digits_of(match[1]), float(match[2])
+        return PrintedValue(text, value, bounds=(value.value - error, value.value + error))
+    between = rf"(?:between|from)?({_SIGNED})(?:to|and|\.\.)({_SIGNED})"
+    if match := re.fullmatch(between, compact) or re.fullmatch(rf"\[({_SIGNED}),({_SIGNED})\]", compact):
+        low, high = sorted((float(match[1]), float(match[2])))
+        return PrintedValue(text, digits_of(match[1]), bounds=(low, high))
+    if match := re.fullmatch(rf"(<=?|≤|lessthan|below|atmost|upto)({_SIGNED})", compact):
+        return PrintedValue(text, digits_of(match[2]), bounds=(float("-inf"), float(match[2])))
+    if match := re.fullmatch(rf"(>=?|≥|morethan|above|atleast)({_SIGNED})", compact):
+        return PrintedValue(text, digits_of(match[2]), bounds=(float(match[2]), float("inf")))
+    return None
+
+
+def readable(text: str) -> str:
+    """Validate a printed value."""
+    if len(text) > MAX_PRINTED or parse_printed(text) is None:
+        comma = " (decimals follow a point)" if re.search(r"\d,\d", text) else ""
+        raise meaning_error(f"is not a printed value{comma}: give {FORMS}, without its unit")
+    return text
+
+
+Printed = Annotated[Text, AfterValidator(readable)]
+
+
+class CheckSource(Block):
+    """Publication of a printed gait."""
+
+    title: Text | None = key(None, "", "title of the paper, thesis or program", bounds="any text")
+    authors: Text | None = key(None, "", "its authors", bounds="any text")
+    year: int | Text | None = key(None, "", "year of its publication", bounds="a year")
+    where: Text | None = key(None, "", "table, equation or line", bounds="any text")
+
+
+_FROM: Any = key("vertical", "", "line from which the first angle is measured")
+if TYPE_CHECKING:
+
+    class _From(Block):
+        """Key `from`."""
+
+else:
+    # `from` is a keyword of Python, so a class body cannot declare it
+    _From = create_model("_From", __base__=Block, **{"from": (Literal["vertical", "slope-normal"], _FROM)})
+
+
+class PrintedAngles(_From):
+    """Conventions of the printed angles and rates."""
+
+    second: Literal["absolute", "relative", "stance-minus-swing"] = key(
+        "absolute",
+        "",
+        "angle of the second leg: like the first one, or relative: swing leg minus stance leg (a shank's: minus its "
+        "thigh's); stance-minus-swing is the opposite",
+    )
+    unit: Literal["rad", "deg"] = key("rad", "", "unit of the angles, and of the rates per second")
+    positive: Literal["counter-clockwise", "clockwise"] = key(
+        "counter-clockwise", "", "direction of positive angles, for a walker that walks to the right"
+    )
+    order: tuple[Body, ...] | None = key(
+        None,
+        "",
+        "bodies in the order of their angles",
+        bounds="a list of swing, stance, shank, each at most once",
+        default_in_words="[stance] for 2 values, [swing, stance] for 4, [swing, stance, shank] for 6",
+        sequence=True,
+    )
+    layout: Literal["angles-first", "interleaved"] = key(
+        "angles-first", "", "all angles, then all rates; or interleaved: angle, rate, angle, rate"
+    )
+
+    @field_validator("order")
+    @classmethod
+    def _once(cls, value: tuple[Body, ...] | None) -> tuple[Body, ...] | None:
+        if value is not None and (len(set(value)) < len(value) or not value):
+            raise meaning_error("must name each body once")
+        return value
+
+    @property
+    def origin(self) -> str:
+        """Line from which the first angle is measured."""
+        return str(getattr(self, "from"))  # the key is declared above, where the type checker cannot see it
+
+
+class Check(Block):
+    """A printed gait for `walkerlab check`; digits count as they are typed."""
+
+    source: CheckSource = CheckSource()
+    angles: PrintedAngles = PrintedAngles()
+    instant: Instant = key("after-strike", "", "instant of the printed state")
+    state_before: tuple[Printed, ...] | None = key(
+        None, "", "state just before the heel strike that `state` follows", bounds="a list of numbers", sequence=True
+    )
+    printed: dict[Text, Printed | list[Printed] | None] = key(
+        dict,
+        "",
+        "printed values by name: state, multipliers, or a value of fixedpoint or simulate, such as period_s",
+        bounds=f"{FORMS}, or a list of them, for each name",
+    )

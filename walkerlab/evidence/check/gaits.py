@@ -1,0 +1,118 @@
+"""Plain walkers of configs, and their gaits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from walkerlab.config.reads import RigidConfig
+from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
+from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, Part, PlainWalker, Step
+
+DIFFERENCE = 1e-6  # rad, and rad/s times sqrt(L/g)
+MAX_MOVES, SMALLEST_MOVE = 16, 1e-13
+ROUNDED = 1e-11  # residual that rounding may leave
+SLOW = 0.1  # ratio of two errors above which the derivative is computed anew
+
+
+def why_not_plain(config: RigidConfig) -> str:
+    """Explain why the plain model does not describe a config's walker; empty if it does."""
+    if getattr(config.walker, "leg_2", None) is not None:
+        return "the plain model has two equal legs"
+    if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
+        return "the plain model has no walkers of type parts"
+    return ""
+
+
+def plain_walker(config: RigidConfig) -> PlainWalker:
+    """Build the plain model of a config's walker."""
+    walker = config.walker
+    assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
+    radius, ahead, knee, free = walker.foot_radius_m, getattr(walker, "foot_centre_ahead_m", 0.0), 0j, False
+    if isinstance(walker, CompassWalker):
+        # the compass rolls on its ball feet in the contact model only
+        radius, centre = 0.0, -1j * walker.mass_to_hip_m
+        parts: tuple[Part, ...] = (Part(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
+    elif isinstance(walker, StraightLegs):
+        centre = walker.leg_mass_ahead_m - 1j * walker.leg_mass_below_hip_m
+        parts = (Part(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
+    else:
+        thigh, shank, knee = walker.thigh, walker.shank, -1j * walker.thigh.length_m
+        upper = Part(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
+        lower = Part(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
+        parts, free = (upper, lower), walker.knee.at_heel_strike == "free"
+    torso = walker.torso
+    return PlainWalker(
+        parts=parts,
+        knee=knee,
+        hip_mass=walker.hip_mass_kg,
+        foot=ahead - 1j * (walker.leg_length_m - radius),
+        radius=radius,
+        gravity=config.gravity_m_s2,
+        slope=config.slope_rad,
+        torso=None if torso is None else Part(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
+        hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
+        push_off=config.push_off.impulse_N_s,
+        free_at_strike=free,
+        signs={(STRAIGHT, STANCE, SWING): -1.0} if config.equations == "as-printed" else {},
+    )
+
+
+def scales(walker: PlainWalker, size: int) -> Floats:
+    """Return the units (size,) of coordinates just after a heel strike: 1 for angles, sqrt(g/L) for rates."""
+    return np.array([1.0, 1.0, *[1.0 / walker.pendulum_time] * (size - 2)])
+
+
+def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
+    """Return the derivative of the step map at a start by central differences; None where a step fails."""
+    columns, moves = [], DIFFERENCE * scales(walker, len(start))
+    for k, move in enumerate(moves):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = start.copy()
+            moved[k] += sign * move
+            ends.append(walker.step(moved, tolerance))
+        if ends[0] is None or ends[1] is None:
+            return None
+        columns.append((ends[0].after - ends[1].after) / (2.0 * move))
+    return np.array(columns).T
+
+
+def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, Step] | None:
+    """Return start and step of the gait near a start, by Newton's method; None if there is none.
+
+    A  derivative of a similar walker's step map, to begin with
+    """
+    unit, identity = scales(walker, len(start)), np.eye(len(start))
+    x, last, is_own = np.array(start, float), math.inf, False  # whether A is this walker's own derivative
+    old = error = x
+    move = np.zeros(len(x))
+    for _ in range(MAX_MOVES):
+        step = walker.step(x)
+        size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
+        if step is not None and size < SMALLEST_MOVE:
+            break
+        if step is not None and size < last:
+            slow = size > SLOW * last
+            last, old, error = size, x, step.after - x
+        elif last == math.inf:
+            return None
+        elif last < ROUNDED:
+            step = walker.step(old)
+            return None if step is None else (old, step)
+        else:
+            slow = not is_own
+            move = 0.5 * move
+            x = old - move
+            if not slow:
+                continue
+        if A is None or slow:
+            A, is_own = derivative(walker, old, 1e-10), True
+            if A is None:
+                return None
+        move = np.linalg.solve(A - identity, error)
+        x = old - move
+    else:
+        return None
+    return x, step

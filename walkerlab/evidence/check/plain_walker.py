@@ -1,0 +1,419 @@
+"""A plain model of a walker, the second route to its gaits, in which known mistakes can be switched on.
+
+It shares no equations with the compiled model. Lagrange's equations follow from the point masses of the walker's parts,
+whose velocities are linear in the rates of its bodies; heel and knee strikes are balances of angular momentum. All
+positions are complex numbers in the slope's frame, real along the slope and imaginary along its normal, and angles are
+measured from the normal, counter-clockwise.
+
+State of a walker: angles, then rates, of the swing leg (its thigh), the stance leg and, while its knee is free, the
+swing shank. A torso on the legs' bisector follows them.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DOP853
+from scipy.optimize import brentq
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Event = Callable[[Floats], float]
+SWING, STANCE, SHANK = 0, 1, 2
+EXACT, QUICK = 1e-12, 1e-9  # relative tolerances of gaits and of first looks
+LONGEST_SWING = 12.0  # sqrt(L/g)
+MAX_EULER_STEPS = 400_000
+LARGEST_STEP = 0.1  # sqrt(L/g)
+LOCATING_ROUNDS, TINY = 2, 1e-7  # s
+STRAIGHT, BENT = "straight", "bent"
+"""Phases of a swing: with a straight leg, and with a free knee."""
+
+
+class Part(NamedTuple):
+    """A rigid part of a leg, seen from its upper hinge, with the part upright."""
+
+    mass: float  # kg
+    centre: complex  # m, centre of mass
+    inertia: float  # kg m^2, about the centre of mass
+
+
+@dataclass(frozen=True)
+class PlainWalker:
+    """A walker on its slope, with the mistakes that its equations contain; SI units."""
+
+    parts: tuple[Part, ...]  # of one leg: the whole leg, or thigh and shank
+    knee: complex  # m, from hip to knee; 0 for straight legs
+    hip_mass: float
+    foot: complex  # m, from hip to the centre of the foot's arc, leg upright
+    radius: float
+    gravity: float
+    slope: float
+    torso: Part | None = None  # seen from the hip
+    hip: tuple[float, float, float] = (0.0, 0.0, 0.0)  # spring, damper and torque between the legs
+    push_off: float = 0.0  # N s
+    free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
+    # mistakes
+    signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors on velocity terms, by phase
+    keeps_trailing_rate: bool = False
+    extra_inertia: tuple[float, float] = (0.0, 0.0)  # weights of trailing and leading rate in an extra term I * rate
+    strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
+    turned_on_it: bool = False  # whether the trailing leg turned on the same point of its own before
+    strike_inertia: float = 1.0  # factor on the inertia of legs in the strike
+    window: float = 0.0  # rad, by which a touch is accepted early
+    euler_step: float = 0.0  # s, step of Euler's method; 0 for exact integration
+    interpolates: bool = True  # whether Euler's method finds the strike between two steps
+    evens_angles: bool = False  # whether a touch within the window puts both feet on the slope
+
+    @property
+    def kneed(self) -> bool:
+        return len(self.parts) > 1
+
+    @property
+    def leg_length(self) -> float:
+        return self.radius - self.foot.imag
+
+    @property
+    def lean(self) -> float:
+        """Angle (rad) from an upright leg to the line from its foot's centre to the hip."""
+        return cmath.phase(-self.foot) - 0.5 * math.pi
+
+    @property
+    def pendulum_time(self) -> float:
+        return math.sqrt(self.leg_length / self.gravity)
+
+    @property
+    def leg_inertia(self) -> float:
+        return sum(part.inertia for part in self.parts)
+
+    @cached_property
+    def bodies(self) -> int:
+        """Number of bodies that turn on their own or follow others: swing leg, stance leg, shank, torso."""
+        return 2 + int(self.kneed) + int(self.torso is not None)
+
+    def reduction(self, phase: str) -> Floats:
+        """Return the matrix (bodies, coordinates) from the rates of the coordinates to those of all bodies."""
+        independent = 3 if self.kneed and phase == BENT else 2
+        Z = np.zeros((self.bodies, independent))
+        Z[:2, :2] = np.eye(2)
+        if self.kneed:
+            Z[SHANK, SHANK if independent == 3 else SWING] = 1.0
+        if self.torso is not None:
+            Z[-1, :2] = 0.5
+        return Z
+
+    @cached_property
+    def masses(self) -> Floats:
+        """Point masses: those of the swing leg, of the stance leg, of the hip and of the torso."""
+        leg = [part.mass for part in self.parts]
+        return np.array([*leg, *leg, self.hip_mass, *([] if self.torso is None else [self.torso.mass])])
+
+    @cached_property
+    def inertias(self) -> Floats:
+        """Inertias of all bodies."""
+        leg = [part.inertia for part in self.parts]
+        return np.array([leg[0], sum(leg), *leg[1:], *([] if self.torso is None else [self.torso.inertia])])
+
+    def levers(self, foot: complex) -> Complex:
+        """Return the levers (masses, bodies): position of each mass as a sum over bodies of lever times exp(i psi)."""
+        n = len(self.parts)
+        levers = np.zeros((len(self.masses), self.bodies), complex)
+        levers[:, STANCE] = -foot
+        upper = 0j
+        for place, part in enumerate(self.parts):
+            levers[n + place, STANCE] += upper + part.centre
+            body = SHANK if place else SWING
+            levers[place, body] = part.centre
+            if place:
+                levers[place, SWING] = upper
+            upper += self.knee
+        if self.torso is not None:
+            levers[-1, -1] = self.torso.centre
+        return levers
+
+    @cached_property
+    def _levers(self) -> Complex:
+        return self.levers(self.foot)
+
+    @cached_property
+    def phases(self) -> dict[str, Phase]:
+        """Sums over the point masses, from which the equations of motion are made, by phase."""
+        return {phase: self.sums(phase) for phase in (STRAIGHT, BENT)}
+
+    def sums(self, phase: str) -> Phase:
+        levers, inertias = self._levers, self.inertias
+        moments = (levers.conj().T * self.masses) @ levers
+        signs = [[self.signs.get((phase, k, l), 1.0) for l in range(self.bodies)] for k in range(self.bodies)]
+        first = self.masses @ levers
+        return Phase(self.reduction(phase), moments.tolist(), first.tolist(), inertias.tolist(), signs)
+
+    def motions(self, angles: Floats, levers: Complex, radius: float) -> Complex:
+        """Return the velocities (masses, bodies) of all masses per unit rate of each body; the foot rolls."""
+        D: Complex = 1j * levers * np.exp(1j * angles)
+        D[:, STANCE] -= radius
+        return D
+
+    def rates(self, phase: str, state: Floats) -> Floats:
+        """Return the derivative of a state by Lagrange's equations."""
+        sums = self.phases[phase]
+        Z, R = sums.reduction, self.radius
+        n, bodies = Z.shape[1], range(self.bodies)
+        angles, omega = (Z @ state[:n]).tolist(), (Z @ state[n:]).tolist()
+        turns = [cmath.exp(1j * angle) for angle in angles]
+        # velocity of all masses per unit rate: i lever turn, and -R for the stance leg, on which the foot rolls
+        M, forces = [[0.0] * self.bodies for _ in bodies], [0.0] * self.bodies
+        for k in bodies:
+            back = turns[k].conjugate()
+            for l in bodies:
+                pull = sums.moments[k][l] * back * turns[l]
+                M[k][l] += pull.real
+                # D^H m times the centripetal acceleration -lever turn omega^2
+                forces[k] -= sums.signs[k][l] * (1j * pull).real * omega[l] ** 2
+            along = (1j * sums.first[k] * turns[k]).real
+            M[k][STANCE] -= R * along
+            M[STANCE][k] -= R * along
+            forces[STANCE] -= sums.signs[STANCE][k] * R * (sums.first[k] * turns[k]).real * omega[k] ** 2
+            forces[k] += ((1j * sums.first[k] * turns[k]).conjugate() * self.down).real
+            M[k][k] += sums.inertias[k]
+        M[STANCE][STANCE] += R * R * self.mass
+        forces[STANCE] -= R * self.mass * self.down.real
+        spring, damper, torque = self.hip
+        twist = torque - spring * (angles[SWING] - angles[STANCE]) - damper * (omega[SWING] - omega[STANCE])
+        forces[SWING] += twist
+        forces[STANCE] -= twist
+        if n < self.bodies:
+            M, forces = (Z.T @ M @ Z).tolist(), (Z.T @ forces).tolist()
+        return np.array([*state[n:].tolist(), *eliminate(M, forces)])
+
+    @cached_property
+    def mass(self) -> float:
+        return float(self.masses.sum())
+
+    @cached_property
+    def down(self) -> complex:
+        """Gravity (m/s^2) in the slope's frame."""
+        return -1j * self.gravity * cmath.exp(1j * self.slope)
+
+    def swing_foot(self, state: Floats) -> complex:
+        """Return the position of the swing foot's centre relative to that of the stance foot, swing leg straight."""
+        return complex(self.foot * (cmath.exp(1j * state[SWING]) - cmath.exp(1j * state[STANCE])))
+
+    def feet_apart(self, state: Floats) -> float:
+        """Return the sum (rad) of both legs' angles, hip to foot; it falls to the window, usually 0, at a touch."""
+        return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
+
+    def knee_bend(self, state: Floats) -> float:
+        """Return the angle (rad) by which the shank is behind its thigh; it falls to 0 as the knee locks."""
+        return float(state[SWING] - state[SHANK])
+
+    def energy(self, phase: str, state: Floats) -> float:
+        """Return kinetic plus potential energy (J); heights are from where an upright stance leg touches the slope."""
+        Z = self.reduction(phase)
+        n = Z.shape[1]
+        angles, omega = Z @ state[:n], Z @ state[n:]
+        velocities = self.motions(angles, self._levers, self.radius) @ omega
+        rolled = 1j * self.radius - self.radius * angles[STANCE]
+        places = self._levers @ np.exp(1j * angles) + rolled
+        kinetic = 0.5 * (self.masses @ np.abs(velocities) ** 2 + self.inertias @ omega**2)
+        return float(kinetic - self.masses @ (places * np.conj(self.down)).real)
+
+    def balances(self) -> tuple[str, ...]:
+        """Return the points about which angular momentum is conserved in a heel strike, in words."""
+        names = ("the whole walker about the new foot", "the trailing leg about the hip")
+        return (*names, "the trailing shank about its knee") if self.kneed and self.free_at_strike else names
+
+    def strike_balances(self, before: Floats) -> tuple[Floats, Floats]:
+        """Return matrix and right-hand side of the balances that give the rates just after a heel strike.
+
+        before  state just before it, swing leg straight
+        """
+        phase = BENT if self.free_at_strike else STRAIGHT
+        Z, legs = self.reduction(phase), len(self.parts)
+        Z_before = self.reduction(STRAIGHT)
+        old_angles, old = Z_before @ before[:2], Z_before @ before[2:4]
+        foot, radius = (self.foot, self.radius) if self.strike_foot is None else (self.strike_foot, 0.0)
+        pivot = (foot, radius) if self.turned_on_it else (self.foot, self.radius)
+        velocities = self.motions(old_angles, self.levers(pivot[0]), pivot[1]) @ old
+        order = [*range(legs, 2 * legs), *range(legs), *range(2 * legs, len(velocities))]
+        bodies = [STANCE, SWING, *([STANCE] if self.kneed else []), *([len(old) - 1] if self.torso else [])]
+        angles, omega = old_angles[bodies], old[bodies]
+        J = self.motions(angles, self.levers(foot), radius) @ Z
+        weighted = J.conj().T * self.masses
+        inertias = self.inertias.copy()
+        inertias[: 3 if self.kneed else 2] *= self.strike_inertia
+        momentum = (weighted @ velocities[order]).real + Z.T @ (inertias * omega)
+        if self.push_off:
+            # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
+            to_hip = -self.foot * cmath.exp(1j * angles[SWING]) + 1j * self.radius
+            hip = 1j * -foot * cmath.exp(1j * angles[STANCE]) - radius
+            momentum[STANCE] += self.push_off * (hip.conjugate() * to_hip / abs(to_hip)).real
+        M = (weighted @ J).real + Z.T @ (inertias[:, None] * Z)
+        # whole walker, trailing leg and, if it is free, trailing shank
+        T = np.ones((Z.shape[1], Z.shape[1]))
+        T[1:] = 0.0
+        T[1, [SWING, *range(2, Z.shape[1])]] = 1.0
+        if Z.shape[1] > 2:
+            T[2, SHANK] = 1.0
+        M, momentum = T @ M, T @ momentum
+        momentum[1] -= self.leg_inertia * float(np.dot(self.extra_inertia, omega[:2]))
+        if self.keeps_trailing_rate:
+            M[1], momentum[1] = 0.0, omega[SWING]
+            M[1, SWING] = 1.0
+        return M, momentum
+
+    def after_strike(self, before: Floats) -> Floats:
+        """Return the coordinates just after a heel strike: angles of swing and stance leg, and all rates."""
+        M, momentum = self.strike_balances(before)
+        angles = before[[STANCE, SWING]]
+        if self.evens_angles:
+            angles[STANCE] = -2.0 * self.lean - angles[SWING]
+        return np.concatenate((angles, np.linalg.solve(M, momentum)))
+
+    def step(self, start: Floats, tolerance: float = EXACT) -> Step | None:
+        """Take a step from coordinates just after a heel strike; None if the walker does not complete it.
+
+        start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
+        """
+        state = np.asarray(start, float)
+        if self.kneed:
+            rates = state[2:] if len(state) > 4 else np.append(state[2:], state[2])
+            state = np.array([*state[:2], state[0], *rates])
+        pieces = self.land(state, tolerance)
+        if pieces is None:
+            return None
+        before = pieces[-1].end
+        length = self.swing_foot(before).real - self.radius * (before[STANCE] - start[STANCE])
+        period = sum(piece.duration for piece in pieces)
+        return Step(period, length, before, self.after_strike(before), pieces)
+
+    def land(self, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
+        """Return the parts of the swing from a state of all bodies to the heel strike; None if there is none."""
+        pieces: tuple[Piece, ...] = ()
+        # a straight leg whose foot is behind has just been released
+        if self.kneed and (self.knee_bend(state) != 0.0 or self.swing_foot(state).real < 0.0):
+            locked = self.swing(BENT, state, self.knee_bend, lambda _: True, tolerance)
+            if locked is None:
+                return None
+            pieces, state = (locked,), self.after_knee_strike(locked.end)
+        elif self.kneed:
+            state = state[[SWING, STANCE, 3 + SWING, 3 + STANCE]]
+        landed = self.swing(STRAIGHT, state, self.feet_apart, lambda end: self.swing_foot(end).real > 0.0, tolerance)
+        return None if landed is None else (*pieces, landed)
+
+    def swing(
+        self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], tolerance: float
+    ) -> Piece | None:
+        """Integrate until `event` falls to zero in a state that counts; None if it does not."""
+        latest = LONGEST_SWING * self.pendulum_time
+        if self.euler_step:
+            return self.euler(phase, start, event, counts, latest)
+        scale = np.repeat((1.0, 1.0 / self.pendulum_time), len(start) // 2)
+
+        def rates(_time: float, state: Floats) -> Floats:
+            return self.rates(phase, state)
+
+        def solver(begin: float, state: Floats, end: float) -> DOP853:
+            largest = LARGEST_STEP * self.pendulum_time
+            return DOP853(rates, begin, state, end, max_step=largest, rtol=tolerance, atol=0.1 * tolerance * scale)
+
+        walk, before = solver(0.0, start, latest), event(start)
+        while walk.status == "running":
+            old_time, old = walk.t, walk.y
+            walk.step()
+            after = event(walk.y)
+            if before > 0.0 >= after:
+                time = crossing(event, walk.dense_output(), old_time, walk.t)
+                for _ in range(LOCATING_ROUNDS):
+                    landing = solver(old_time, old, time)
+                    while landing.status == "running":
+                        landing.step()
+                    # the interpolant has fewer digits than the integration
+                    state, slope = landing.y, event(landing.y + TINY * self.rates(phase, landing.y))
+                    time -= event(state) * TINY / (slope - event(state))
+                if counts(state):
+                    return Piece(phase, start, time, state)
+            before = after
+        return None
+
+    def euler(
+        self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], latest: float
+    ) -> Piece | None:
+        """Integrate as `swing` does, by Euler's method with a fixed step."""
+        step, state, before = self.euler_step, start, event(start)
+        for count in range(1, min(int(latest / step), MAX_EULER_STEPS)):
+            old, state = state, state + step * self.rates(phase, state)
+            after = event(state)
+            if before > 0.0 >= after and counts(state):
+                share = before / (before - after) if self.interpolates else 1.0
+                return Piece(phase, start, step * (count - 1 + share), old + share * (state - old))
+            before = after
+        return None
+
+    def after_knee_strike(self, state: Floats) -> Floats:
+        """Return the state with a straight leg just after the knee has locked."""
+        Z, Z_bent = self.reduction(STRAIGHT), self.reduction(BENT)
+        D = self.motions(Z_bent @ state[:3], self._levers, self.radius)
+        M = (D.conj().T * self.masses @ D).real + np.diag(self.inertias)
+        rates = np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ Z_bent @ state[3:])
+        return np.concatenate((state[:2], rates))
+
+
+def crossing(event: Event, course: Callable[[float], Floats], begin: float, end: float) -> float:
+    """Return the time at which an event function is zero on a course between two times."""
+    return float(brentq(lambda time: event(course(time)), begin, end, xtol=1e-15))
+
+
+class Phase(NamedTuple):
+    """Sums over the point masses of a walker in one phase."""
+
+    reduction: Floats  # (bodies, coordinates)
+    moments: list[list[complex]]  # kg m^2, of two levers
+    first: list[complex]  # kg m, of one lever
+    inertias: list[float]
+    signs: list[list[float]]  # factors on velocity terms
+
+
+def eliminate(M: list[list[float]], forces: list[float]) -> list[float]:
+    """Solve M x = forces for a small symmetric positive M, which needs no pivots; both are overwritten."""
+    n = len(forces)
+    for pivot in range(n):
+        for row in range(pivot + 1, n):
+            factor = M[row][pivot] / M[pivot][pivot]
+            for column in range(pivot + 1, n):
+                M[row][column] -= factor * M[pivot][column]
+            forces[row] -= factor * forces[pivot]
+    for row in range(n - 1, -1, -1):
+        for column in range(row + 1, n):
+            forces[row] -= M[row][column] * forces[column]
+        forces[row] /= M[row][row]
+    return forces
+
+
+class Piece(NamedTuple):
+    """Part of a swing in one phase."""
+
+    phase: str
+    start: Floats
+    duration: float  # s
+    end: Floats
+
+
+class Step(NamedTuple):
+    """A step of a plain walker, SI units."""
+
+    period: float
+    length: float
+    before: Floats  # state just before the heel strike
+    after: Floats  # coordinates just after it
+    pieces: tuple[Piece, ...]
+
+    @property
+    def knee_strike(self) -> float | None:
+        """Time (s) of the knee strike from the start; None without knees."""
+        return self.pieces[0].duration if len(self.pieces) > 1 else None
