@@ -1,4 +1,4 @@
-"""Passive-dynamic walking as a reproducible experiment; see README.md, and docs/python.md for use from Python.
+"""Passive-dynamic walking as a reproducible experiment. See README.md, and docs/python.md for use from Python.
 
 Names that `walkerlab.api` lists are imported on first access, so importing the package takes no time.
 """

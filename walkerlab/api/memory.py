@@ -47,7 +47,7 @@ R = TypeVar("R")
 
 
 class CompassKeys(TypedDict, total=False):
-    """Keys of a compass walker; `walkerlab schema walker` has their defaults and bounds."""
+    """Keys of a compass walker. `walkerlab schema walker` has their defaults and bounds."""
 
     leg_length_m: float
     foot_to_mass_m: float
@@ -60,7 +60,7 @@ class CompassKeys(TypedDict, total=False):
 
 
 class KneedKeys(TypedDict, total=False):
-    """Keys of a walker with knees; `walkerlab schema walker` has their defaults and bounds."""
+    """Keys of a walker with knees. `walkerlab schema walker` has their defaults and bounds."""
 
     thigh: Mapping[str, Setting]
     shank: Mapping[str, Setting]
@@ -73,7 +73,7 @@ class KneedKeys(TypedDict, total=False):
 
 
 class ContactKeys(TypedDict, total=False):
-    """Keys of the contact model's ground; `walkerlab schema contact` has their defaults and bounds."""
+    """Keys of the contact model's ground. `walkerlab schema contact` has their defaults and bounds."""
 
     units: Literal["adams", "si"]
     stiffness: float
@@ -102,7 +102,7 @@ def shows(keys: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
 
 
 def passed(keys: Mapping[str, object]) -> dict[str, Setting]:
-    """Return the keys that a caller passed; None leaves a key at its default."""
+    """Return the keys that a caller passed. None leaves a key at its default."""
     return {name: cast(Setting, value) for name, value in keys.items() if value is not None}
 
 
@@ -123,7 +123,8 @@ def walker(type: Literal["compass", "straight-legs", "kneed", "parts"], **keys: 
 
 @shows(CompassKeys)
 def compass(**keys: Unpack[CompassKeys]) -> CompassWalker:
-    """Build a compass walker: two straight legs with a mass on each, and a mass at the hip; by default the paper's.
+    """Build a compass walker: two straight legs with a mass on each, and a mass at the hip. The default is the walker
+    of the paper.
 
     keys  keys of the config's block `walker`, in m, kg and kg m^2; see docs/config.md
 
@@ -138,7 +139,7 @@ def compass(**keys: Unpack[CompassKeys]) -> CompassWalker:
 
 @shows(KneedKeys)
 def kneed(**keys: Unpack[KneedKeys]) -> Kneed:
-    """Build a walker with knees that lock; by default Hsu Chen's walker.
+    """Build a walker with knees that lock. The default is Hsu Chen's walker.
 
     keys  keys of the config's block `walker`, in m, kg and kg m^2; see docs/config.md
 
@@ -194,7 +195,7 @@ def simulate(
     strides: int | None = None,
     **keys: Setting,
 ) -> Result:
-    """Simulate a walk in memory; it starts on the gait unless `start` is passed.
+    """Simulate a walk in memory. It starts on the gait unless `start` is passed.
 
     walker     built by `compass`, `kneed` or `walker`
     slope_deg  slope in deg, positive downhill
@@ -453,7 +454,10 @@ def explore(
 
 
 def in_memory(stage: str, config: Config) -> Result:
-    """Compute a stage and its inputs without files; ConfigError if the config lacks a block that the stage needs."""
+    """Compute a stage and its inputs without files.
+
+    Raises ConfigError if the config lacks a block that the stage needs.
+    """
     check_stage(stage)
     PIPELINE[stage].refuse_question(config)
     memory = MemoryResults()
@@ -464,7 +468,7 @@ def in_memory(stage: str, config: Config) -> Result:
 
 
 def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: Mapping[str, Setting]) -> Config:
-    """Build the paper config with another scene; it has a contact block only if one is passed.
+    """Build the paper config with another scene. It has a contact block only if one is passed.
 
     walker  walker block; None keeps the paper's
     values  values and blocks by key; None keeps the paper's value
@@ -487,14 +491,14 @@ def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: 
 
 
 def with_blocks(config: str | Path | Config, **blocks: Setting) -> Config:
-    """Return a config with some blocks replaced; `config` may also be a file, a built-in name or a run."""
+    """Return a config with some blocks replaced. `config` may also be a file, a built-in name or a run."""
     start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
     tree = {**start.model_dump(mode="json", exclude_none=True, by_alias=True), **blocks}
     return validate_tree(tree_of(tree, NOWHERE))
 
 
 def stage_block(stage: str, keys: dict[str, Setting], **values: Setting) -> dict[str, Setting]:
-    """Take the keys of a stage's block out of `keys`; return the block with them and `values`, by its name."""
+    """Take the keys of a stage's block out of `keys`, and return the block with them and `values`, by its name."""
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage with a question has a block"
     own = {name: keys.pop(name) for name in block.model_fields if name in keys}

@@ -67,7 +67,7 @@ def export_model(
 def mujoco_model(
     config: str | Path | Config | Run = DEFAULT, slope: str = "gravity", **blocks: Setting
 ) -> "tuple[MjModel, MjData]":
-    """Build a walker as a MuJoCo model with data at the start of its gait; plain `mujoco.mj_step` makes it walk.
+    """Build a walker as a MuJoCo model with data at the start of its gait. Plain `mujoco.mj_step` makes it walk.
 
     Drives and knees are a control callback, which MuJoCo calls in each step. Callbacks are global: this model walks
     until the next call, and `mujoco.set_mjcb_control(None)` must come before another model is compiled.

@@ -38,7 +38,7 @@ Setting: TypeAlias = "Value | Block | NDArray[np.generic] | np.generic | Sequenc
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """Result of a stage; its repr shows the headline values, and notebooks show its answer with tables.
+    """Result of a stage. Its repr shows the headline values, and notebooks show its answer with tables.
 
     Each value of the summary is also an attribute and an item.
 
@@ -119,7 +119,7 @@ class Result:
 
     @property
     def advice(self) -> str:
-        """Advice if there is no answer; empty otherwise.
+        """Advice if there is no answer, otherwise empty.
 
         >>> find_gait(slope_deg=-1).advice.partition(",")[0]
         'Let the slope descend in walking direction (slope_deg above 0)'
@@ -146,7 +146,7 @@ class Result:
         return self.content[name]
 
     def to_dataframe(self, group: str = "") -> DataFrame:
-        """Return a group of arrays, by default the first, as a pandas DataFrame; `attrs["units"]` has units by column.
+        """Return a group of arrays, by default the first, as a pandas DataFrame. `attrs["units"]` has units by column.
 
         Its index is made of the dimensions that all arrays share; others give columns such as `angle.1`.
 
@@ -194,7 +194,10 @@ class Gait(Result):
     """
 
     def plot(self, figure: str = "") -> Figure:
-        """Draw the multipliers in the unit circle as a matplotlib Figure; NoAnswer if there is no gait."""
+        """Draw the multipliers in the unit circle as a matplotlib Figure.
+
+        Raises NoAnswer if there is no gait.
+        """
         from walkerlab.views.figures.multipliers import draw_multipliers
 
         if self.no_answer is not None:
@@ -203,7 +206,7 @@ class Gait(Result):
 
     @property
     def multipliers(self) -> tuple[complex, ...]:
-        """Multipliers of the chosen gait, largest first; empty if there is no gait.
+        """Multipliers of the chosen gait, largest first, or () if there is no gait.
 
         >>> gait = find_gait()
         >>> max(abs(one) for one in gait.multipliers) == gait.summary["spectral_radius"]
@@ -254,7 +257,10 @@ def dataset(group: Group) -> Dataset:
 
 
 def dataframe(group: Group) -> DataFrame:
-    """Convert a group of labelled arrays to a pandas DataFrame; ConfigError if pandas is not installed."""
+    """Convert a group of labelled arrays to a pandas DataFrame.
+
+    Raises ConfigError if pandas is not installed.
+    """
     try:
         import pandas
     except ImportError as error:
@@ -281,7 +287,10 @@ def dataframe(group: Group) -> DataFrame:
 
 
 def xarray_here() -> ModuleType:
-    """Import xarray; ConfigError if it is not installed."""
+    """Import xarray.
+
+    Raises ConfigError if it is not installed.
+    """
     try:
         return importlib.import_module("xarray")
     except ImportError as error:

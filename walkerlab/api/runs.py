@@ -32,7 +32,7 @@ RUNS = "runs"
 
 
 class Combined(TypedDict, total=False):
-    """Options for combining the values of a sweep's parameters; by default they form the full grid.
+    """Options for combining the values of a sweep's parameters. By default they form the full grid.
 
     zip     whether to combine the n-th values into the n-th point
     sample  how to draw points from the intervals, and how many, instead of using the grid, such as "sobol:64"
@@ -63,7 +63,10 @@ class Run:
 
     @property
     def config(self) -> Config:
-        """Config that the results were computed with; StaleError if it cannot be determined."""
+        """Config that the results were computed with.
+
+        Raises StaleError if it cannot be determined.
+        """
         config = config_of(self.folder)
         if config is None:
             raise StaleError(f"{self.folder.path} has no result with a readable config.")
@@ -229,13 +232,16 @@ def sweep(
 
 
 def warn(messages: Iterable[str], inside: int = 0) -> None:
-    """Issue warnings that point at the line that called the API; `inside` counts the functions in between."""
+    """Issue warnings that point at the line that called the API. `inside` counts the functions in between."""
     for text in messages:
         warnings.warn(text, stacklevel=3 + inside)
 
 
 def set_options(values: Mapping[str, Setting] | None) -> list[str]:
-    """Convert values of keys to `--set` options; ConfigError if they are not a mapping."""
+    """Convert values of keys to `--set` options.
+
+    Raises ConfigError if they are not a mapping.
+    """
     if not isinstance(values, Mapping | NoneType):
         raise ConfigError(f"set: {values!r} is not a mapping of keys to values.", 'For example set={"slope_deg": 3}.')
     return [f"{key}={json.dumps(value)}" for key, value in (values or {}).items()]
@@ -248,7 +254,10 @@ def folder_of(runs: str | Path) -> Path:
 
 
 def sweep_values(key: str, values: Sequence[Setting] | str) -> str | list[Setting]:
-    """Return the values of a sweep's parameter, or the text of a range; ConfigError for anything else."""
+    """Return the values of a sweep's parameter, or the text of a range.
+
+    Raises ConfigError for anything else.
+    """
     # Imported late: few callers sweep.
     from walkerlab.pipeline.sweeps.question import MAX_POINTS
 

@@ -52,7 +52,7 @@ def digits_of(text: str) -> Digits:
 
 
 def parse_printed(text: str) -> PrintedValue | None:
-    """Read a printed value; None if it has none of the allowed forms."""
+    """Read a printed value, or return None if it has none of the allowed forms."""
     plain = text.strip().lower().replace("−", "-").replace("–", "-").replace("\xa0", " ")
     plain = re.sub(r"\s*[×x·*]\s*10\s*\^?\s*\{?([-+]?\d+)\}?", r"e\1", plain).replace("+/-", "±").replace("+-", "±")
     plain = re.sub(r"\b(zero|one|two|half)\b", lambda match: _WORDS[match[1]], plain)
@@ -149,7 +149,7 @@ class PrintedAngles(_From):
 
 
 class Check(Block):
-    """A printed gait for `walkerlab check`; digits count as they are typed."""
+    """A printed gait for `walkerlab check`. Digits count as they are typed."""
 
     source: CheckSource = CheckSource()
     angles: PrintedAngles = PrintedAngles()

@@ -187,7 +187,7 @@ def check_second_leg() -> Any:
 
 
 def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
-    """Build the walker whose two legs are both like leg 2; `values` are the keys of the walker by name."""
+    """Build the walker whose two legs are both like leg 2. `values` are the keys of the walker by name."""
     second = {name: value for name, value in values.items() if name != "leg_2"}
     if getattr(leg, "type", None) is not None:
         shared = {
@@ -201,7 +201,7 @@ def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> An
 
 
 def second_leg_in_words(walker: Any) -> str:
-    """List the keys of leg 2 that a config states, with their values; empty if it states none."""
+    """List the keys of leg 2 that a config states, with their values. The list is empty if it states none."""
     leg = getattr(walker, "leg_2", None)
     keys = {} if leg is None else leg.model_dump(exclude_none=True)
     stated = []
@@ -231,7 +231,7 @@ def with_locked_knee(thigh: Any, shank: Any) -> dict[str, float]:
 
 
 def second_of(walker: Any) -> Any:
-    """Return the walker whose two legs are both like leg 2; the walker itself if it has no `leg_2`."""
+    """Return the walker whose two legs are both like leg 2, or the walker itself if it has no `leg_2`."""
     return walker if getattr(walker, "leg_2", None) is None else built_second(walker)
 
 
@@ -367,7 +367,7 @@ class SecondKneedLeg(Block):
 
 
 class KneelessLeg(SecondStraightLeg):
-    """A second leg without a knee; keys that it leaves out are those of leg 1 with its knee locked."""
+    """A second leg without a knee. Keys that it leaves out are those of leg 1 with its knee locked."""
 
     type: Literal["straight-legs"] = key(..., "", "a leg without a knee")
 

@@ -59,7 +59,7 @@ class Exported:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Unique link names that other programs accept; the first link is the first stance leg, hinged at the hip."""
+        """Unique link names that other programs accept. The first link is the first stance leg, hinged at the hip."""
         names: list[str] = []
         for link in self.model.links:
             name = identifier(link.name)
@@ -84,12 +84,12 @@ class Exported:
 
     @property
     def knee_links(self) -> tuple[int, ...]:
-        """Index of each leg's shank; empty for straight legs."""
+        """Index of each leg's shank, or () for straight legs."""
         return tuple(place - 2 for place in self.scene.knee_places)
 
     @cached_property
     def couplings(self) -> list[dict[int, float]]:
-        """Weights, by link, of the hinge angles of bodies that follow other bodies; each weighted sum is zero."""
+        """Weights, by link, of the hinge angles of bodies that follow other bodies. Each weighted sum is zero."""
         weights = []
         for row in coupling_rows(self.scene.assembly, self.model):
             if abs(row[0]) > COUPLED:
@@ -116,7 +116,7 @@ class Exported:
         return tuple(pads)
 
     def lane_across_m(self, foot: int) -> float:
-        """Signed distance (m) of a foot's lane from the plane of the walk; no ball reaches the other foot's lane."""
+        """Signed distance (m) of a foot's lane from the plane of the walk. No ball reaches the other foot's lane."""
         distance = self.half_lane_m + 0.01 * self.config.walker.leg_length_m
         return -distance if foot == STANCE_FOOT else distance
 

@@ -75,7 +75,7 @@ LAST_OF: Final[Mapping[str, str]] = {"last_step_period_s": "step_periods_s", "la
 
 
 def headlines(stage: str, names: Iterable[str]) -> list[str]:
-    """Return the names of a stage's headline quantities in order; for an unlisted stage, its first quantities.
+    """Return the names of a stage's headline quantities in order. For an unlisted stage, its first quantities.
 
     names  dotted names of all its quantities
     """
@@ -92,12 +92,12 @@ def stands_for(entry: str, name: str) -> bool:
 
 
 def has_quantity(stage: str, name: str) -> bool:
-    """Whether a stage may have a quantity of that name; always true for an unlisted stage."""
+    """Whether a stage may have a quantity of that name. Always true for an unlisted stage."""
     return stage not in QUANTITIES or any(stands_for(entry, name) for entry in QUANTITIES[stage])
 
 
 def claims(compared: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return the study's published values with their verdicts; empty if the scene departs from the study's.
+    """Return the study's published values with their verdicts, or nothing if the scene departs from the study's.
 
     compared  summary of `compare`; empty if it has no result
     """
@@ -130,7 +130,7 @@ class RunDifference:
 def difference(
     first: Mapping[str, Content], second: Mapping[str, Content], configs: Sequence[Config | None]
 ) -> RunDifference:
-    """Compare the results and configs of two runs; an unknown config counts as empty."""
+    """Compare the results and configs of two runs. An unknown config counts as empty."""
     both = [name for name in first if name in second]
     keys = pairs(*({} if config is None else dict(flatten(config.model_dump(mode="json"))) for config in configs))
     return RunDifference(
@@ -156,6 +156,6 @@ def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def change(first: Any, second: Any) -> float | None:
-    """Return the relative change from `first` to `second`; None unless both are numbers and `first` is not 0."""
+    """Return the relative change from `first` to `second`, or None unless both are numbers and `first` is not 0."""
     numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (first, second))
     return float(second / first - 1.0) if numbers and first else None

@@ -92,7 +92,7 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
-    """Return the value at a path of keys; a key that the second leg leaves out has the value of the first leg's."""
+    """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg's."""
     value = value_at(config, path)
     return value_at(config, [name for name in path if name != SECOND_LEG]) if value is None else value
 

@@ -78,7 +78,7 @@ def drive_parameters(config: RigidConfig) -> dict[str, Any]:
 
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
-    """Return the damping (N m s/rad) of each leg's knee; 0 for a leg without a knee."""
+    """Return the damping (N m s/rad) of each leg's knee, or 0 for a leg without a knee."""
     knees = (getattr(each, "knee", None) for each in (walker, second_of(walker)))
     first, second = (0.0 if knee is None else knee.damping_N_m_s_per_rad for knee in knees)
     return first, second

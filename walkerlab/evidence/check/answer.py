@@ -137,7 +137,7 @@ class Checked:
         return {"swing", "stance"}.issubset(self.convention.order)
 
     def printed_state(self, name: str, known: Floats) -> Floats | None:
-        """Return a printed state of all bodies; what is not printed is as in the state `known`."""
+        """Return a printed state of all bodies. What is not printed is as in the state `known`."""
         if name not in self.conventions:
             return None
         numbers = [item.printed.value.real for item in self.items if item.quantity == name]
@@ -171,7 +171,7 @@ class Checked:
 
     @cached_property
     def right(self) -> Walk | None:
-        """The right gait nearest to the printed one; None if there is none."""
+        """The right gait nearest to the printed one, or None if there is none."""
         if not self.walks:
             return None
         if not self.items:
@@ -204,7 +204,7 @@ class Checked:
 
     @cached_property
     def question(self) -> Question | None:
-        """Printed values to explain; None without a right gait."""
+        """Printed values to explain, or None without a right gait."""
         right = self.right
         if right is None:
             return None
@@ -277,7 +277,7 @@ def answer_without(check: Check, reason: str) -> dict[str, Any]:
 
 
 def as_row(item: Item, right: complex | None, verdict: Judgement) -> dict[str, Any]:
-    """Return a printed number and its verdict as JSON values; a complex right value is a pair."""
+    """Return a printed number and its verdict as JSON values. A complex right value is a pair."""
     value: Any = None
     if right is not None:
         value = [right.real, right.imag] if item.printed.imaginary or right.imag else right.real
@@ -320,7 +320,7 @@ def finding_of(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explana
 
 
 def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
-    """Return how far the printed state is from periodic; None if no state is printed or it does not step."""
+    """Return how far the printed state is from periodic, or None if no state is printed or it does not step."""
     walker, right = checked.walker, question.right
     state = question.state if checked.has_both_legs else None
     if state is None or right.derivative is None:

@@ -63,7 +63,10 @@ OFFER = Offer(check, ("config", "sets", "as_json", "quiet", "verbose"))
 
 
 def configs_in(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield the configs themselves, and those in folders; raises ConfigError for a folder without any."""
+    """Yield the configs themselves, and those in folders.
+
+    Raises ConfigError for a folder without any.
+    """
     # imported here, as below: help must load neither the config nor NumPy
     from walkerlab.config.files import BUILTIN_FOLDER, SUFFIXES
 
@@ -80,7 +83,10 @@ def configs_in(paths: Sequence[Path]) -> Iterator[Path]:
 
 
 def answer_to(path: Path, settings: Sequence[str], request: Request) -> dict[str, Any]:
-    """Check one config; raises ConfigError, with the position of the fault, if it is invalid."""
+    """Check one config.
+
+    Raises ConfigError, with the position of the fault, if it is invalid.
+    """
     from walkerlab.config.loader import load
     from walkerlab.evidence.check.answer import check_gait
 

@@ -71,7 +71,7 @@ class Convention:
         return list((pairs.T if self.layout == "interleaved" else pairs).ravel().tolist())
 
     def read(self, walker: PlainWalker, numbers: Sequence[float], known: Floats) -> Floats:
-        """Return the state that printed numbers describe; bodies that are not printed are as in the state `known`."""
+        """Return the state that printed numbers describe. Bodies that are not printed are as in the state `known`."""
         n, count = len(known) // 2, len(self.order)
         table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))
         K, tilt = self.rows(n), walker.slope if self.origin == "vertical" else 0.0
@@ -130,7 +130,10 @@ INSTANT_WORDS: Final = {
 
 
 def stated(angles: PrintedAngles, instant: Instant, count: int, bodies: int, name: str = "state") -> Convention:
-    """Return the convention that a config states for a state of `count` numbers; ConfigError if they do not fit."""
+    """Return the convention that a config states for a state of `count` numbers.
+
+    Raises ConfigError if they do not fit.
+    """
     order = angles.order or DEFAULT_ORDERS.get(count)
     fits = order is not None and 2 * len(order) == count
     if order is None or not fits or any(BODIES[body] >= bodies for body in order):
@@ -199,7 +202,7 @@ def coordinates_of(walker: PlainWalker, state: Floats) -> Floats:
 
 
 def state_at(walker: PlainWalker, start: Floats, step: Step, instant: Instant, vertical: bool) -> Floats | None:
-    """Return the state of all bodies at an instant of a step; None if the step has no such instant.
+    """Return the state of all bodies at an instant of a step, or None if the step has no such instant.
 
     vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
     """
@@ -221,7 +224,7 @@ def state_at(walker: PlainWalker, start: Floats, step: Step, instant: Instant, v
 
 
 def start_from(walker: PlainWalker, state: Floats, instant: Instant) -> Floats | None:
-    """Return the coordinates just after the heel strike that a state leads to; None if it leads to none."""
+    """Return the coordinates just after the heel strike that a state leads to, or None if it leads to none."""
     if instant == "after-strike":
         return coordinates_of(walker, state)
     n = len(state) // 2

@@ -220,7 +220,7 @@ def fitted(question: Question) -> Iterator[Attempt]:
 
 
 def fitted_size(question: Question, family: Family) -> float | None:
-    """Return the size of a mistake that brings its gait closest to the printed values; None if none does."""
+    """Return the size of a mistake that brings its gait closest to the printed values, or None if none does."""
     low, high = LIMITS[family.unit]
     without = misses(question, question.guess(family.of_size(0.0), EXACT))
     size, best, left = family.first, 0.0, without
@@ -342,7 +342,9 @@ def periodic_with(question: Question) -> list[dict[str, float | str]]:
 
 
 def one_change(question: Question, key: str, value: float) -> float | None:
-    """Return the value of a parameter for which the printed state is periodic to its digits; None if none is near."""
+    """Return the value of a parameter for which the printed state is periodic to its digits, or None if
+    none is near.
+    """
     without = misses(question, question.guess(question.walker))
     near = value * (1.0 + 1e-4)
     for _ in range(FITTING_ROUNDS):
@@ -361,7 +363,7 @@ def one_change(question: Question, key: str, value: float) -> float | None:
 
 
 def undecided(explanations: Sequence[Explanation]) -> str:
-    """Say what would decide between several explanations; empty if there is at most one."""
+    """Say what would decide between several explanations, or return '' if there is at most one."""
     if len(explanations) < 2:
         return ""
     if {each.kind for each in explanations} == {"convention"}:

@@ -17,7 +17,7 @@ SLOW = 0.1  # ratio of two errors above which the derivative is computed anew
 
 
 def why_not_plain(config: RigidConfig) -> str:
-    """Explain why the plain model does not describe a config's walker; empty if it does."""
+    """Explain why the plain model does not describe a config's walker, or return '' if it does."""
     if getattr(config.walker, "leg_2", None) is not None:
         return "the plain model has two equal legs"
     if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
@@ -65,7 +65,7 @@ def scales(walker: PlainWalker, size: int) -> Floats:
 
 
 def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
-    """Return the derivative of the step map at a start by central differences; None where a step fails."""
+    """Return the derivative of the step map at a start by central differences, or None where a step fails."""
     columns, moves = [], DIFFERENCE * scales(walker, len(start))
     for k, move in enumerate(moves):
         ends = []
@@ -80,7 +80,7 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
 
 
 def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, Step] | None:
-    """Return start and step of the gait near a start, by Newton's method; None if there is none.
+    """Return start and step of the gait near a start, by Newton's method, or None if there is none.
 
     A  derivative of a similar walker's step map, to begin with
     """

@@ -52,7 +52,7 @@ def numbers_in(prefix: str, block: Block) -> Iterator[tuple[str, float]]:
 
 
 def with_value(config: RigidConfig, key: str, value: float) -> Changed:
-    """Return the config with another value of one parameter; it is not validated."""
+    """Return the config with another value of one parameter. It is not validated."""
     scene = Changed(config.walker, config.gravity_m_s2, config.slope_rad, config.push_off, config.equations)
     first, _, rest = key.partition(".")
     changes: dict[str, Any] = {first: with_inner(config.walker, rest, value) if rest else value}
@@ -75,7 +75,7 @@ def misprints_of(config: RigidConfig) -> Iterator[Misprint]:
 
 
 def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | None:
-    """Return the plain walker with another value of one parameter; None if it cannot be built."""
+    """Return the plain walker with another value of one parameter, or None if it cannot be built."""
     walker = plain_walker(with_value(config, key, value))
     turns = all(part.inertia + part.mass * abs(part.centre) ** 2 > 0.0 for part in walker.parts)
     return walker if turns and walker.leg_length > walker.radius >= 0.0 else None

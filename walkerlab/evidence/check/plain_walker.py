@@ -46,7 +46,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class PlainWalker:
-    """A walker on its slope, with the mistakes that its equations contain; SI units."""
+    """A walker on its slope, with the mistakes that its equations contain. SI units."""
 
     parts: tuple[Part, ...]  # of one leg: the whole leg, or thigh and shank
     knee: complex  # m, from hip to knee; 0 for straight legs
@@ -154,7 +154,7 @@ class PlainWalker:
         return Phase(self.reduction(phase), moments.tolist(), first.tolist(), inertias.tolist(), signs)
 
     def motions(self, angles: Floats, levers: Complex, radius: float) -> Complex:
-        """Return the velocities (masses, bodies) of all masses per unit rate of each body; the foot rolls."""
+        """Return the velocities (masses, bodies) of all masses per unit rate of each body. The foot rolls."""
         D: Complex = 1j * levers * np.exp(1j * angles)
         D[:, STANCE] -= radius
         return D
@@ -205,15 +205,15 @@ class PlainWalker:
         return complex(self.foot * (cmath.exp(1j * state[SWING]) - cmath.exp(1j * state[STANCE])))
 
     def feet_apart(self, state: Floats) -> float:
-        """Return the sum (rad) of both legs' angles, hip to foot; it falls to the window, usually 0, at a touch."""
+        """Return the sum (rad) of both legs' angles, hip to foot. It falls to the window, usually 0, at a touch."""
         return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
 
     def knee_bend(self, state: Floats) -> float:
-        """Return the angle (rad) by which the shank is behind its thigh; it falls to 0 as the knee locks."""
+        """Return the angle (rad) by which the shank is behind its thigh. It falls to 0 as the knee locks."""
         return float(state[SWING] - state[SHANK])
 
     def energy(self, phase: str, state: Floats) -> float:
-        """Return kinetic plus potential energy (J); heights are from where an upright stance leg touches the slope."""
+        """Return kinetic plus potential energy (J). Heights are from where an upright stance leg touches the slope."""
         Z = self.reduction(phase)
         n = Z.shape[1]
         angles, omega = Z @ state[:n], Z @ state[n:]
@@ -276,7 +276,7 @@ class PlainWalker:
         return np.concatenate((angles, np.linalg.solve(M, momentum)))
 
     def step(self, start: Floats, tolerance: float = EXACT) -> Step | None:
-        """Take a step from coordinates just after a heel strike; None if the walker does not complete it.
+        """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
 
         start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
         """
@@ -293,7 +293,7 @@ class PlainWalker:
         return Step(period, length, before, self.after_strike(before), pieces)
 
     def land(self, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
-        """Return the parts of the swing from a state of all bodies to the heel strike; None if there is none."""
+        """Return the parts of the swing from a state of all bodies to the heel strike, or None if there is none."""
         pieces: tuple[Piece, ...] = ()
         # a straight leg whose foot is behind has just been released
         if self.kneed and (self.knee_bend(state) != 0.0 or self.swing_foot(state).real < 0.0):
@@ -309,7 +309,7 @@ class PlainWalker:
     def swing(
         self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], tolerance: float
     ) -> Piece | None:
-        """Integrate until `event` falls to zero in a state that counts; None if it does not."""
+        """Integrate until `event` falls to zero in a state that counts, or None if it does not."""
         latest = LONGEST_SWING * self.pendulum_time
         if self.euler_step:
             return self.euler(phase, start, event, counts, latest)
@@ -380,7 +380,7 @@ class Phase(NamedTuple):
 
 
 def eliminate(M: list[list[float]], forces: list[float]) -> list[float]:
-    """Solve M x = forces for a small symmetric positive M, which needs no pivots; both are overwritten."""
+    """Solve M x = forces for a small symmetric positive M, which needs no pivots. Both are overwritten."""
     n = len(forces)
     for pivot in range(n):
         for row in range(pivot + 1, n):
@@ -415,5 +415,5 @@ class Step(NamedTuple):
 
     @property
     def knee_strike(self) -> float | None:
-        """Time (s) of the knee strike from the start; None without knees."""
+        """Time (s) of the knee strike from the start, or None without knees."""
         return self.pieces[0].duration if len(self.pieces) > 1 else None

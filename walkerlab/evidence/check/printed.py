@@ -93,7 +93,7 @@ class Judgement(NamedTuple):
 
 
 def judge(item: Item, right: complex | None, reason: str = "") -> Judgement:
-    """Compare a printed value with the right one; `reason` says why there is none."""
+    """Compare a printed value with the right one. `reason` says why there is none."""
     if right is None:
         return Judgement(NOT_COMPARABLE, 0, reason)
     agreeing, total, units = item.agreement(right), item.digits, short(item.miss(right))
@@ -113,7 +113,7 @@ def short(number: float) -> str:
 
 
 def items_of(printed: Mapping[str, Any], names: Mapping[str, Sequence[str]]) -> list[Item]:
-    """List the printed numbers; `names` has those of the components of lists, by quantity."""
+    """List the printed numbers. `names` has those of the components of lists, by quantity."""
     items = []
     for quantity, texts in printed.items():
         if texts is None:
@@ -128,7 +128,7 @@ def items_of(printed: Mapping[str, Any], names: Mapping[str, Sequence[str]]) -> 
 
 
 def match_multipliers(items: Sequence[Item], right: Sequence[complex]) -> dict[str, complex | None]:
-    """Return the right multiplier nearest to each printed one; each serves once."""
+    """Return the right multiplier nearest to each printed one. Each serves once."""
     left, matches = list(right), dict[str, complex | None]()
     for item in items:
         if not left:

@@ -42,14 +42,14 @@ class Walk:
 
     @cached_property
     def multipliers(self) -> tuple[complex, ...]:
-        """Multipliers of the step map on its section, largest first; the one that is always zero is left out."""
+        """Multipliers of the step map on its section, largest first. The one that is always zero is left out."""
         if self.derivative is None:
             return ()
         values = sorted(map(complex, np.linalg.eigvals(self.derivative).tolist()), key=abs, reverse=True)
         return tuple(values[:-1])
 
     def quantity(self, name: str) -> Any:
-        """Return a value of the compiled model, or else of the plain one; None if there is none."""
+        """Return a value of the compiled model, or else of the plain one, or None if there is none."""
         if name in self.measured:
             return self.measured[name]
         if name == "multipliers":
@@ -66,7 +66,7 @@ class Walk:
         }.get(name)
 
     def values(self, items: Sequence[Item], convention: Convention) -> dict[str, complex | None]:
-        """Return the value of each printed number, in the printed conventions; None where there is none."""
+        """Return the value of each printed number, in the printed conventions, or None where there is none."""
         values: dict[str, complex | None] = {}
         factor, written = convention.rate_factor(self.walker), self.written(items, convention)
         for item in items:
@@ -89,7 +89,7 @@ class Walk:
         return state_at(self.walker, self.start, self.step, instant, vertical)
 
     def written(self, items: Sequence[Item], convention: Convention) -> dict[str, list[float]]:
-        """Return the numbers of the states that are printed, by quantity; empty lists where there is no such state."""
+        """Return the numbers of the states that are printed, by quantity. Empty lists where there is no such state."""
         written, instants = {}, {"state": convention.instant, "state_before": BEFORE}
         for name in instants.keys() & {item.quantity for item in items}:
             state = self.state(instants[name], convention.origin == "vertical")

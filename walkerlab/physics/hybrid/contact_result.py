@@ -73,7 +73,9 @@ def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """Write the energies of all samples into `energies`; overwrites ground and knees of `system`, the free walker."""
+    """Write the energies of all samples into `energies`. This overwrites ground and knees of `system`, the
+    free walker.
+    """
     for i in range(samples.states.shape[0]):
         for k in range(2):
             system.has_ground[k], system.knee[k] = samples.has_ground[i, k], samples.knees[i, k]
@@ -159,7 +161,7 @@ def new_observer(
 
 
 def in_walk(walker: ContactWalker, walk_state: WalkState, pinned: bool = False) -> OnGround:
-    """Return the walker in its present form; it shares memory with the walk state."""
+    """Return the walker in its present form. It shares memory with the walk state."""
     return on_ground(walker, walk_state.has_ground, walk_state.knee, pinned, walk_state.level, walk_state.progress)
 
 
@@ -280,7 +282,7 @@ def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
 
 
 def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:
-    """Compute the largest residual of the energy balance (J) that the tolerance explains; a larger one is a fault."""
+    """Compute the largest residual of the energy balance (J) that the tolerance explains. A larger one is a fault."""
     exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
     return float(UNEXPLAINED * max(tolerances.rtol, FINEST_RTOL) * exchanged)
 

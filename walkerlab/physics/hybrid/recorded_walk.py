@@ -90,12 +90,12 @@ class RigidWalkResult(WalkRecord):
 
     @property
     def final_state(self) -> State:
-        """State after the last heel strike; the start if there was none."""
+        """State after the last heel strike, or the start if there was none."""
         return as_state(self.after[-1]) if self.steps else self.start
 
 
 def describe_pulls(min_force: float, min_impulse: float) -> list[str]:
-    """Describe how the ground would have to pull; empty if it never would.
+    """Describe how the ground would have to pull, or return nothing if it never would.
 
     min_force    minimum normal force (N)
     min_impulse  minimum normal impulse in a strike (N s)
@@ -184,7 +184,7 @@ class Recorder:
         self.pieces: list[Samples] = []
 
     def walk_on(self, rises: Array) -> Outcome:
-        """Take up to `rises.size - 1` more steps; `rises` (m) begins with the rise to the present foothold."""
+        """Take up to `rises.size - 1` more steps. `rises` (m) begins with the rise to the present foothold."""
         steps = rises.size - 1
         seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
         if self.sampled:  # enough samples for the longest steps
@@ -220,7 +220,7 @@ class Recorder:
         return Outcome(status)
 
     def _mean_energy(self, strikes: Array, after: Array) -> float:
-        """Compute the mean energy over time (J); heights are from the contact point at the touch before each step."""
+        """Compute the mean energy over time (J). Heights are from the contact point at the touch before each step."""
         touched = np.append(self.start[STANCE], after[:, STANCE])
         zeros = by_turns(self.walker, np.arange(touched.size), energy_at_touch, touched)
         if self.tally.duration == 0.0:
@@ -229,7 +229,7 @@ class Recorder:
         return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
 
     def _driven_work(self, before: Array, after: Array, gravity: float) -> tuple[DrivenWork, float]:
-        """Compute the work done in the completed steps and the energy residual (J); `gravity` is gravity's work (J)."""
+        """Compute the work done in the completed steps and the energy residual (J). `gravity` is gravity's work (J)."""
         # A push-off does its work before the strike, which loses part of it. The work of a damper does not follow from
         # the states before and after strikes: it is determined by the energy balance, which leaves no residual.
         walker, rows = self.walker, range(len(self.walker.hinges))

@@ -1,4 +1,4 @@
-"""Walks of the rigid model in parallel lanes, each with its own step size; a lane whose walk ends takes the next start.
+"""Walks of the rigid model in parallel lanes, each with its own step size. A lane whose walk ends takes the next start.
 
 All lanes take a solver step of a Runge-Kutta method together. A lane whose solver step may contain a heel strike or a
 fall is then handled alone: the event is located on the quintic Hermite interpolant of its event function, the solver
@@ -72,7 +72,7 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Convert a model of two straight legs for lanes; None if the model has knees or more bodies."""
+    """Convert a model of two straight legs for lanes, or return None if the model has knees or more bodies."""
     if len(model.arm_x) != 2 or model.kneed:
         return None
     x, y = model.hip_x, model.hip_y
@@ -119,7 +119,7 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
 
 
 class LaneMemory(NamedTuple):
-    """Workspace of a batch, apart from its starts and results; its size does not depend on the number of walks."""
+    """Workspace of a batch, apart from its starts and results. Its size does not depend on the number of walks."""
 
     rtol: float
     atol: float
@@ -146,7 +146,7 @@ def new_fates(n: int) -> Fates:
 
 @by_type
 def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
-    """Record a heel strike at time t (s), with state y after it; return GOES_ON or the outcome's number."""
+    """Record a heel strike at time t (s), with state y after it, and return GOES_ON or the outcome's number."""
 
 
 @kernel
@@ -174,7 +174,7 @@ def walk_lanes(walker: TwoLegs, memory: LaneMemory, observer: Any, starts: Any, 
 
 @kernel_part
 def refill(walker: TwoLegs, memory: LaneMemory, starts: Any, fates: Fates, lane: int, waiting: int) -> int:
-    """Give a lane the next valid start; returns the number of starts used so far."""
+    """Give a lane the next valid start, and return the number of starts used so far."""
     while waiting < starts.shape[0]:
         y = (starts[waiting, 0], starts[waiting, 1], starts[waiting, 2], starts[waiting, 3])
         waiting += 1
@@ -206,7 +206,7 @@ def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 
 @kernel_part
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
-    """Try a solver step in every lane, accept it where no event is possible; return whether a lane needs attention.
+    """Try a solver step in every lane, accept it where no event is possible, and return whether a lane needs attention.
 
     Attention is due if the solver step may contain an event or ends at one, time is over, or solver steps are too many
     or too small.
@@ -290,7 +290,7 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
-    """Apply the heel strike if the solver step has reached it; otherwise set the next one to the remaining time."""
+    """Apply the heel strike if the solver step has reached it, otherwise set the next one to the remaining time."""
     rows, slots = memory.rows, memory.slots
     move_on(memory, lane)
     pendulum_time = walker.pendulum_time
@@ -357,7 +357,9 @@ def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
 
 @kernel_part
 def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
-    """Find the fraction of a lane's solver step at which the hip gets too low; NO_CROSSING if it ends high enough."""
+    """Find the fraction of a lane's solver step at which the hip gets too low, or NO_CROSSING if it ends
+    high enough.
+    """
     from_upright = walker.slope - walker.upright
     angle = memory.rows[END_STATE + 1, lane] + from_upright
     if abs(angle) <= walker.fallen:

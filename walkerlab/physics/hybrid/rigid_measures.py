@@ -31,7 +31,7 @@ def energies(walker: RigidModel, states: Array) -> Array:
 
 
 def reactions(walker: RigidModel, states: Array, bent: NDArray[np.bool_] | None = None) -> Array:
-    """Compute the force (N) on the stance foot along and normal to the slope (samples, 2); `bent` marks a free knee."""
+    """Compute the force (N) on the stance foot along and normal to the slope (samples, 2). `bent` marks a free knee."""
     out = np.zeros((len(states), 2))
     free = np.zeros(len(states), np.bool_) if bent is None else bent
     fill_reactions(walker, np.ascontiguousarray(states), free, out)

@@ -57,7 +57,7 @@ RIGID_TALLY = record_type(RigidTally, {})
 
 @by_reference
 class Observer(NamedTuple):
-    """Record of a walk besides its heel strikes; empty unless `watching`."""
+    """Record of a walk besides its heel strikes. It is empty unless `watching`."""
 
     watching: bool
     times: Any  # (samples,) s, rising
@@ -117,7 +117,7 @@ def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: 
 
 @kernel_part
 def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
-    """Return the ground's pull (N), the friction ratio and the swing foot's depth (m); see section 3.1 of the paper."""
+    """Return the ground's pull (N), the friction ratio and the swing foot's depth (m). See section 3.1 of the paper."""
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
     return -normal, ratio, -swing_foot(mode.model, y)[0]
@@ -151,7 +151,9 @@ def record_extremes(tally: Any, mode: Mode, y: Any) -> tuple[float, float, float
 
 @kernel_part
 def vertex(before: float, middle: float, after: float) -> float:
-    """Find the position of the maximum of the parabola through values at -1, 0 and 1; 2 if it has no maximum."""
+    """Find the position of the maximum of the parabola through values at -1, 0 and 1, or return 2 if it has
+    no maximum.
+    """
     bend = before - 2.0 * middle + after
     return 0.5 * (before - after) / bend if bend < 0.0 else 2.0
 
@@ -178,7 +180,9 @@ def ascend_to_worst(
 def observe(
     observer: Observer, method: Any, mode: Mode, finder: CrossingFinder, row: int, fraction: float, step: int
 ) -> None:
-    """Record the last solver step up to `fraction`: its samples, extremes and energy; overwrites the finder's `row`."""
+    """Record the last solver step up to `fraction`: its samples, extremes and energy. This overwrites the finder's
+    `row`.
+    """
     tally = observer.tally[()]
     torque = hinge_law(mode.model, HIP_ROW).torque
     if torque != 0.0:

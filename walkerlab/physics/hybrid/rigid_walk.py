@@ -69,7 +69,9 @@ def is_bent(system: Mode) -> bool:
 
 @kernel_part
 def knee_angle(model: RigidModel, y: Any, first: int) -> float:
-    """Return the swing knee's angle beyond straight (rad) or its rate; y[first] is the first of the angles or rates."""
+    """Return the swing knee's angle beyond straight (rad) or its rate. `y[first]` is the first of the
+    angles or rates.
+    """
     return y[first + model.shank] - y[first + model.thigh]
 
 
@@ -81,7 +83,9 @@ def hip_above_fall(model: RigidModel, y: Any) -> float:
 
 @kernel_part
 def may_end(system: Mode, method: Any, at_start: bool) -> bool:
-    """Whether the last solver step may contain an event, judged by values and rates at its ends; usually false."""
+    """Whether the last solver step may contain an event, judged by values and rates at its ends. It usually contains
+    none.
+    """
     model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
     if hip_above_fall(model, y) < 0.0:
         return True
@@ -154,7 +158,7 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
 def take_step(
     walker: Any, method: Any, finder: CrossingFinder, observer: Any, t: float, y: Any, step: int, strikes: Any
 ) -> tuple[int, float]:
-    """Take one step, a swing and its heel strike, from time t (s); afterwards y holds the state and tangent columns.
+    """Take one step, a swing and its heel strike, from time t (s). Afterwards y holds the state and tangent columns.
 
     walker  as in `walk`; of legs that differ, leg 1 swings in even steps
 
@@ -221,7 +225,7 @@ def swing_phase(
 
 @kernel_part
 def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
-    """Compute the event function of the strike that ends a phase, and its rate; `turn` as in `foot_function`."""
+    """Compute the event function of the strike that ends a phase, and its rate. `turn` is as in `foot_function`."""
     if is_bent(system):
         return knee_angle(system.model, y, 0), knee_angle(system.model, turn, 0)
     value, _, change, _ = foot_function(system, y, turn)
@@ -230,7 +234,7 @@ def event_value(system: Mode, y: Any, turn: Any) -> tuple[float, float]:
 
 @kernel_part
 def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strikes: Any, step: int) -> float:
-    """Apply the strike at the end of a phase, after a last Newton correction of its time; return that time (s).
+    """Apply the strike at the end of a phase, after a last Newton correction of its time, and return that time (s).
 
     Afterwards `method` holds the state before the strike, `new` the state after it, and `strikes` how much later each
     tangent column strikes (its wait). A heel strike turns a column Phi into J (Phi + f wait), to stay on the section; a
@@ -271,7 +275,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
 
 
 class HeelStrikes(NamedTuple):
-    """Heel strikes of a walk, step by step; states include the tangent columns of the walk."""
+    """Heel strikes of a walk, step by step. States include the tangent columns of the walk."""
 
     time: Any  # (steps,) s
     before: Any  # (steps, m) states just before the strikes
@@ -287,7 +291,9 @@ class HeelStrikes(NamedTuple):
 def new_heel_strikes(
     steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0, columns: int = 0
 ) -> HeelStrikes:
-    """Create room for heel strikes with states of m values, tangent columns included; fields as in `HeelStrikes`."""
+    """Create room for heel strikes with states of m values, tangent columns included. The fields are as in
+    `HeelStrikes`.
+    """
     before, after = np.zeros((2, steps, m))
     even, knee_time = np.zeros(steps + 1) if rise is None else rise, np.zeros(steps if kneed else 0)
     lift, waits = np.zeros((steps + 1, columns)), np.zeros((steps, columns))
@@ -298,7 +304,7 @@ def new_heel_strikes(
 def walk(
     walker: Any, method: Any, finder: CrossingFinder, observer: Observer, y: Any, strikes: HeelStrikes
 ) -> tuple[int, int]:
-    """Walk until `strikes` is full or the walk ends; return the outcome's number and the number of steps taken.
+    """Walk until `strikes` is full or the walk ends, and return the outcome's number and the number of steps taken.
 
     walker  models of the first step and, if the legs differ, of the second, from `models_in_turn`
     y       (m,) state at time 0, with tangent columns if the method has room for them; overwritten with the last state

@@ -33,7 +33,7 @@ from walkerlab.physics.solvers.system import Floats
 
 @kernel_part
 def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) -> None:
-    """Write the state after a plastic impact under constraints E[phase] into `new`; y is the state before it.
+    """Write the state after a plastic impact under constraints E[phase] into `new`, where y is the state before it.
 
     At a heel strike, AT_STRIKE, the swing foot becomes the stance foot and the legs exchange their roles: `before` is
     the model of the swing that ends, `model` that of the next one. Any number of variational columns may follow the
@@ -104,7 +104,7 @@ class RootedTree(NamedTuple):
 def lock(
     tree: RootedTree, E: Floats, angles: Floats, omega: Floats, turns: Floats, rates: Floats
 ) -> tuple[Floats, float, Floats]:
-    """Project the angular velocities omega (n,) onto those that E (n, n) allows; the root's motion does not change.
+    """Project the angular velocities omega (n,) onto those that E (n, n) allows. The root's motion does not change.
 
     turns, rates  (n, columns) changes of the angles (rad) and of omega (rad/s) just before the lock
 
@@ -238,7 +238,7 @@ def project(
 
 @forced_inline
 def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, upward: float, p: Any) -> None:
-    """Write Z^T dM w into p (n,); dM is the change of M due to `turn` (n,), and w the jump of all velocities."""
+    """Write Z^T dM w into p (n,). `dM` is the change of M due to `turn` (n,), and w the jump of all velocities."""
     n = len(model.arm_x)
     F, U = vector(model.arm_x), vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)

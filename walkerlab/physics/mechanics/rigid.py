@@ -34,12 +34,12 @@ class BodyPlaces:
 
 
 def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
-    """Build the rigid model of an assembly on a slope (rad); other arguments as in `on_level_ground`."""
+    """Build the rigid model of an assembly on a slope (rad). The other arguments are as in `on_level_ground`."""
     return on_slope(on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
 def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
-    """Build the rigid model of an assembly, which is a pair of models if the legs differ; gravity in m/s^2.
+    """Build the rigid model of an assembly, which is a pair of models if the legs differ. Gravity in m/s^2.
 
     The trailing knee is released just after the heel strike if `knee_locked_at_strike`, otherwise just before it.
     Raises ValueError, with a message for the user, if the parts are not a walker with two legs.
@@ -60,7 +60,7 @@ def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: b
 
 
 def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
-    """Build the model of the steps in which an assembly's first leg swings; arguments as in `on_level_ground`."""
+    """Build the model of the steps in which an assembly's first leg swings. Arguments as in `on_level_ground`."""
     hip = find_hip(assembly)
     places = group_bodies(assembly)
     swing_foot, foot = assembly.feet
@@ -142,7 +142,7 @@ def find_hip(assembly: Assembly) -> Revolute:
 
 
 def knee_positions(assembly: Assembly) -> tuple[Position, ...]:
-    """Return the position (m) of each leg's knee in the frame of its thigh; empty for a walker without knees."""
+    """Return the position (m) of each leg's knee in the frame of its thigh, or () for a walker without knees."""
     # The line of a leg without a knee is drawn through the point where the other leg has one.
     hinges = (assembly.hinge(knee.thigh, knee.shank) for knee in assembly.knees)
     positions = tuple(hinge.parent_point_m for hinge in hinges if hinge is not None)

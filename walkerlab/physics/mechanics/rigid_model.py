@@ -50,7 +50,7 @@ NO_SHANK = -1
 
 @tree.fast_fields
 class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
-    """Constants of the rigid model, SI; a structured scalar whose type fixes the number n of bodies."""
+    """Constants of the rigid model in SI, a structured scalar whose type fixes the number n of bodies."""
 
     # E holds three reductions: BENT, STRAIGHT and AT_STRIKE. If the legs differ, `paired_with` is the model in which
     # the other leg swings. It is no field of the record: a kernel takes both records, see `models_in_turn`.
@@ -102,7 +102,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     @property
     def exchanged(self) -> "RigidModel":
-        """Model of the next step, in which the legs have exchanged their roles; this model itself for equal legs."""
+        """Model of the next step, in which the legs have exchanged their roles. This model itself for equal legs."""
         return self if self.paired_with is None else pair(self.paired_with, self)
 
     def __eq__(self, other: object) -> bool:
@@ -118,7 +118,7 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
         return restored, (np.asarray(self), self.paired_with)
 
     def changed(self, **fields: Any) -> "RigidModel":
-        """Return a read-only copy with some fields changed; of legs that differ, both models are changed."""
+        """Return a read-only copy with some fields changed. Of legs that differ, both models are changed."""
         model = with_fields(self, fields)
         return model if self.paired_with is None else pair(model, with_fields(self.paired_with, fields))
 
@@ -154,7 +154,7 @@ def models_in_turn(model: RigidModel) -> Any:
 
 
 def by_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> Floats:
-    """Return compute(model, *rows) of rows (n, ...) in steps (n,); the models of legs that differ take turns."""
+    """Return compute(model, *rows) of rows (n, ...) in steps (n,). The models of legs that differ take turns."""
     if model.paired_with is None:
         return np.asarray(compute(model, *rows))
     parts = [(step % 2 == k, each) for k, each in enumerate((model, model.exchanged))]
@@ -166,7 +166,7 @@ def by_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> Floats:
 
 
 def new_rigid_model(n: int, **fields: Any) -> RigidModel:
-    """Create a rigid model of n bodies with the given fields; all others are zero."""
+    """Create a rigid model of n bodies with the given fields. All others are zero."""
     shapes = {
         **tree.mechanism_shapes(n, 3, len(fields["hinges"])),
         **dict.fromkeys(("foot_x", "foot_y", "roles"), (n,)),

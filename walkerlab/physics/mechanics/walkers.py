@@ -32,7 +32,7 @@ class Limb:
 
 @dataclass(frozen=True)
 class Arc:
-    """Circular sole, whose lowest point is level with the leg's lower end; a zero radius makes a point foot."""
+    """Circular sole, whose lowest point is level with the leg's lower end. A zero radius makes a point foot."""
 
     radius_m: float = 0.0
     centre_ahead_m: float = 0.0
@@ -52,7 +52,7 @@ def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
 
 
 def with_second_leg(walker: Assembly, other: Assembly) -> Assembly:
-    """Return `walker` with the second leg of `other`; the hip mass is that of `walker`."""
+    """Return `walker` with the second leg of `other`. The hip mass is that of `walker`."""
     legs = walker.legs[0], other.legs[1]
     sources = (walker, legs[0]), (other, legs[1])
     names = (legs[0][0], legs[1][0], *legs[0][1:], *legs[1][1:])

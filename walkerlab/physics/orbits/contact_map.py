@@ -74,7 +74,7 @@ class SectionStep(MappedStep):
 
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
-    """Return the bodies that turn independently, the swing leg's first; the locked stance shank is left out."""
+    """Return the bodies that turn independently, the swing leg's first. The locked stance shank is left out."""
     locked = walker.whole.knees[stance, 0] if walker.kneed else None
     return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
 
@@ -89,7 +89,7 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
 
 
 def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
-    """Set the angles (n,), or changes of angles, of coupled bodies that are not `fixed`; return `angles`."""
+    """Set the angles (n,), or changes of angles, of coupled bodies that are not `fixed`, and return `angles`."""
     form, n = walker.whole, angles.size
     shank, thigh = form.knees[stance]
     if walker.kneed and shank not in fixed:
@@ -151,7 +151,7 @@ def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
 
 
 def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats:
-    """Differentiate `state_on_section` with respect to z at one of its states; returns (4 + 2 n, coordinates)."""
+    """Differentiate `state_on_section` with respect to z at one of its states. The result is (4 + 2 n, coordinates)."""
     n = int(walker.whole.bodies)
     turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
@@ -169,7 +169,7 @@ def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats
 
 
 def stance_of(swing: int) -> int:
-    """Return the foot that stands in a walk's step of this number; in step 0 leg 1 swings."""
+    """Return the foot that stands in a walk's step of this number. In step 0 leg 1 swings."""
     return STANCE_FOOT if swing % 2 == 0 else 1 - STANCE_FOOT
 
 
@@ -182,7 +182,9 @@ def step_from_section(
     derived: bool = True,
     stance: int = STANCE_FOOT,
 ) -> SectionStep:
-    """Walk from section to section on pads of pitch `pitch_m`; REJECTED if a push-off lasts beyond the section."""
+    """Walk from section to section on pads of pitch `pitch_m`. The outcome is REJECTED if a push-off lasts beyond the
+    section.
+    """
     laid = ground
     start = state_on_section(walker, z, stance)
     if ground.terrain.has_pads:  # the stance foot stands in the middle of a pad
@@ -268,7 +270,7 @@ def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Fl
 def legs_sampled_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats
 ) -> Floats:
-    """Sample angles (times, 2) in `walk_from_section`, first stance leg first; times (s) count from the section."""
+    """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
     start = state_on_section(walker, z, STANCE_FOOT)
     walk_state = walk_state_on_section(walker, over_footholds(ground, heights), start, heights.size)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
@@ -353,7 +355,7 @@ class ContactMap(StepMap):
         step_length_m: float,
         like: WalkerOnGround,
     ) -> None:
-        """Prepare a family's map; `walker_at` returns None for values without a valid walker, `like` sets the units."""
+        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` sets the units."""
 
         @lru_cache(CACHE_SIZE)
         def site_at(p: float) -> WalkerOnGround | None:
@@ -454,7 +456,7 @@ class OwnPads(Stepper):
 
 
 def lengths_between_touches(gait: Cycle) -> Floats:
-    """Return the lengths (n,) of a gait's steps from touch to touch, in m; `lengths_m` are those between sections."""
+    """Return the lengths (n,) of a gait's steps from touch to touch, in m. `lengths_m` are those between sections."""
     steps = [step for step in gait.steps if isinstance(step, SectionStep)]
     return np.array([steps[k - 1].moved_m + step.spacing_m for k, step in enumerate(steps)])
 

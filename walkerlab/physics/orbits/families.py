@@ -218,7 +218,9 @@ class BranchFollower:
         return branches
 
     def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
-        """Return the first gait of twice the period, at the normal form's amplitude; None if Newton's method fails."""
+        """Return the first gait of twice the period, at the normal form's amplitude, or None if Newton's
+        method fails.
+        """
         # the tangent must point away from the flip: the halves of the cycle must move apart along it
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
@@ -296,7 +298,9 @@ class BranchFollower:
     def next_point(
         self, equations: GaitEquations, last: CurvePoint[Cycle], step: float, before: CurvePoint[Cycle] | None
     ) -> tuple[CurvePoint[Cycle], float, BranchEnd | None] | BranchEnd:
-        """Return the next point, step length and, if reached, the branch's end; only the end if no point follows."""
+        """Return the next point, step length and, if reached, the end of the branch. If no point follows, return only
+        the end.
+        """
         # A step out of the span is cut at its edge, because there may be no walker beyond.
         ahead, acceptable = last.x + step * last.tangent, self.check_after(last)
         edge = self.span.nearest(equations.value(ahead))
@@ -319,7 +323,9 @@ class BranchFollower:
         return at_edge, step, BranchEnd(self.span.nearest(value), END_OF_SPAN)
 
     def at_edge(self, equations: GaitEquations, last: CurvePoint[Cycle], beyond: Floats) -> CurvePoint[Cycle] | None:
-        """Solve for the gait at the span's edge, between `last` and a point `beyond` (d + 1,); None if that fails."""
+        """Solve for the gait at the span's edge, between `last` and a point `beyond` (d + 1,), or return None if that
+        fails.
+        """
         start, value = equations.value(last.x), equations.value(beyond)
         edge = self.span.nearest(value)
         guess = last.x + (edge - start) / (value - start) * (beyond - last.x)
@@ -350,7 +356,7 @@ def steps_word(n: int) -> str:
 
 
 def half_cycle_difference(gait: Cycle) -> Floats:
-    """Return the difference between a gait's states half a cycle apart; zero if it repeats after half its steps."""
+    """Return the difference between a gait's states half a cycle apart, or zero if it repeats after half its steps."""
     return np.asarray(gait.steps[len(gait.steps) // 2 - 1].z - gait.z)
 
 

@@ -71,7 +71,7 @@ THOROUGHNESS = {
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Search results for one model; `step_map` is None if there was no gait to start from."""
+    """Search results for one model. `step_map` is None if there was no gait to start from."""
 
     model: str
     step_map: StepMap | None
@@ -112,7 +112,7 @@ class FamilySearch:
         return Family(self.model, self.step_map, self.follower.family(self.seeds, self.periods))
 
     def family(self, generator: np.random.Generator) -> Family:
-        """Run the whole search; `generator` draws the scattered starts."""
+        """Run the whole search. `generator` draws the scattered starts."""
         results = self.branches()
         if self.step_map.stride > 1:  # attractors are looked for by steps that are all alike
             return results
@@ -155,7 +155,9 @@ class FamilySearch:
         return replace(family, attractors=attractors, exponents=measured)
 
     def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
-        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span; return the attractor at the smallest value."""
+        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span, and return the attractor at the
+        smallest value.
+        """
         # A walk from an end of the branch leaves the gait for the attractor; its nearly repeating points are the seeds.
         how = self.thoroughness
         self.announce("gaits of {model} beyond flips outside the span")

@@ -1,4 +1,4 @@
-"""Search for the periodic gaits of a rigid walker; each gait is solved to rounding error and measured.
+"""Search for the periodic gaits of a rigid walker. Each gait is solved to rounding error and measured.
 
 The two gaits of small-slope theory are followed to the walker's slope, and the step map is solved from random starts,
 as in the paper (section 3.3). If a driven walker still has no gait, gaits of the passive walker are followed as the
@@ -68,7 +68,7 @@ START_RANGES = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1
 
 @dataclass(frozen=True)
 class RigidGait:
-    """A gait with the quantities of one of its steps, or their means over a stride if the legs differ; SI units."""
+    """A gait with the quantities of one of its steps, or their means over a stride if the legs differ. SI units."""
 
     state: State  # just after the heel strike
     period: float  # s
@@ -120,7 +120,7 @@ class RigidGait:
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """Reasons why no ground can support this gait; empty for a physical gait, stable or not."""
+        """Reasons why no ground can support this gait, or none for a physical gait, stable or not."""
         reasons = describe_pulls(self.min_normal_force, self.min_normal_impulse)
         if not self.trailing_foot_rises:
             reasons.append("the trailing foot would have to pass through the ground")
@@ -145,7 +145,7 @@ def straight_only(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
 
 
 def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
-    """Walk the steps of a gait of the unit walker and measure them in SI; None if a step fails."""
+    """Walk the steps of a gait of the unit walker and measure them in SI, or None if a step fails."""
     start, count = state_on_section(walker, gait.z), len(gait.steps)
     step = take_walk(walker, EXACT_STEPS, start, count, sampled=True)
     if step.steps < count or step.samples is None:
@@ -223,7 +223,7 @@ class GaitSearch:
 
 
 def find_gaits(walker: RigidModel, seed: int = 0, settings: SearchSettings = SearchSettings()) -> GaitSearch:
-    """Find the period-1 gaits of `walker`; `seed` determines the random starting values."""
+    """Find the period-1 gaits of `walker`. `seed` determines the random starting values."""
     if walker.slope <= 0.0 and walker.unpaired == 0.0 and not walker.driven:
         return GaitSearch((), None, NO_DESCENT)
     search = Search(walker)
@@ -264,7 +264,9 @@ class SlopeBranch:
         self.step_map, self.seed = step_map, seed
 
     def follow(self, slope: float) -> tuple[float, Floats | None]:
-        """Follow the gait to `slope` > 0 (rad); return the slope reached and z (3,), None if the gait is lost."""
+        """Follow the gait to `slope` > 0 (rad), and return the slope reached and z (3,), or None if the
+        gait is lost.
+        """
         s = float(np.cbrt(slope))
         follower = self.seed_follower if s > np.cbrt(self.seed.slope) else self.start_follower(s)
         if follower is None:
@@ -279,7 +281,9 @@ class SlopeBranch:
         return self.start_follower(float(np.cbrt(self.seed.slope)))
 
     def start_follower(self, s: float) -> Follower | None:
-        """Return a follower from the gait at s, or at a smaller s if the seed is too inaccurate; None if all fail."""
+        """Return a follower from the gait at s, or at a smaller s if the seed is too inaccurate, or None if
+        all fail.
+        """
         seed, s_seed = self.seed, float(np.cbrt(self.seed.slope))
         limit = (0.0, np.array([*seed.limit, seed.period]))
         rough = (limit, (s_seed**2, scale_gait(s_seed, seed.z, seed.period)))
@@ -313,7 +317,9 @@ def scale_gait(s: float, z: Floats, period: float) -> Floats:
 
 @lru_cache(maxsize=16)
 def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
-    """Return the branches of the small-slope gaits of a walker on level ground; cached, since they serve all slopes."""
+    """Return the branches of the small-slope gaits of a walker on level ground. They are cached, since they serve all
+    slopes.
+    """
     looking = over_slope(walker, SEARCH_TOLERANCES)
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
@@ -323,7 +329,7 @@ def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
 
 
 def with_mean_legs(walker: RigidModel, share: float) -> RigidModel:
-    """Return the walker with its legs' differences from their mean times `share`; at 0 it has equal legs."""
+    """Return the walker with its legs' differences from their mean times `share`. At 0 it has equal legs."""
     # The constants of both models enter the equations linearly, so all walkers between them are possible.
     models = walker, walker.exchanged
 
@@ -447,7 +453,7 @@ class Search:
         return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
-        """Solve for the gait near z to rounding error and record it; return whether a gait was found."""
+        """Solve for the gait near z to rounding error and record it, and return whether a gait was found."""
         if self.record_hit(z, by):
             return True
         effort = Effort(SOLVED_RESIDUAL, MAX_GAIT_EVALUATIONS, SHORTEST_MOVE, rounding=MAX_RESIDUAL / SOLVED_RESIDUAL)
@@ -463,7 +469,7 @@ class Search:
         return True
 
     def record_hit(self, z: Floats, by: str) -> bool:
-        """Return whether z is a known gait; if so, record that this search found it again."""
+        """Whether z is a known gait. If so, record that this search found it again."""
         for record in self.records:
             if np.abs(record.cycle.z - z).max() < SAME_GAIT * np.abs(z).max():
                 record.by.append(by)
@@ -489,7 +495,7 @@ def preference(gait: RigidGait) -> tuple[bool, int, float]:
 
 
 def choose_gait(gaits: tuple[RigidGait, ...]) -> tuple[int | None, str]:
-    """Choose the gait to walk among the physical ones by `preference`; return its index and the reason."""
+    """Choose the gait to walk among the physical ones by `preference`, and return its index and the reason."""
     walkable = [index for index, gait in enumerate(gaits) if not gait.objections]
     if not walkable:
         objections = dict.fromkeys(objection for gait in gaits for objection in gait.objections)

@@ -124,7 +124,7 @@ def state_on_section(walker: RigidModel, z: Any) -> State:
 
 
 def states_on_section(walker: RigidModel, z: Any) -> Floats:
-    """Return the states (n, 2 n) at section coordinates z (n, d); also takes a single z (d,)."""
+    """Return the states (n, 2 n) at section coordinates z (n, d), or the state at a single z (d,)."""
     section = strike_section(walker)
     states = np.asarray(section.start[: len(walker.zero_state)] + np.asarray(z) @ section.basis)
     if section.curved is not None:
@@ -224,7 +224,7 @@ class RigidStepper(local):
     def _walk(
         self, section: StrikeSection, method: Any, observer: Observer, y: Floats, strikes: HeelStrikes
     ) -> tuple[Outcome, int]:
-        """Walk until `strikes` is full or the walk ends; return the outcome and the number of completed steps."""
+        """Walk until `strikes` is full or the walk ends, and return the outcome and the number of completed steps."""
         method.counts[:BUDGET] = 0
         method.counts[BUDGET] = min(strikes.time.size * self.budget, ENDLESS)
         method.clock[H_NEXT] = 0.0
@@ -234,7 +234,7 @@ class RigidStepper(local):
     def differentiate(
         self, section: StrikeSection, start: Floats, floor: tuple[Floats, float], times: Floats
     ) -> StepTangents | None:
-        """Differentiate a step from a state (2 n,) by that state and the step's rise; None if the step fails.
+        """Differentiate a step from a state (2 n,) by that state and the step's rise, or return None if the step fails.
 
         floor  rises (2,) and nearest landing, as in `HeelStrikes`
         times  of samples, from the start of the step
@@ -350,7 +350,7 @@ class RigidMap(StepMap):
     probe = 2e-5
 
     def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare a family's map; `walker_at` returns None for values without a valid walker, `like` is an example."""
+        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` is an example."""
 
         @lru_cache(CACHE_SIZE)
         def unit_at(p: float) -> SimilarWalker | None:

@@ -32,7 +32,10 @@ class Units(NamedTuple):
         return self.mass * self.length / self.time
 
     def of(self, unit: str) -> float:
-        """Return the walker's unit, in SI, with the dimension of `unit` (as in the config); KeyError if unknown."""
+        """Return the walker's unit, in SI, with the dimension of `unit` (as in the config).
+
+        Raises KeyError if unknown.
+        """
         inertia, damping = self.mass * self.length**2, self.energy * self.time
         basic = {"": 1.0, "1": 1.0, "m": self.length, "kg": self.mass, "s": self.time}
         derived = {"kg m^2": inertia, "N s": self.impulse, "N m": self.energy}

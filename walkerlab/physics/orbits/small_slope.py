@@ -64,7 +64,7 @@ class Modes(NamedTuple):
 
 
 def linear_modes(walker: RigidModel) -> Modes | None:
-    """Return the modes of the swing phase about upright legs; None if the legs have too little inertia."""
+    """Return the modes of the swing phase about upright legs, or None if the legs have too little inertia."""
     legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
     inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
     equations(level, level.zero_state, s, c, F, U, inertias, r)
@@ -88,7 +88,9 @@ def leg_columns(walker: RigidModel) -> Floats:
 
 
 def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
-    """Return the small-slope gaits of `walker`, whatever its own slope; only walkers that balance upright have them."""
+    """Return the small-slope gaits of `walker`, for any slope of its own. Only walkers that balance upright
+    have them.
+    """
     modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
     try:
         long = None if modes is None else long_period_seed(walker, modes)
@@ -101,7 +103,7 @@ def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
 
 
 def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
-    """Return the symmetric gait at LONG_AMPLITUDE; None if the walker falls before its legs meet again."""
+    """Return the symmetric gait at LONG_AMPLITUDE, or None if the walker falls before its legs meet again."""
     half = symmetric_half_period(modes)
     if half is None or modes.fall * half > MAX_GROWTH:
         return None
@@ -116,7 +118,9 @@ def long_period_seed(walker: RigidModel, modes: Modes) -> SmallSlopeSeed | None:
 
 
 def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: float) -> SmallSlopeSeed:
-    """Return the gait at LONG_AMPLITUDE; `per_angle`: theta_2 + phi, dtheta_1, dtheta_2 per angle between the legs."""
+    """Return the gait at LONG_AMPLITUDE. `per_angle` holds theta_2 + phi, dtheta_1 and dtheta_2 per angle between the
+    legs.
+    """
     kappa = slope_for_loss(walker, per_angle)
     slope = kappa * LONG_AMPLITUDE**3
     z = LONG_AMPLITUDE * per_angle - np.array([slope, 0.0, 0.0])
@@ -161,7 +165,7 @@ def symmetric_half_period(modes: Modes) -> float | None:
 
 
 def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> SmallSlopeSeed | None:
-    """Return the gait proportional to the slope, with a period below `longest` (s); None if it does not exist."""
+    """Return the gait proportional to the slope, with a period below `longest` (s), or None if it does not exist."""
     try:
         conditions = step_conditions(walker, modes)
         period = first_root(lambda t: np.asarray(np.linalg.det(conditions(t)) / t), longest)
@@ -218,7 +222,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
 
 
 def first_root(f: Callable[[Floats], Floats], longest: float) -> float | None:
-    """Return the smallest root of f in (0, longest) by successively finer samples; None if f keeps its sign."""
+    """Return the smallest root of f in (0, longest) by successively finer samples, or None if f keeps its sign."""
     # exclude the end, at which the short gait's conditions degenerate into those of the long gait
     samples = longest * np.arange(1, SCAN) / SCAN
     while True:

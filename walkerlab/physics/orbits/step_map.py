@@ -76,7 +76,7 @@ class DisturbedWalk:
 
 @dataclass(frozen=True, eq=False)
 class VariedWalk:
-    """Derivatives of a walk from the section along columns of start and heights; times of samples are fixed."""
+    """Derivatives of a walk from the section along columns of start and heights. Times of samples are fixed."""
 
     durations_s: Floats  # (steps, columns)
     lengths_m: Floats  # (steps, columns)
@@ -87,7 +87,7 @@ class VariedWalk:
 
 class Stepper(Protocol):
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
-        """Take a step from z (d,) at parameter p, with its derivative; outcome None if p gives no valid walker.
+        """Take a step from z (d,) at parameter p, with its derivative. The outcome is None if p gives no valid walker.
 
         swing  number of steps taken before, which matters if the legs differ: leg 1 swings in even steps
         """
@@ -148,7 +148,7 @@ class StepMap(Stepper, Protocol):
         return VariedWalk(durations, lengths, angles, rates, samples)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Return work divided by weight times distance for a step from z (d,); None if the step fails."""
+        """Return work divided by weight times distance for a step from z (d,), or None if the step fails."""
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         """Return leg length (m) and pendulum time (s) of the walker at p."""
@@ -196,7 +196,9 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: in
 def differentiate_along(
     step_map: StepMap, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats
 ) -> tuple[Floats, ...] | None:
-    """Differentiate step quantities (steps,) and samples (times, 2) in direction `along`; None if a walk ends early."""
+    """Differentiate step quantities (steps,) and samples (times, 2) in direction `along`, or None if a walk
+    ends early.
+    """
     ends, h = [], VARIATION / np.abs(along).max()
     for offset, weight in CENTRAL_2ND:
         moved, heights = z + offset * h * along[: z.size], heights_m + offset * h * along[z.size :]
@@ -220,7 +222,7 @@ def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """Consecutive steps; those of a gait return to their start."""
+    """Consecutive steps. The steps of a gait return to its start."""
 
     outcome: Outcome | None  # outcome of the last step
     value: float  # value of the parameter
@@ -303,7 +305,7 @@ def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1
 
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
-    """Return the eigenvalues, largest first; of a complex pair, the one with positive imaginary part first."""
+    """Return the eigenvalues, largest first. Of a complex pair, the one with positive imaginary part first."""
     return in_order(np.linalg.eigvals(DP).astype(np.complex128))
 
 

@@ -75,7 +75,7 @@ def walks_and(*names: str) -> Inputs:
 
 @dataclass(frozen=True)
 class Option:
-    """Option of a stage's command; sets a key of the config."""
+    """Option of a stage's command, which sets a key of the config."""
 
     flag: str  # as typed, such as --steps
     key: str  # dotted config key
@@ -90,7 +90,7 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return the options that say what a recorded file does not, as keys of a block; each needs some flags."""
+    """Return the options that say what a recorded file does not, as keys of a block. Each needs some flags."""
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
         Option("--units", "units", "KIND=UNIT,...", "Units that the file lacks.", "units"),
@@ -135,7 +135,7 @@ class Stage:
     shown_by: tuple[str, ...] = ()  # those that show it if it is current
 
     def takes_under(self, config: Config) -> type | None:
-        """Return the type of the config slice that the stage's result depends on; None for the whole config."""
+        """Return the type of the config slice that the stage's result depends on, or None for the whole config."""
         return self.takes if self.takes is None or isinstance(self.takes, type) else self.takes(config)
 
     def reads(self, config: Config) -> tuple[str, ...]:
@@ -148,12 +148,12 @@ class Stage:
         return (*self.inputs(config), *self.if_current)
 
     def why_unsuited(self, config: Config) -> str | None:
-        """Return the reason why the stage cannot run under a config; None if it can."""
+        """Return the reason why the stage cannot run under a config, or None if it can."""
         missing = (block for block in self.requires if getattr(config, block) is None)
         return next(map(without_block, missing), None) or self.why_no_such_legs(config)
 
     def why_no_such_legs(self, config: Config) -> str | None:
-        """Return the reason why the stage cannot answer for a config's legs; None if it can."""
+        """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
         if self.name in FOR_LEGS_THAT_DIFFER or (config.walker.type != "parts" and config.walker.leg_2 is None):
             return None
         from walkerlab.scene.rigid import have_different_legs  # imported here: equal legs need no mechanics

@@ -49,9 +49,11 @@ SCUFFED = (
 
 
 def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Walk `config.strides` strides; raises NoAnswer if the solver fails.
+    """Walk `config.strides` strides.
 
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
+
+    Raises NoAnswer if the solver fails.
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
     limps = "fixedpoint" in inputs and have_different_legs(config)
@@ -109,7 +111,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
 
 
 def mean_of(values: Floats) -> float | None:
-    """Return the mean over steps; None if no step was completed."""
+    """Return the mean over steps, or None if no step was completed."""
     return float(np.mean(values)) if values.size else None
 
 

@@ -65,7 +65,7 @@ class FamilyQuestion:
 
     @property
     def second(self) -> FamilyQuestion | None:
-        """Second parameter and its span; None if the config has no second key."""
+        """Second parameter and its span, or None if the config has no second key."""
         block = self.config.continuation.second
         return None if block is None else question_over(block, self.config, "continuation", "second")
 
@@ -80,7 +80,10 @@ class FamilyQuestion:
         return model_differs(model, self.config, self.parameter, (self.span.least, self.span.most))
 
     def touched(self, key: str) -> tuple[str, ...]:
-        """Return the requested models that the parameter affects; raises ConfigError if it affects none of them."""
+        """Return the requested models that the parameter affects.
+
+        Raises ConfigError if it affects none of them.
+        """
         touched = tuple(model for model in self.models if self.touches(model))
         if not touched:
             raise unused_key_error(f"continuation.{key}", self.parameter.key, self.models)
@@ -160,7 +163,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
 
 
 def search_of(model: str, question: FamilyQuestion, progress: Progress) -> FamilySearch | None:
-    """Set up the search for a model's families, over both parameters if there are two; None if no gait is found."""
+    """Set up the search for a model's families, over both parameters if there are two, or None if no gait is found."""
     seeding, second, block = SEEDS[model](question, progress), question.second, question.config.continuation
     if seeding is None:
         return None
@@ -186,7 +189,7 @@ def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
 
 
 def contact_seeds(question: FamilyQuestion, progress: Progress) -> Begun | None:
-    """Find a gait of the contact model at the first start value that has one; None if no value has one."""
+    """Find a gait of the contact model at the first start value that has one, or return None if no value has one."""
     from walkerlab.scene.contact import gait_off_pads
 
     progress.start("continuation: a gait of the contact model")
@@ -214,7 +217,7 @@ SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] =
 
 
 def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -> dict[str, Any]:
-    """Summarise the families, with values in the unit of the requested key; `again` as in `run`."""
+    """Summarise the families, with values in the unit of the requested key. `again` is as in `run`."""
     config, parameter = question.config, question.parameter
 
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
@@ -273,7 +276,7 @@ def bifurcation_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def first_doubling(branches: Sequence[GaitBranch]) -> float | None:
-    """Return the lowest flip at which a one-step gait loses stability; None if no gait loses it."""
+    """Return the lowest flip at which a one-step gait loses stability, or None if no gait loses it."""
     flips = [
         flip.value
         for branch in branches
@@ -294,7 +297,9 @@ def limit_rows(family: Family) -> Iterator[dict[str, Any]]:
 
 
 def sample_again(family: Family) -> dict[str, Any] | None:
-    """Solve for evenly spread gaits at tighter tolerances; return the largest changes, or None if no gait exists."""
+    """Solve for evenly spread gaits at tighter tolerances, and return the largest changes, or None if no
+    gait exists.
+    """
     # the gaits are solved for, not only walked again, so that the residual of Newton's method counts as well
     step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:

@@ -42,9 +42,11 @@ STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
 
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Find the gaits of each set of equations; raises NoAnswer if the config's own set has no physical gait.
+    """Find the gaits of each set of equations.
 
     again  whether the advice then names nearby gaits, which takes a second
+
+    Raises NoAnswer if the config's own set has no physical gait.
     """
     sets = equation_sets(config)
     searches: dict[str, GaitSearch] = {

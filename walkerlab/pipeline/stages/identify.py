@@ -46,7 +46,10 @@ FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), o
 
 
 def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Fit the measured walk; raises ConfigError for an invalid config or file, NoAnswer if no fit converges."""
+    """Fit the measured walk.
+
+    Raises ConfigError for an invalid config or file, NoAnswer if no fit converges.
+    """
     refuse(config)
     block = config.identify
     assert block is not None, "refuse rejects a config without the block"
@@ -98,7 +101,7 @@ def refuse(config: IdentifyConfig) -> None:
 def identify_divided(
     config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification]
 ) -> Identification:
-    """Try divisions of the walk into steps; return the first that fits, or else the best, the earlier of equals."""
+    """Try divisions of the walk into steps, and return the first that fits, or else the best, the earlier of equals."""
     answers, problems = list[Identification](), list[NoAnswer]()
     for measured in read_divisions(block, config):
         try:
@@ -116,7 +119,9 @@ def identify_divided(
 def divide_again(
     config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Repeat a fit if the identified slope and sensors move heel strikes; keep the old fit if the new one is bad."""
+    """Repeat a fit if the identified slope and sensors move heel strikes, and keep the old fit if the new
+    one is bad.
+    """
     if not before.measured.sampled:
         return before
     slope_change = identified_config(config, before).slope_rad - config.slope_rad
@@ -240,7 +245,8 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
 
 
 def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
-    """Build the identified and measured motions of the first steps; empty for kneed walkers (no shank angles are read).
+    """Build the identified and measured motions of the first steps, or return an empty mapping for kneed walkers (no
+    shank angles are read).
 
     Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
 
@@ -275,7 +281,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
 
 def reference_masses(config: IdentifyConfig, keys: Sequence[str], model: str) -> dict[str, float]:
-    """Return the masses in the config that were not fitted; the estimated masses are relative to them."""
+    """Return the masses in the config that were not fitted. The estimated masses are relative to them."""
     # empty for the contact model, whose stiffness sets the scale of mass
     if model != "rigid" or not any(key.endswith("mass_kg") for key in keys):
         return {}

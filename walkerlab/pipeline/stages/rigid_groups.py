@@ -62,7 +62,7 @@ def stance_leg(samples: Samples) -> Any:
 
 
 def leg_variables(samples: Samples) -> dict[str, Variable]:
-    """Return angles and velocities by leg; the legs change roles at each heel strike."""
+    """Return angles and velocities by leg. The legs change roles at each heel strike."""
     n, stance = samples.state.shape[1] // 2, stance_leg(samples)
     angle, velocity = samples.state[:, :2], samples.state[:, n : n + 2]
     return over_time(angle=reorder_by_leg(angle, stance), velocity=reorder_by_leg(velocity, stance))

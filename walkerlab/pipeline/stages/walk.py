@@ -164,7 +164,7 @@ def only_at(samples: Any, mask: NDArray[Any]) -> Any:
 
 
 def over_time(**values: ArrayLike) -> dict[str, Variable]:
-    """Build variables over time from values (samples,), or (samples, 2) by leg; their names are keys of `OVER_TIME`."""
+    """Build variables over time from values (samples,), or (samples, 2) by leg. Their names are keys of `OVER_TIME`."""
     return {name: labelled(column, OVER_TIME[name], *(TIME, LEG)[: np.ndim(column)]) for name, column in values.items()}
 
 
@@ -179,12 +179,12 @@ def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Varia
 
 
 def legs() -> dict[str, Variable]:
-    """Build the coordinate of the legs; they keep the numbers 1 and 2, whichever is the stance leg."""
+    """Build the coordinate of the legs. They keep the numbers 1 and 2, whichever is the stance leg."""
     return {LEG: Variable(np.array([1, 2]), (LEG,), "1", "leg: 1 swings first, 2 stands first")}
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `OF_STEPS`; NaN and missing values of the last steps become gaps."""
+    """Build variables over steps, named as in `OF_STEPS`. NaN and missing values of the last steps become gaps."""
     count = np.size(touch_time_s)
     if count == 0:
         return {}
@@ -210,7 +210,7 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
 
 
 def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
-    """Return the mean speed (m/s) up to the last touch, and its Froude number; empty if no step was completed."""
+    """Return the mean speed (m/s) up to the last touch, and its Froude number, or nothing if no step was completed."""
     if not walk.steps:
         return {}
     speed = float(walk.touch_along_m[-1] / walk.touch_time_s[-1])
@@ -218,7 +218,9 @@ def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str,
 
 
 def driven_by(walk: WalkRecord) -> dict[str, Any]:
-    """Return the work of each drive per step and the cost of transport; empty for a walk that covers no distance."""
+    """Return the work of each drive per step and the cost of transport, or nothing for a walk that covers
+    no distance.
+    """
     distance = float(walk.touch_along_m[-1]) if walk.steps else 0.0
     if distance <= 0.0:
         return {}
@@ -245,7 +247,7 @@ def settling(walk: WalkRecord) -> dict[str, int | None]:
 
 
 def steps_to_repeat_last(steps: Floats) -> int:
-    """Return the number of steps after which the last steps (steps, n) repeat, in the longest end that does; or 0."""
+    """Return the number of steps after which the last steps (steps, n) repeat, in the longest end that does, or 0."""
     longest = max(MAX_REPEATED, len(steps) // 4)
     ends = (longest >> halvings for halvings in range(longest.bit_length()))
     periods = (steps_to_repeat(steps[-end:]) for end in ends if end >= FEWEST_SETTLED)
@@ -253,7 +255,7 @@ def steps_to_repeat_last(steps: Floats) -> int:
 
 
 def steps_to_repeat(steps: Floats) -> int:
-    """Return the number of steps after which quantities of steps (steps, n), relative to 1, repeat; 0 if never."""
+    """Return the number of steps after which quantities of steps (steps, n), relative to 1, repeat, or 0 if never."""
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
         apart = np.abs(steps[period:] - steps[:-period]).max()
@@ -264,7 +266,7 @@ def steps_to_repeat(steps: Floats) -> int:
 
 
 def numbers_of(walk: WalkRecord) -> dict[str, Any]:
-    """Summarise a walk of either model; knee strikes only for walkers with knees."""
+    """Summarise a walk of either model, with knee strikes for walkers with knees."""
     strikes = walk.knee_strike_time_s
     knee_strikes = (
         {} if strikes is None else {"knee_strike_times_s": [None if np.isnan(t) else t for t in strikes.tolist()]}
@@ -288,7 +290,9 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
 
 
 def last_stride(walk: WalkRecord) -> dict[str, Any]:
-    """Return both steps of a walk's last stride and how they differ; empty for a walk without a stride."""
+    """Return both steps of a walk's last stride and how they differ, or an empty mapping for a walk without
+    a stride.
+    """
     if walk.steps < STRIDE:
         return {}
     count = walk.steps - walk.steps % STRIDE  # leg 1 swings in the first step of a stride
@@ -316,7 +320,7 @@ def mean_step(walk: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Return period (s), length (m) and knee strike time (s) of a walk's last step; None for what did not happen."""
+    """Return period (s), length (m) and knee strike time (s) of a walk's last step, or None for what did not happen."""
     periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
     step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
     if not strikes:

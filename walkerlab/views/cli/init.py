@@ -36,7 +36,7 @@ check:                               # a printed gait; `walkerlab check` says wh
 
 
 def write_config(file: Path, walker: str, checks: bool = False) -> str:
-    """Write a walker's commented config and schema; `checks` adds a block `check` to fill in.
+    """Write a walker's commented config and schema. `checks` adds a block `check` to fill in.
 
     Raises ConfigError for an unknown type, StorageError if writing fails.
     """

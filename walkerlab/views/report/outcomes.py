@@ -67,7 +67,7 @@ def legs_differ(gait: Mapping[str, Any]) -> bool:
 
 
 def describe_limp(gait: Mapping[str, Any]) -> str:
-    """Describe, after a multiplier, by how much the steps of legs that differ differ; empty for equal legs."""
+    """Describe, after a multiplier, by how much the steps of legs that differ differ, or return '' for equal legs."""
     if not legs_differ(gait):
         return ""
     period, length = (gait["asymmetry"][f"step_{name}"] for name in ("period", "length"))
