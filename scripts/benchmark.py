@@ -37,7 +37,7 @@ from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, ContactTrial, Rigi
 from walkerlab.evidence.benchmarks.user_script import walk_as_a_script
 from walkerlab.evidence.paper.walker import compass, compass_or_none
 from walkerlab.physics.hybrid.endings import FALLEN_HIP
-from walkerlab.physics.hybrid.recorded_walk import with_scaled_rates
+from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.hybrid.rigid_lanes import new_fates, new_lane_memory, two_legs, walk_lanes
 from walkerlab.physics.orbits.basin import ATOL, RTOL, Attractors
 from walkerlab.physics.orbits.families import ValueSpan
@@ -47,7 +47,7 @@ from walkerlab.physics.orbits.fixed_point import (
     Search,
     SlopeBranch,
     find_gaits,
-    over_slope,
+    map_over_slope,
 )
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import state_on_section
@@ -213,7 +213,7 @@ def printed_trial() -> RigidTrial:
 def rigid_trial_of(config: Config) -> RigidTrial:
     """Ten rigid steps from near the gait of a config."""
     walker = rigid_walker(config, "corrected")
-    start = with_scaled_rates(walker, chosen_gait(config).state, START_RATE_FACTOR, START_RATE_FACTOR)
+    start = scale_rates(walker, chosen_gait(config).state, START_RATE_FACTOR, START_RATE_FACTOR)
     return RigidTrial(walker, start, STEPS, compass_or_none(config, "corrected"))
 
 
@@ -234,7 +234,7 @@ def newton_lines(watch: Stopwatch) -> Iterator[Line]:
     """From the small-slope seed to the fixed point at 1 degree."""
     search = Search(rigid_walker(ONE_DEGREE, "corrected"))
     seed, slope = seeds(search.walker)[0], float(search.walker.slope)
-    looking = over_slope(search.walker, SEARCH_TOLERANCES)
+    looking = map_over_slope(search.walker, SEARCH_TOLERANCES)
 
     def solve() -> None:
         _, z = SlopeBranch(looking, seed).follow(slope)

@@ -15,7 +15,7 @@ from walkerlab.evidence.check.gaits import gait_near
 from walkerlab.evidence.check.mistakes import families_of, mistakes_of
 from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker
 from walkerlab.evidence.check.section import COLUMNS, headline, remarks, source_of
-from walkerlab.evidence.check.walks import Walk
+from walkerlab.evidence.check.walks import CheckedStep
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 
@@ -79,7 +79,7 @@ def page() -> str:
     return HEAD + "\n" + "\n\n".join([*overview, *(part for each in entries for part in each if part), TAIL])
 
 
-def walkers_with_mistakes(name: str) -> tuple[Walk, list[tuple[str, PlainWalker]]]:
+def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, PlainWalker]]]:
     """Return the right gait of a config's walker, and its walkers with mistakes."""
     config = load(Path(name)).config
     right = Checked(config, Check(), find_gaits(rigid_walker(config))).right

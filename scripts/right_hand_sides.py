@@ -12,7 +12,7 @@ from walkerlab.config import loader
 from walkerlab.evidence.paper.appendix_a import RigidWalker, accelerations, swing_constants
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.physics.ground.friction import Coulomb, Frictionless
-from walkerlab.physics.ground.walker import ContactWalker, on_ground
+from walkerlab.physics.ground.walker import ContactWalker, place_on_ground
 from walkerlab.physics.kernels import kernel, kernel_part
 from walkerlab.physics.mechanics.rigid_model import BENT, Mode, RigidModel, swing_foot
 from walkerlab.physics.solvers.system import State, derivative
@@ -60,11 +60,14 @@ def systems() -> dict[str, tuple[Any, State]]:
         "Appendix A": (AppendixA(compass(ONE_DEGREE, "corrected")), ANGLES),
         "rigid": (Mode(rigid, BENT), ANGLES),
         "rigid, inertia": (Mode(heavy, BENT), ANGLES),
-        "contact": (on_ground(walker, both), FREE),
-        "contact, friction of zero": (on_ground(walker._replace(friction=Coulomb(0.0, 0.0, 0.1, 1.0)), both), FREE),
-        "contact, frictionless": (on_ground(walker._replace(friction=Frictionless()), both), FREE),
-        "contact, inertia": (on_ground(walker_of(rigid, "walker.leg_inertia_kg_m2=0.1"), both), FREE),
-        "contact, pinned": (on_ground(walker, (False, False), pinned=True), ANGLES),
+        "contact": (place_on_ground(walker, both), FREE),
+        "contact, friction of zero": (
+            place_on_ground(walker._replace(friction=Coulomb(0.0, 0.0, 0.1, 1.0)), both),
+            FREE,
+        ),
+        "contact, frictionless": (place_on_ground(walker._replace(friction=Frictionless()), both), FREE),
+        "contact, inertia": (place_on_ground(walker_of(rigid, "walker.leg_inertia_kg_m2=0.1"), both), FREE),
+        "contact, pinned": (place_on_ground(walker, (False, False), pinned=True), ANGLES),
     }
 
 

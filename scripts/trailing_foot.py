@@ -28,7 +28,7 @@ from walkerlab.physics.ground.walker import (
     OnGround,
     feet_motion,
     foot_force,
-    on_ground,
+    place_on_ground,
     sines_cosines,
     to_form,
 )
@@ -71,7 +71,7 @@ def at_touch(ground: Ground, name: str, slope_deg: float) -> tuple[OnGround, Flo
     methods = Tolerances("radau5", 1e-10, 1e-13, 10**7)
     y = walk_contact(trial.walker, trial.ground, False, TRAILING, trial.start, methods, 1, None).end_state
     assert not trial.walker.whole.release_at_touch, "both knees are still locked as the foot sinks in"
-    system = on_ground(trial.walker, (True, True), (LOCKED, LOCKED))
+    system = place_on_ground(trial.walker, (True, True), (LOCKED, LOCKED))
     return system, to_form(system.form, y)
 
 

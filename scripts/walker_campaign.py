@@ -43,7 +43,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.hybrid.rigid_walk import SHORTEST_LANDING
 from walkerlab.physics.mechanics.parts import Assembly
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits.fixed_point import (
     MAX_START,
@@ -229,7 +229,7 @@ def tally(name: str, walkers: int, seed: int) -> Tally:
         light = name == "light-hips"
         described, slope = TYPES[name](draw), float(10.0 ** draw.uniform(*((-3.5, -1.3) if light else (-2.3, -1.0))))
         assembly = assembly_of(described, rigid=True)
-        walker = standing(assembly, 9.81, slope, knee_locked_at_strike(described))
+        walker = rigid_on_slope(assembly, 9.81, slope, knee_locked_at_strike(described))
         if name == "kneed-torque":
             walker = walker.changed(**torque_and_spring(draw))
         start = time.process_time()

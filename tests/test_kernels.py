@@ -16,13 +16,13 @@ from walkerlab.physics import kernel_cache
 from walkerlab.physics.compiler import read_code, stripped
 from walkerlab.physics.kernel_cache import watch_compilation
 from walkerlab.physics.kernels import (
-    by_reference,
-    by_type,
-    by_type_or_default,
+    dispatch_by_type,
+    dispatch_by_type_or_default,
     forced_inline,
     kernel,
     kernel_part,
     matrix,
+    pass_by_reference,
     uncompiled,
     vector,
 )
@@ -40,7 +40,7 @@ class Square(NamedTuple):
     side: float
 
 
-@by_type
+@dispatch_by_type
 def area(shape):
     """Area of a shape."""
 
@@ -92,7 +92,7 @@ def test_type_without_a_case_is_named_in_one_line(call):
         call((1.0, 2.0))
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def corners(shape):
     """How many corners a shape has."""
     return 0
@@ -115,7 +115,7 @@ def test_types_without_a_case_use_the_default():
     assert Circle not in corners
 
 
-@by_reference
+@pass_by_reference
 class Lid(NamedTuple):
     """A part of a record."""
 
@@ -123,7 +123,7 @@ class Lid(NamedTuple):
     weights: np.ndarray
 
 
-@by_reference
+@pass_by_reference
 class Box(NamedTuple):
     """A record with arrays and a record in it."""
 

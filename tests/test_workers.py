@@ -13,7 +13,7 @@ import worker_calls as calls
 from process_table import THERE, is_alive, workers_below
 
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.run.workers import Worker, WorkerDiedError, WorkerPool, WorkerTimeoutError, in_order
+from walkerlab.pipeline.run.workers import Worker, WorkerDiedError, WorkerPool, WorkerTimeoutError, map_in_order
 
 DEADLINE_S = 60.0
 
@@ -33,18 +33,18 @@ def pool():
 
 
 def test_results_come_in_the_order_of_the_calls():
-    assert list(in_order([partial(calls.square, n) for n in range(7)], jobs=3)) == [n * n for n in range(7)]
+    assert list(map_in_order([partial(calls.square, n) for n in range(7)], jobs=3)) == [n * n for n in range(7)]
 
 
 def test_single_job_and_first_calls_run_in_this_process():
-    assert set(in_order([calls.own_id] * 3, jobs=1)) == {os.getpid()}
-    ids = list(in_order([calls.own_id] * 3, jobs=2, first=(1,)))
+    assert set(map_in_order([calls.own_id] * 3, jobs=1)) == {os.getpid()}
+    ids = list(map_in_order([calls.own_id] * 3, jobs=2, first=(1,)))
     assert ids[1] == os.getpid()
     assert os.getpid() not in (ids[0], ids[2])
 
 
 def test_calls_of_lowest_rank_start_first():
-    begun = list(in_order([calls.begun_at] * 3, jobs=2, rank=lambda place: -place))
+    begun = list(map_in_order([calls.begun_at] * 3, jobs=2, rank=lambda place: -place))
     assert begun[0] == max(begun)
 
 

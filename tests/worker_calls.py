@@ -7,7 +7,7 @@ import sys
 import time
 
 from walkerlab.errors import NoAnswer
-from walkerlab.pipeline.run.workers import in_order, tell
+from walkerlab.pipeline.run.workers import map_in_order, tell
 
 
 def square(number):
@@ -105,4 +105,4 @@ def interrupt_handler():
 def squares_of_workers_own(count):
     from functools import partial
 
-    return list(in_order([partial(square, number) for number in range(count)], 2))
+    return list(map_in_order([partial(square, number) for number in range(count)], 2))

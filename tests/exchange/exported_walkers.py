@@ -8,7 +8,7 @@ from adams_dataset import Dataset
 
 from walkerlab.api.memory import in_memory
 from walkerlab.config.loader import load
-from walkerlab.exchange.export import export_model, with_stops
+from walkerlab.exchange.export import add_stops, export_model
 from walkerlab.exchange.exported import prepare_export
 
 PADS = "contact.terrain=checkerboard"
@@ -102,7 +102,7 @@ def run_kneed(name, *sets):
     touches, locks = (
         np.array([time for sensor, time in events if sensor.endswith(ending)]) for ending in ("touches", "straight")
     )
-    return touches, locks, prepare_export(with_stops(config), length, state).walk
+    return touches, locks, prepare_export(add_stops(config), length, state).walk
 
 
 def touches_of(dataset, export, count):

@@ -20,7 +20,7 @@ from exported_walkers import (
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.export import export_model
 from walkerlab.physics.ground.external import feet_and_forces
-from walkerlab.physics.ground.walker import new_progress, on_ground
+from walkerlab.physics.ground.walker import new_progress, place_on_ground
 
 MM = 1000.0
 STOPS = ((), ("walker.knee.lock=compliant",))
@@ -109,7 +109,7 @@ def test_exported_forces_equal_the_models(seed, law):
     # the other foot has just touched: its leg stands, and the trailing foot is pushed
     touch = export.touches_s[0]
     time = touch + 0.3 * export.config.push_off.duration_s
-    system = on_ground(export.scene.walker, (True, True), progress=new_progress(0, 1, touch))
+    system = place_on_ground(export.scene.walker, (True, True), progress=new_progress(0, 1, touch))
     for q, v in random_states(export):
         ours, feet = np.zeros(q.size), np.zeros((2, 4))
         feet_and_forces(system, export.model.chain, time, q, v, feet, ours)

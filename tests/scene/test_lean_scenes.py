@@ -13,7 +13,7 @@ from system_rates import gradient_of, rate_of
 from walkerlab.config.loader import load
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Coulomb, Frictionless, switching_count
-from walkerlab.physics.ground.walker import FootMotion, feet_motion, foot_force, on_ground
+from walkerlab.physics.ground.walker import FootMotion, feet_motion, foot_force, place_on_ground
 from walkerlab.physics.hybrid.contact_events import FRICTION_SWITCHES, MATERIAL
 from walkerlab.physics.mechanics.parts import Assembly, Body, Particle
 from walkerlab.physics.solvers.registry import Tolerances
@@ -49,7 +49,7 @@ def same_to_rounding(found, expected, scale):
 
 def stiffest(walker, y):
     """By how much the ground magnifies the rounding of a foot's height: the force's gradient over the masses."""
-    J = gradient_of(on_ground(walker, BOTH), y)
+    J = gradient_of(place_on_ground(walker, BOTH), y)
     return np.abs(J).max()
 
 
@@ -63,8 +63,8 @@ states = st.tuples(
 def test_frictionless_ground_is_a_coefficient_of_zero(state, radius):
     zero, none = (walker_with(radius, law) for law in (NO_FRICTION, Frictionless()))
     y = over(zero, *state)
-    assert rate_of(on_ground(none, BOTH), y) == rate_of(on_ground(zero, BOTH), y)
-    found, expected = gradient_of(on_ground(none, BOTH), y), gradient_of(on_ground(zero, BOTH), y)
+    assert rate_of(place_on_ground(none, BOTH), y) == rate_of(place_on_ground(zero, BOTH), y)
+    found, expected = gradient_of(place_on_ground(none, BOTH), y), gradient_of(place_on_ground(zero, BOTH), y)
     np.testing.assert_array_equal(found, expected)
 
 
@@ -93,7 +93,7 @@ def rates_with_point_feet(walker, y):
 def test_point_foot_is_a_ball_of_radius_zero(state):
     walker = walker_with(radius=0.0)
     y = over(walker, *state)
-    same_to_rounding(rate_of(on_ground(walker, BOTH), y), rates_with_point_feet(walker, y), stiffest(walker, y))
+    same_to_rounding(rate_of(place_on_ground(walker, BOTH), y), rates_with_point_feet(walker, y), stiffest(walker, y))
 
 
 @given(state=states, clearance=st.floats(1e-9, 0.5))
@@ -102,7 +102,7 @@ def test_foot_in_the_air_moves_as_without_ground(state, clearance):
     foot, _, *rest = state
     y = over(walker, foot, clearance, *rest)
     has_ground = (foot != 0, foot != 1)
-    assert rate_of(on_ground(walker, has_ground), y) == rate_of(on_ground(walker, BOTH), y)
+    assert rate_of(place_on_ground(walker, has_ground), y) == rate_of(place_on_ground(walker, BOTH), y)
 
 
 @given(state=states)
@@ -115,8 +115,8 @@ def test_leg_without_inertia_is_a_point_mass_on_a_massless_bar(state):
     one = walker_with()
     other = contact_walker(points, one.normal, one.friction, 9.81, one.slope)
     y = over(one, *state)
-    found = rate_of(on_ground(other, BOTH), y)
-    expected = rate_of(on_ground(one, BOTH), y)
+    found = rate_of(place_on_ground(other, BOTH), y)
+    expected = rate_of(place_on_ground(one, BOTH), y)
     same_to_rounding(found, expected, stiffest(one, y))
 
 

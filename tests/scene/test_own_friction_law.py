@@ -15,7 +15,7 @@ from walkerlab.evidence.benchmarks.contact_trials import CREEP_FACTOR, stiff_gro
 from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.physics.ground import friction
 from walkerlab.physics.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
-from walkerlab.physics.orbits.contact_gait import why_no_gait, with_rigidity, with_scaled_laws
+from walkerlab.physics.orbits.contact_gait import scale_laws, set_rigidity, why_no_gait
 from walkerlab.physics.orbits.rigid_limit import STICTION_SERIES, series_settings
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.run.runner import execute
@@ -135,10 +135,10 @@ def test_result_names_its_friction_law(own):
 
 
 def test_rigid_limit_reduces_the_creep_of_any_law(own):
-    stiff = with_rigidity(own.walker, 1.0).friction.v_0
+    stiff = set_rigidity(own.walker, 1.0).friction.v_0
     assert stiff < 0.1
     setting = series_settings(STICTION_SERIES)[-1]
-    assert with_scaled_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
+    assert scale_laws(own.walker, *setting[2:]).friction.v_0 == pytest.approx(0.1 * setting.stiction)
     trial = stiff_ground_trial(load().config, START, 0.3714, 2)
     assert trial.walker.friction.v_0 == pytest.approx(0.1 * CREEP_FACTOR)
 

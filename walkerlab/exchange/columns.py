@@ -85,7 +85,7 @@ class RecordedWalk:
 
 
 @dataclass(frozen=True)
-class Source:
+class ColumnSource:
     """Column, or line between markers, that a quantity comes from: sign times its values, plus a constant."""
 
     column: str
@@ -133,7 +133,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
             if name in ends:
                 lines[name] = places_of_ends(within, ends[name], units)
             else:
-                source = named.get(name, Source(column))
+                source = named.get(name, ColumnSource(column))
                 unit = unit_value(recording, name, column, QUANTITY_KINDS[name], units)
                 floor = floor_in_column(recording, asked, slope_rad) if name in NEEDED[1:] else 0.0
                 values[name] = source.sign * (unit * within.columns[column] + floor) + source.constant
@@ -162,7 +162,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     if not lines:
         return walk
     constants = {name: source.constant for name, source in named.items() if name in lines}
-    return with_lines(walk, lines, constants, str(recording.path))
+    return add_lines(walk, lines, constants, str(recording.path))
 
 
 def with_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, list[str]]:
@@ -261,7 +261,7 @@ def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> 
     return slope_rad if asked.walks == "left" else -slope_rad
 
 
-def with_lines(
+def add_lines(
     walk: RecordedWalk, lines: Mapping[str, Line], constants: Mapping[str, float], source: str
 ) -> RecordedWalk:
     """Add the angles of lines between markers (by quantity) to a walk.
@@ -417,13 +417,13 @@ def leg_names(name: str) -> list[str]:
     return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
 
 
-def find_named(recording: Recording, asked: Recorded) -> dict[str, Source]:
+def find_named(recording: Recording, asked: Recorded) -> dict[str, ColumnSource]:
     """Return the sources that the user names, by quantity.
 
     Raises ConfigError for an unknown quantity or column.
     """
     known = {plain(name): name for name in QUANTITY_KINDS}
-    sources = {TIME: Source(FRAME_TIME)} if FRAME_TIME in recording.columns else {}
+    sources = {TIME: ColumnSource(FRAME_TIME)} if FRAME_TIME in recording.columns else {}
     for quantity, text in asked.columns.items():
         name = known.get(plain(quantity))
         if name is None:
@@ -436,19 +436,19 @@ def find_named(recording: Recording, asked: Recorded) -> dict[str, Source]:
     return sources
 
 
-def parse_source(recording: Recording, text: str, kind: str) -> Source:
+def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
     """Return the source that a text such as NAME, -NAME or NAME+90deg names. An exact or quoted column name wins.
 
     Raises ConfigError for a constant in an unknown unit, and for a line with a sign.
     """
     name = named_column(recording, text)
     if name in recording.columns:
-        return Source(name)
+        return ColumnSource(name)
     if quoted := QUOTED.fullmatch(text):
-        return Source(named_column(recording, quoted[1]))
+        return ColumnSource(named_column(recording, quoted[1]))
     match = CHANGED.fullmatch(text)
     if match is None or not (match[1] or match[3]):
-        return Source(name)
+        return ColumnSource(name)
     unit = value_in_si(match[4], kind) if match[4] else 0.0
     if unit is None:
         raise ConfigError(
@@ -461,7 +461,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> Source:
             f"--columns: {text!r} changes the sign of a line's angle, which follows from the way the walk goes.",
             "Leave out the sign, or state the direction with --walks.",
         )
-    return Source(column, -1.0 if match[1] else 1.0, float(match[3].replace(" ", "")) * unit if match[3] else 0.0)
+    return ColumnSource(column, -1.0 if match[1] else 1.0, float(match[3].replace(" ", "")) * unit if match[3] else 0.0)
 
 
 def named_column(recording: Recording, name: str) -> str:

@@ -58,7 +58,7 @@ def export_model(
     Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
     pads depends on a contact gait and none is found.
     """
-    export = prepare_export(config if kind == "mjcf" else with_stops(config), rigid_step_length_m, rigid_state)
+    export = prepare_export(config if kind == "mjcf" else add_stops(config), rigid_step_length_m, rigid_state)
     stem = stem or export.model_name
     left_out = tuple(parts_left_out(export, config, kind, law, f"{stem}.py"))
     tilted = "gravity" if slope == "gravity" else "ground"
@@ -100,7 +100,7 @@ def slope_named(text: str) -> Slope:
     raise ConfigError(f"--slope {text}: unknown way to express a slope.", f"Choose from {', '.join(SLOPES)}.")
 
 
-def with_stops(config: Config) -> Config:
+def add_stops(config: Config) -> Config:
     """Return a config whose knees are caught by a stop before they lock.
 
     ADAMS changes velocities in a way of its own where a joint is activated, so a knee must be at rest when it locks.

@@ -16,7 +16,7 @@ import numpy as np
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import HIP_OF_LINES, SAMPLE, RecordedWalk, only_rows
 from walkerlab.exchange.marker_lines import NAMED, spell_samples, swap_doubt, swapped_rows
-from walkerlab.exchange.rate_jumps import AHEAD, Array, apart_runs
+from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs
 from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
 from walkerlab.exchange.touches import ERRORS
 
@@ -40,7 +40,7 @@ def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
 
     Raises ConfigError for angles that are not those of two legs near the vertical.
     """
-    mended = on_course(swap_back(keep_one_way(unwrap(walk, source))))
+    mended = drop_off_course(swap_back(keep_one_way(unwrap(walk, source))))
     upright = {name: mended.quantities[name] - walk.tilt_rad for name in ("angle 1", "angle 2")}
     return replace(mended, quantities={**mended.quantities, **upright})
 
@@ -101,7 +101,7 @@ def swap_back(walk: RecordedWalk) -> RecordedWalk:
     return doubting(replace(walk, quantities=quantities), swap_doubt(walk.time_s, walk.quantities[SAMPLE], swapped))
 
 
-def on_course(walk: RecordedWalk) -> RecordedWalk:
+def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
     """Leave out samples at which a leg is off its course, and cut where an angle jumps and stays beside it."""
     stretches = find_stretches(walk.time_s, legs(walk))
     off, numbers = np.zeros((walk.time_s.size, 2), bool), walk.quantities[SAMPLE]
@@ -164,7 +164,7 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
 def find_ways(time: Array, angle: Array) -> list[Way]:
     """Return the stretches of a walk in one direction. A single passing of the legs the other way does not count."""
     spread, total = angle[:, 0] - angle[:, 1], angle.sum(axis=1)
-    runs = apart_runs(np.abs(spread) > AHEAD * np.percentile(np.abs(spread), FAR_PERCENT), spread > 0.0)
+    runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.percentile(np.abs(spread), FAR_PERCENT), spread > 0.0)
     trends = [
         (last, first, trend(time[last : first + 1], total[last : first + 1]))
         for (_, last), (first, _) in pairwise(runs)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 NORMAL_QUARTILE: Final = 0.6745  # median of the absolute value of a normal variable with standard deviation 1
-AHEAD: Final = 0.4
+WINDOW_AHEAD: Final = 0.4
 """Smallest angle between the legs at a heel strike, as a fraction of the largest during the walk."""
 WINDOW: Final = 0.1
 """Time before and after a heel strike in which angles are fitted, as a fraction of the step period."""
@@ -36,7 +36,7 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     total  function from angles (samples, 2), from the vertical, to their sum (samples,), from the slope's normal
     """
     spread, sums = angle[:, 0] - angle[:, 1], total(angle)
-    runs = apart_runs(np.abs(spread) > AHEAD * np.abs(spread).max(), spread > 0.0)
+    runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.abs(spread).max(), spread > 0.0)
     half = WINDOW * typical_interval([0.5 * (time[first] + time[last]) for first, last in runs], time)
     evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_RUNS], half) for tried in SUMS])
     padded = np.concatenate(([0.0], evidence, [0.0]))

@@ -73,7 +73,9 @@ NO_FILE: Final = "there is no such file"
 LONGEST_PATH: Final = 200  # characters of a path that messages show
 HEADER_LINES: Final = 60
 """Number of lines at the top of a file that are searched for the header."""
-WANTED: Final = "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
+ACCEPTED_FORMATS: Final = (
+    "CSV (.csv, .txt, .tab, .tsv), ADAMS results (.res), OpenSim (.sto, .mot), markers (.trc, .c3d)"
+)
 
 ONE_TABLE: Final = (
     "Write a table with a column of times and all points side by side: time (s),hip.x,hip.y,foot1.x,foot1.y,..."
@@ -140,7 +142,7 @@ def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
     if reader is None:
         raise ConfigError(
             f"{path} has an unsupported format ({path.suffix or 'no extension'}).",
-            FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {WANTED}."),
+            FORMAT_ADVICE.get(path.suffix.lower(), f"Export it as one of: {ACCEPTED_FORMATS}."),
         )
     return read_file(path, reader, key)
 
@@ -191,7 +193,7 @@ def read_delimited(path: Path) -> Recording:
     for beginning, (program, advice) in PROGRAMS.items():
         if beginning.match(text):
             raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
-    lines = with_one_header(without_blanks(text.splitlines()))
+    lines = with_one_header(remove_blanks(text.splitlines()))
     delimiter, header, unit_row, first = header_of(path, lines)
     names, units = names_and_units(header)
     names = [name or f"column {number}" for number, name in enumerate(names, 1)]
@@ -221,7 +223,7 @@ def with_one_header(lines: list[str]) -> list[str]:
     return [*[""] * coords, ",".join(["frame", *(f'"{name}"' for name in names)]), *lines[coords + 1 :]]
 
 
-def without_blanks(lines: list[str]) -> list[str]:
+def remove_blanks(lines: list[str]) -> list[str]:
     """Return lines with semicolons between columns if blanks separate numbers with decimal commas."""
     last = next((line for line in reversed(lines) if line.strip()), "")
     if not COMMAS_AND_BLANKS.fullmatch(last):
@@ -248,7 +250,7 @@ def text_of(path: Path) -> str:
         if "\0" in text:
             break
         return text
-    raise ConfigError(f"{path} is not a text file, despite its extension.", f"Export it as one of: {WANTED}.")
+    raise ConfigError(f"{path} is not a text file, despite its extension.", f"Export it as one of: {ACCEPTED_FORMATS}.")
 
 
 def rows_of(lines: Iterable[str], delimiter: str) -> Iterator[Row]:
@@ -274,7 +276,7 @@ def header_of(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[st
             has_units = len(below) > 1 and not any(map(is_number, below[0][1])) and any(map(is_unit, below[0][1]))
             units = below[0][1] if has_units else [""] * len(names)
             line, cells = below[has_units]
-            alike = len(names) == len(units) == len(without_blank_end(cells, len(names))) >= fewest
+            alike = len(names) == len(units) == len(trim_blank_end(cells, len(names))) >= fewest
             numbers = sum(map(is_number, names))
             if alike and any(names) and numbers < (1 if only_words else len(names)) and any(map(is_number, cells)):
                 return delimiter, names, units, line
@@ -301,7 +303,7 @@ def refuse_without_table(path: Path, lines: Sequence[str]) -> None:
             )
 
 
-def without_blank_end(cells: list[str], count: int) -> list[str]:
+def trim_blank_end(cells: list[str], count: int) -> list[str]:
     """Return the first `count` cells of a row if the others are empty, otherwise the row."""
     return cells if any(cells[count:]) else cells[:count]
 
@@ -341,7 +343,7 @@ def table_of(
     """
     numbers, table = [], []
     for number, row in rows:
-        cells = without_blank_end(row, len(names))
+        cells = trim_blank_end(row, len(names))
         if len(cells) != len(names):
             raise ConfigError(
                 f"{path}, line {number}: {len(cells)} values where the header names {len(names)} columns.",
@@ -435,7 +437,7 @@ def read_adams_results(path: Path) -> Recording:
     values = np.array([numbers_of_step(path, place, step, len(components)) for place, step in enumerate(steps)])
     names = [name for _, name, _ in components]
     units = {name: unit for _, name, unit in components if unit not in ("", "no_units")}
-    return without_repeated_times(build_recording(path, names, values.T, units, xml_units(root)))
+    return drop_repeated_times(build_recording(path, names, values.T, units, xml_units(root)))
 
 
 def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, str, str]]:
@@ -480,7 +482,7 @@ def xml_units(root: ElementTree.Element) -> dict[str, str]:
     return {kind: units[kind] for kind in ("angle", "length", "time", "force") if units.get(kind)}
 
 
-def without_repeated_times(recording: Recording) -> Recording:
+def drop_repeated_times(recording: Recording) -> Recording:
     """Keep the last of the samples at a time: a block begins with the last sample of the block before it."""
     time = recording.columns.get(recording.time_name or "", np.zeros(0))
     last = np.append(np.diff(time) != 0.0, True) if time.size else np.zeros(0, bool)

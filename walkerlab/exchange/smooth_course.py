@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.exchange.rate_jumps import AHEAD, Array, apart_runs, noise_of, typical_interval
+from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs, noise_of, typical_interval
 
 HIGHEST_DEGREE: Final = 7  # of the polynomial through a step; it leaves 0.1 mrad of the angles of straight legs
 SAMPLES_PER_DEGREE: Final = 3  # samples of a step for each degree above 1
@@ -295,7 +295,7 @@ def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> C
     course = Course(time, angle, np.arange(time.size), [], 0.0).without(stretches)
     time, angle = course.time, course.angle
     spread = angle[:, 0] - angle[:, 1]
-    far = AHEAD * float(np.percentile(np.abs(spread), FAR_PERCENT))
+    far = WINDOW_AHEAD * float(np.percentile(np.abs(spread), FAR_PERCENT))
     apart = apart_runs(np.abs(spread) > far, spread > 0.0)
     shortest = BRIEF * float(np.percentile([time[last] - time[first] for first, last in apart] or [0.0], FAR_PERCENT))
     runs: list[tuple[int, int]] = []

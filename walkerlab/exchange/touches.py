@@ -15,20 +15,20 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.exchange.rate_jumps import AHEAD, WINDOW, Array, typical_interval
+from walkerlab.exchange.rate_jumps import WINDOW, WINDOW_AHEAD, Array, typical_interval
 
 Height = Callable[[Array], Array]
 
 DEGREES: Final = range(1, 7)
 """Degrees of the polynomials; the samples decide between them."""
-FEWEST: Final = 6
+MIN_SAMPLES: Final = 6
 """Fewest samples on each side of a heel strike that a fit takes in, if the step has as many."""
 WIDEST: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
 SHORTEST: Final = 0.25  # fraction of the step period; nearer crossings of one leg are one heel strike
 SLOWEST: Final = 0.25  # fraction of the median speed of falling feet; a slower crossing is no heel strike
 ITERATIONS: Final = 20
-SETTLED: Final = 3  # number of iterations that choose the degree anew
-CLOSE: Final = 1e-3  # correction at which a heel strike is located, in standard errors
+DEGREE_ITERATIONS: Final = 3  # number of iterations that choose the degree anew
+LOCATED: Final = 1e-3  # correction at which a heel strike is located, in standard errors
 ERRORS: Final = 3.0  # standard errors within which a value is zero
 LASTING_S: Final = 1e-4  # time that a heel strike takes on ground that gives way, so that no fit resolves less
 PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first sample
@@ -97,7 +97,7 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
     spread, over = angle[:, 0] - angle[:, 1], height(angle)
-    apart = AHEAD * np.abs(spread).max()
+    apart = WINDOW_AHEAD * np.abs(spread).max()
     crossings = []
     for i in np.flatnonzero((over[:-1] > 0.0) != (over[1:] > 0.0)):
         leg, ahead = (0, spread[i]) if over[i] > 0.0 else (1, -spread[i])
@@ -124,7 +124,7 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
     The height fitted at the first sample is zero within three of its standard errors, which are small in time.
     """
     spread, begin = angle[:, 0] - angle[:, 1], float(time[0])
-    if abs(spread[0]) <= AHEAD * np.abs(spread).max():
+    if abs(spread[0]) <= WINDOW_AHEAD * np.abs(spread).max():
         return None
     rows = time - begin <= WIDEST * period
     t, y = time[rows] - begin, angle[rows]
@@ -145,14 +145,14 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     at, correction, degree, touch = 0.0, 0.0, DEGREES[0], None
     for iteration in range(ITERATIONS):
         # The best degree shows only once the polynomials meet near the strike.
-        degree = best_degree(t, y, at) if iteration < SETTLED else degree
+        degree = best_degree(t, y, at) if iteration < DEGREE_ITERATIONS else degree
         fit = fit_at(t, y, at, degree)
         touch = touch_of(fit, height, near + at, leg) if fit else None
         if touch is None or touch.fall_m_s <= 0.0:
             return None
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
         correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
-        if iteration >= SETTLED and abs(correction) < CLOSE * touch.error_s:
+        if iteration >= DEGREE_ITERATIONS and abs(correction) < LOCATED * touch.error_s:
             return touch_of(with_bias(touch.fit, t, y, at, degree), height, near + at, leg)
         at += correction
     # With much noise the samples that change sides keep moving the zero.
@@ -162,7 +162,7 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
     """Return the samples around an instant (times from it, and angles), with more of the step if samples are sparse."""
     away = np.abs(time - near)
-    wanted = float(np.partition(away, min(2 * FEWEST, away.size) - 1)[min(2 * FEWEST, away.size) - 1])
+    wanted = float(np.partition(away, min(2 * MIN_SAMPLES, away.size) - 1)[min(2 * MIN_SAMPLES, away.size) - 1])
     inside = away <= max(WINDOW * period, min(wanted, WIDEST * period))
     return time[inside] - near, angle[inside]
 

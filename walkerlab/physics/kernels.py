@@ -119,7 +119,7 @@ class ByType:
         return body
 
 
-def by_type(declaration: Callable[..., Any]) -> ByType:
+def dispatch_by_type(declaration: Callable[..., Any]) -> ByType:
     """Declare a function with one body per type of its first argument (a NamedTuple class)."""
     # The choice is made while compiling, so variants that a scene does not use cost nothing.
     chosen = ByType(declaration)
@@ -127,15 +127,15 @@ def by_type(declaration: Callable[..., Any]) -> ByType:
     return chosen
 
 
-def by_type_or_default(declaration: Callable[..., Any]) -> ByType:
-    """Declare a function as `by_type` does. Types without a registered body use the body of the declaration."""
-    chosen = by_type(declaration)
+def dispatch_by_type_or_default(declaration: Callable[..., Any]) -> ByType:
+    """Declare a function as `dispatch_by_type` does. Types without a registered body use the body of the declaration."""
+    chosen = dispatch_by_type(declaration)
     chosen.default = declaration
     return chosen
 
 
 class ByAddress(types.Type):
-    """Numba's type of a NamedTuple that is passed by its address: see `by_reference`."""
+    """Numba's type of a NamedTuple that is passed by its address: see `pass_by_reference`."""
 
     def __init__(self, held: Any) -> None:
         self.held, self.instance_class = held, held.instance_class
@@ -147,7 +147,7 @@ class ByAddress(types.Type):
         return f"{self.instance_class.__name__}_{hashlib.sha256(self.name.encode()).hexdigest()[:16]}", ()
 
 
-def by_reference(chosen: C) -> C:
+def pass_by_reference(chosen: C) -> C:
     """Let kernels pass a NamedTuple class by address. Python creates its values, kernels only read their fields."""
     # Otherwise numba turns a record of twenty arrays into a hundred arguments, and most of the compile time goes into
     # packing and unpacking them.

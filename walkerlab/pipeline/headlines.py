@@ -54,7 +54,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
     "report": (),
 }  # fmt: skip
 """Headline quantities of each stage; a name that ends in a dot covers all quantities below it."""
-MOST: Final = 13
+MAX_HEADLINES: Final = 13
 OF_WALKS: Final = (
     "work_per_step_J.", "asymmetry.", "numerical_error.", "end_time_s", "rhs_evaluations", "accepted_steps",
     "rejected_steps", "energy_balance_residual_J", "slope_rad", "repeats_after", "leaves_gait_at",
@@ -70,7 +70,10 @@ QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
     ),
 }  # fmt: skip
 """All numeric quantities that each of these stages may have at a point of a sweep, in the notation of `HEADLINES`."""
-LAST_OF: Final[Mapping[str, str]] = {"last_step_period_s": "step_periods_s", "last_step_length_m": "step_lengths_m"}
+LAST_STEP_SOURCES: Final[Mapping[str, str]] = {
+    "last_step_period_s": "step_periods_s",
+    "last_step_length_m": "step_lengths_m",
+}
 """Headlines that are the last entry of a list, each with the name of its list."""
 
 
@@ -81,9 +84,9 @@ def headlines(stage: str, names: Iterable[str]) -> list[str]:
     """
     unique = list(dict.fromkeys(names))
     if stage not in HEADLINES:
-        return [name for name in unique if "." not in name][:MOST]
+        return [name for name in unique if "." not in name][:MAX_HEADLINES]
     matches = ([name for name in unique if stands_for(entry, name)] for entry in HEADLINES[stage])
-    return list(chain(*matches))[:MOST]
+    return list(chain(*matches))[:MAX_HEADLINES]
 
 
 def stands_for(entry: str, name: str) -> bool:
@@ -150,7 +153,7 @@ def pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[Pair, ..
 
 def headline_values(stage: str, summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return the headline quantities of a stage's summary, by name."""
-    last = {name: summary[list_name][-1] for name, list_name in LAST_OF.items() if summary.get(list_name)}
+    last = {name: summary[list_name][-1] for name, list_name in LAST_STEP_SOURCES.items() if summary.get(list_name)}
     every = dict(flatten(summary, lists=True)) | last
     return {name: every[name] for name in headlines(stage, every)}
 

@@ -91,14 +91,14 @@ class ConfigFamily:
     def over(self, make: Callable[[ContactConfig], R]) -> Callable[[Any], R | None]:
         """Return a function from values to `make(config)`, or to None if the schema rejects them or `make` does."""
 
-        def at_values(values: Values) -> R | None:
+        def make_at_values(values: Values) -> R | None:
             config = self.at(values)
             try:
                 return None if config is None else make(config)
             except ConfigError:
                 return None
 
-        return at_values
+        return make_at_values
 
     def scales(self) -> Floats:
         return np.array([abs(value) or SCALE_OF_ZERO for value in self.start])

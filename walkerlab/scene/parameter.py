@@ -62,11 +62,11 @@ class Parameter:
     def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
         """Return a function from parameter values to `make(config)`, or to None if the schema rejects the value."""
 
-        def at_value(value: float) -> R | None:
+        def make_at_value(value: float) -> R | None:
             changed = self.config_at(config, value)
             return None if changed is None else make(changed)
 
-        return at_value
+        return make_at_value
 
 
 def config_with(config: ContactConfig, parameters: Sequence[Parameter], values: Sequence[float]) -> Config | None:

@@ -12,8 +12,8 @@ from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.physics.mechanics.parts import Position
-from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, on_level_ground
-from walkerlab.physics.mechanics.rigid_model import RigidModel, on_slope, pair, with_fields
+from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, rigid_on_level_ground
+from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, with_fields
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.footholds import foothold_heights
@@ -69,7 +69,7 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
 
 def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> RigidModel:
     """Return the rigid walker of a config. `equations` overrides the config's set of equations."""
-    passive = on_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
+    passive = change_slope(level_walker(config.walker, config.gravity_m_s2), config.slope_rad)
     return replace_equations(add_drives(passive, config), equations or config.equations)
 
 
@@ -90,7 +90,7 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
     Raises ConfigError if the parts are not a valid walker.
     """
     try:
-        return on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
+        return rigid_on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
     except ValueError as error:
         raise ConfigError(f"walker: {error}", PARTS_DOCS) from None
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from walkerlab.physics.hybrid.recorded_walk import with_scaled_rates
+from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits import scaled_starts
 from walkerlab.physics.orbits.contact_gait import GaitAnswer
@@ -24,7 +24,7 @@ def starts_of(
     own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
 
     def start(swing: float, stance: float) -> State:
-        return start_state(scene, with_scaled_rates(rigid, state, swing, stance))
+        return start_state(scene, scale_rates(rigid, state, swing, stance))
 
     starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, own)
     return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))

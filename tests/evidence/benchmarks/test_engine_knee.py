@@ -9,7 +9,7 @@ from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES
 from walkerlab.evidence.benchmarks.engines.runs import SwingTask
 from walkerlab.exchange.planar import PINNED, planar_model
 from walkerlab.physics.mechanics.assembly import Anchor
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import BENT, STANCE, Mode
 from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs
 from walkerlab.physics.solvers.system import derivative
@@ -29,7 +29,7 @@ def body_by_body(y):
 @pytest.fixture(scope="module")
 def ours():
     """Where the swing ends, by our rates and a library's method."""
-    model = standing(KNEED, GRAVITY, SLOPE)
+    model = rigid_on_slope(KNEED, GRAVITY, SLOPE)
 
     def rate(t, y):
         f = np.zeros(6)

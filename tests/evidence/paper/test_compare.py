@@ -15,7 +15,7 @@ from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages import simulate
-from walkerlab.pipeline.stages.walk import over_time, step_columns
+from walkerlab.pipeline.stages.walk import step_columns, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.runfolder import RunFolder
 
@@ -70,7 +70,9 @@ def contact_walk(rigid, steps, *leave_out, outcome="walked", samples=None):
         "mechanical_J": trajectory["mechanical_J"],
     }
     seen = {name: values[kept][:samples] for name, values in columns.items() if name not in leave_out}
-    groups = {"trajectory": Group(over_time(**seen))} | ({"steps": Group(step_columns(touches))} if steps else {})
+    groups = {"trajectory": Group(variables_over_time(**seen))} | (
+        {"steps": Group(step_columns(touches))} if steps else {}
+    )
     return Content(
         groups,
         {

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from system_rates import gradient_of, rate_of
 
-from walkerlab.physics.ground.walker import on_ground
+from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.solvers.scipy_methods import jacobian_matrix, right_hand_side
 
 
@@ -38,11 +38,11 @@ def check(system, state):
 def test_compiled_contact_walker_agrees_with_python(has_ground):
     walker = ground.compass(inertia=0.1)
     for state in states_on_ground(walker, 40):
-        check(on_ground(walker, has_ground), state)
+        check(place_on_ground(walker, has_ground), state)
 
 
 @pytest.mark.parametrize("has_ground", [False, True])
 def test_compiled_pinned_walker_agrees_with_python(has_ground):
     walker = ground.compass()
     for state in states_on_ground(walker, 20):
-        check(on_ground(walker, (has_ground, True), pinned=True), (*state[2:4], *state[6:]))
+        check(place_on_ground(walker, (has_ground, True), pinned=True), (*state[2:4], *state[6:]))

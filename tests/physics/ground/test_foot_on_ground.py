@@ -11,7 +11,7 @@ from system_rates import gradient_of, rate_of
 from walkerlab.physics.ground.energy import dissipated_power, kinetic_energy, potential_energy, total_energy
 from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.walker import foot_force, on_ground, one_foot_motion
+from walkerlab.physics.ground.walker import foot_force, one_foot_motion, place_on_ground
 
 BOTH = (True, True)
 angles = st.tuples(st.floats(-0.7, 0.7), st.floats(-0.7, 0.7))
@@ -66,7 +66,7 @@ def test_momentum_changes_by_the_contact_force(theta, omega, slip, vertical_velo
     walker = ground.compass(radius=BALL)
     has_ground = (foot == 0, foot == 1)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
-    rate = np.array(rate_of(on_ground(walker, has_ground), state))
+    rate = np.array(rate_of(place_on_ground(walker, has_ground), state))
     motion = motion_of(walker, foot, tuple(state))
     force = foot_force(walker, motion)
     contact = np.array([motion.along, motion.height])
@@ -93,14 +93,14 @@ def test_power_balances_and_the_ground_only_dissipates(theta, omega, slip, verti
     """dE/dt of the energy balance along the motion is what damping and friction take."""
     walker = ground.compass(normal=SOFT)
     state = np.array(ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity))
-    rate = np.array(rate_of(on_ground(walker, BOTH), state))
-    powers = [dissipated_power(on_ground(walker, BOTH), each, tuple(state))[:2] for each in range(2)]
+    rate = np.array(rate_of(place_on_ground(walker, BOTH), state))
+    powers = [dissipated_power(place_on_ground(walker, BOTH), each, tuple(state))[:2] for each in range(2)]
     damping, friction = np.sum(powers, axis=0)
     assert damping >= 0.0
     assert friction >= 0.0
     assume(abs(motion_of(walker, 1 - foot, tuple(state)).height) > 1e-4)  # the other foot reaches no join of the law
     h = 1e-5 / (1.0 + np.abs(rate).max() * 1e-2)  # long enough for the rounding of energies of 1 kJ to be left small
-    before, after = (total_energy(on_ground(walker, BOTH), tuple(state + step * rate)) for step in (-h, h))
+    before, after = (total_energy(place_on_ground(walker, BOTH), tuple(state + step * rate)) for step in (-h, h))
     size = 1.0 + damping + friction + 1e3 * kinetic_energy(walker.whole, tuple(state))
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)
 
@@ -109,10 +109,12 @@ def test_foot_in_the_air_or_without_ground_feels_nothing():
     walker = ground.compass()
     hovering = ground.placed(walker, 1, -0.3, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
     inside = ground.placed(walker, 1, 1e-4, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
-    assert rate_of(on_ground(walker, BOTH), hovering) == rate_of(on_ground(walker, (False, False)), hovering)
-    free = rate_of(on_ground(walker, (False, False)), inside)
+    assert rate_of(place_on_ground(walker, BOTH), hovering) == rate_of(
+        place_on_ground(walker, (False, False)), hovering
+    )
+    free = rate_of(place_on_ground(walker, (False, False)), inside)
     np.testing.assert_allclose(free[4:6], (walker.gravity_along, -walker.gravity_down), rtol=1e-15)
-    assert dissipated_power(on_ground(walker, BOTH), 1, hovering) == (0.0, 0.0, 0.0)
+    assert dissipated_power(place_on_ground(walker, BOTH), 1, hovering) == (0.0, 0.0, 0.0)
 
 
 def test_smooth_ground_has_no_tangential_force():
@@ -120,17 +122,17 @@ def test_smooth_ground_has_no_tangential_force():
     for slip in (-1.0, 0.05, 2.0):
         state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.9), slip, -0.01)
         assert foot_force(walker, motion_of(walker, 1, state)).along == 0.0
-        rate = rate_of(on_ground(walker, BOTH), state)
+        rate = rate_of(place_on_ground(walker, BOTH), state)
         assert rate[4] == walker.gravity_along
-        assert dissipated_power(on_ground(walker, BOTH), 1, state)[1] == 0.0
+        assert dissipated_power(place_on_ground(walker, BOTH), 1, state)[1] == 0.0
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
 def test_smooth_ground_equals_zero_friction_coefficients(theta, omega, slip, vertical_velocity, depth, foot):
     smooth, none = ground.compass(friction=ground.SMOOTH), ground.compass(friction=Coulomb(0.0, 0.0, 0.1, 1.0))
     state = ground.placed(smooth, foot, depth, theta, omega, slip, vertical_velocity)
-    assert rate_of(on_ground(smooth, BOTH), state) == rate_of(on_ground(none, BOTH), state)
-    J, K = gradient_of(on_ground(smooth, BOTH), state), gradient_of(on_ground(none, BOTH), state)
+    assert rate_of(place_on_ground(smooth, BOTH), state) == rate_of(place_on_ground(none, BOTH), state)
+    J, K = gradient_of(place_on_ground(smooth, BOTH), state), gradient_of(place_on_ground(none, BOTH), state)
     np.testing.assert_array_equal(J, K)
 
 
@@ -161,10 +163,10 @@ def test_derivatives_on_ground_equal_finite_differences(friction, theta, omega, 
     has_ground = (foot == 0, foot == 1)
     motion = motion_of(walker, foot, state)
     assume(foot_force(walker, motion).normal.force > 1e-2)  # not clipped, nor about to be
-    J = gradient_of(on_ground(walker, has_ground), state)
+    J = gradient_of(place_on_ground(walker, has_ground), state)
     position = 1e-3 * depth
     steps = (1e-6, position, position, position, 1e-5, 1e-5, 1e-5, 1e-5)
-    expected = differenced(on_ground(walker, has_ground), state, steps)
+    expected = differenced(place_on_ground(walker, has_ground), state, steps)
     # every column by its own size: stiffness along the height is a million times friction's along the speed
     size = np.abs(expected).max(axis=0) + 1.0
     assert (np.abs(J - expected) / size).max() < 1e-4
@@ -174,9 +176,9 @@ def test_derivatives_on_ground_equal_finite_differences(friction, theta, omega, 
 def test_derivatives_are_correct_at_the_stiffness_of_the_paper(vertical_velocity):
     walker = ground.compass()
     state = ground.placed(walker, 1, 6e-5, (-0.2, 0.17), (-0.6, -0.86), 2e-3, vertical_velocity)
-    J = gradient_of(on_ground(walker, (False, True)), state)
+    J = gradient_of(place_on_ground(walker, (False, True)), state)
     steps = (1e-6, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6)
-    expected = differenced(on_ground(walker, (False, True)), state, steps)
+    expected = differenced(place_on_ground(walker, (False, True)), state, steps)
     assert np.abs(J[:, 1]).max() > 1e6  # stiff indeed: so an absolute tolerance would say nothing
     size = np.abs(expected).max(axis=0) + 1.0
     assert (np.abs(J - expected) / size).max() < 1e-5
@@ -185,7 +187,7 @@ def test_derivatives_are_correct_at_the_stiffness_of_the_paper(vertical_velocity
 def creep_velocity(slope, friction):
     """The velocity to which a loaded block settles on a slope."""
     block = ground.sledge(friction=friction, slope=slope)
-    system = on_ground(block, BOTH)
+    system = place_on_ground(block, BOTH)
     start = ground.placed(block, 0, 3e-5, (-slope,), (0.0,), 0.0, 0.0)
 
     path = solve_ivp(

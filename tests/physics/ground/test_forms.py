@@ -9,13 +9,21 @@ from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.ground.energy import total_energy
 from walkerlab.physics.ground.friction import Coulomb
 from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.walker import LOCKED, RELEASED, floating_state, locked_knees, on_ground, to_form, to_full
+from walkerlab.physics.ground.walker import (
+    LOCKED,
+    RELEASED,
+    floating_state,
+    locked_knees,
+    place_on_ground,
+    to_form,
+    to_full,
+)
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Revolute
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, with_torso
+from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs
 
 LAW, FRICTION = NormalLaw(4e5, 1.8, 300.0, 1e-3), Coulomb(0.9, 0.7, 0.01, 0.1)
 LEGS = kneed_legs(Limb(0.5, 0.8, 0.3, 0.02, 0.01), Limb(0.5, 0.3, 0.2, -0.03, 0.004), 0.7, Arc(0.2, 0.05))
-WITH_TORSO = with_torso(LEGS, 0.6, 0.25, 0.02)
+WITH_TORSO = add_torso(LEGS, 0.6, 0.25, 0.02)
 BOTH = (True, True)
 KNEES = [(LOCKED, RELEASED), (RELEASED, LOCKED), (LOCKED, LOCKED)]
 
@@ -44,14 +52,14 @@ def test_merged_body_accelerates_like_two_locked_bodies(assembly, knee):
     walker = walker_of(assembly)
     y = state_in_line(walker, knee)
     # a walker with stops keeps its bodies, and the shank follows
-    expected = rate_of(on_ground(walker_of(assembly, stop=LAW), BOTH, knee), y)
-    one = on_ground(walker, BOTH, knee)
+    expected = rate_of(place_on_ground(walker_of(assembly, stop=LAW), BOTH, knee), y)
+    one = place_on_ground(walker, BOTH, knee)
     z = to_form(one.form, y)
     assert z.size == y.size - 2 * sum(doing == LOCKED for doing in knee)
     whole = to_full(one.form, rate_of(one, z), y.size)
     np.testing.assert_allclose(whole, expected, rtol=1e-10, atol=1e-9)
     assert np.abs(expected).max() > 10.0  # the ground pushes
-    assert total_energy(one, z) == pytest.approx(total_energy(on_ground(walker, BOTH), y), rel=1e-12)
+    assert total_energy(one, z) == pytest.approx(total_energy(place_on_ground(walker, BOTH), y), rel=1e-12)
     np.testing.assert_array_equal(floating_state(one.form, z, y.size), y)
 
 
@@ -60,10 +68,10 @@ def test_merged_body_accelerates_like_two_locked_bodies(assembly, knee):
 def test_energies_of_a_pinned_form_equal_those_of_the_floating_form(assembly, knee):
     walker = walker_of(assembly)
     y, n = state_in_line(walker, knee), int(walker.whole.bodies)
-    pinned = on_ground(walker, BOTH, knee, pinned=True)
+    pinned = place_on_ground(walker, BOTH, knee, pinned=True)
     z = to_form(pinned.form, [*y[2 : 2 + n], *y[4 + n :]])
     afloat = floating_state(pinned.form, z, y.size)
-    assert total_energy(pinned, z) == pytest.approx(total_energy(on_ground(walker, BOTH), afloat), rel=1e-12)
+    assert total_energy(pinned, z) == pytest.approx(total_energy(place_on_ground(walker, BOTH), afloat), rel=1e-12)
 
 
 def test_state_of_a_reduced_form_is_part_of_the_full_state():

@@ -11,7 +11,7 @@ from system_rates import gradient_of, rate_of
 from test_foot_on_ground import differenced
 
 from walkerlab.config import loader
-from walkerlab.physics.ground.walker import LOCKED, RELEASED, changed_forms, new_progress, on_ground
+from walkerlab.physics.ground.walker import LOCKED, RELEASED, changed_forms, new_progress, place_on_ground
 from walkerlab.physics.mechanics.rigid_model import STRAIGHT, Mode
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.solvers.registry import Tolerances
@@ -36,7 +36,9 @@ def test_pinned_driven_walker_moves_like_the_rigid_one(theta, omega):
     expected = np.zeros(4)
     derivative(Mode(rigid, STRAIGHT), 0.0, y, expected)
     walker = contact_scene(config, RIGID_STEP).walker
-    assert rate_of(on_ground(walker, IN_THE_AIR, pinned=True), tuple(y)) == pytest.approx(tuple(expected), rel=1e-9)
+    assert rate_of(place_on_ground(walker, IN_THE_AIR, pinned=True), tuple(y)) == pytest.approx(
+        tuple(expected), rel=1e-9
+    )
 
 
 @settings(max_examples=20)
@@ -44,7 +46,7 @@ def test_pinned_driven_walker_moves_like_the_rigid_one(theta, omega):
 def test_derivatives_of_hip_torques_equal_finite_differences(theta, omega, stance):
     walker = changed_forms(ground.compass(radius=0.01, inertia=0.2), **HIP)
     state = (0.0, 5.0, *theta, 0.2, -0.1, *omega)
-    system = on_ground(walker, IN_THE_AIR, progress=new_progress(stance))
+    system = place_on_ground(walker, IN_THE_AIR, progress=new_progress(stance))
     expected = differenced(system, state, (1e-5,) * 8)
     assert np.abs(gradient_of(system, state) - expected).max() < 1e-7 * (1.0 + np.abs(expected).max())
 
@@ -57,11 +59,14 @@ def test_hip_torques_act_on_the_thighs_of_a_kneed_walker():
     free = (RELEASED, RELEASED)
     for stance in range(2):
         change = np.subtract(
-            *(rate_of(on_ground(w, IN_THE_AIR, free, progress=new_progress(stance)), y) for w in (pushed, passive))
+            *(
+                rate_of(place_on_ground(w, IN_THE_AIR, free, progress=new_progress(stance)), y)
+                for w in (pushed, passive)
+            )
         )
         momentum = np.subtract(change[8:10], change[9:7:-1])
         assert momentum[1 - stance] > 0.0 > momentum[stance]
-    locked = on_ground(pushed, IN_THE_AIR, (RELEASED, LOCKED))
+    locked = place_on_ground(pushed, IN_THE_AIR, (RELEASED, LOCKED))
     swing, stance = (locked.form.hinges[0, k] for k in range(2))
     assert (swing, stance) == tuple(locked.form.knees[:, 1])
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from system_rates import gradient_of, rate_of
 
 from walkerlab.evidence.paper.appendix_a import CORRECTED, RigidWalker, accelerations
-from walkerlab.physics.ground.walker import feet_motion, floating_state, on_ground
+from walkerlab.physics.ground.walker import feet_motion, floating_state, place_on_ground
 
 states = st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
 radii = st.floats(0.0, 0.2)
@@ -19,7 +19,7 @@ inertias = st.floats(0.0, 1.0)
 
 def pinned(radius=0.001, inertia=0.0, foot=1, has_ground=False):
     walker = ground.compass(radius=radius, inertia=inertia, pinned_foot=foot)
-    return on_ground(walker, (has_ground, has_ground), pinned=True)
+    return place_on_ground(walker, (has_ground, has_ground), pinned=True)
 
 
 @given(state=states, radius=radii, inertia=inertias)

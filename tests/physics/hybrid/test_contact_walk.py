@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
-from walkerlab.physics.ground.walker import feet_motion, on_ground
+from walkerlab.physics.ground.walker import feet_motion, place_on_ground
 from walkerlab.physics.hybrid.contact_events import farthest_slide
 from walkerlab.physics.solvers.scipy_methods import jacobian_matrix, right_hand_side
 from walkerlab.scene.contact import start_state
@@ -179,7 +179,7 @@ def test_touch_times_converge_with_the_tolerance():
 def test_single_support_agrees_with_scipy_radau():
     """The same motion, integrated by another program from the start to before the swing foot leaves its pad."""
     scene = scene_of()
-    system = on_ground(scene.walker, (True, True))
+    system = place_on_ground(scene.walker, (True, True))
     start = np.array(start_state(scene, FIXED_POINT))
 
     def fun(t, y):

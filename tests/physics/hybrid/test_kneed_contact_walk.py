@@ -29,9 +29,9 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.ground.knees import lock_knee
 from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, on_ground
+from walkerlab.physics.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, place_on_ground
 from walkerlab.physics.hybrid.contact_loop import walk_in_form
-from walkerlab.physics.hybrid.contact_result import by_channel
+from walkerlab.physics.hybrid.contact_result import losses_by_channel
 from walkerlab.physics.mechanics.parts import Assembly, Particle
 from walkerlab.physics.mechanics.walkers import Arc, Limb, straight_legs
 from walkerlab.physics.orbits.contact_gait import find_gait_from, section_points
@@ -154,10 +154,10 @@ def test_equations_of_a_locked_knee_equal_those_of_one_leg():
         Assembly(legs.bodies, legs.joints, (*legs.particles, *shanks), legs.feet, legs=legs.legs),
         scene.walker.normal, scene.walker.friction, GRAVITY, SLOPE,
     )  # fmt: skip
-    two = on_ground(scene_of(KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))).walker, (True, True), (LOCKED, LOCKED))
+    two = place_on_ground(scene_of(KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))).walker, (True, True), (LOCKED, LOCKED))
     y = (0.1, 0.7, -0.3, 0.2, 0.3, -0.1, -0.5, -0.9)
     straight = (*y[:4], *y[2:4], *y[4:], *y[6:])
-    expected = rate_of(on_ground(one, (True, True)), y)
+    expected = rate_of(place_on_ground(one, (True, True)), y)
     found = rate_of(two, straight)
     np.testing.assert_allclose(found[:4] + found[6:10], expected, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(found[10:], found[8:10], rtol=0.0, atol=0.0)
@@ -172,7 +172,7 @@ def test_exact_derivatives_equal_finite_differences(knee):
     scene = scene_of(rules)
     y = np.array(BENT_STATE)
     y[4] = y[2] + 5e-3
-    system = on_ground(scene.walker, (False, False), knee)
+    system = place_on_ground(scene.walker, (False, False), knee)
     J = gradient_of(system, y)
     differences = np.zeros((12, 12))
     for j in range(12):
@@ -213,8 +213,8 @@ def test_stiff_knee_stop_walks_like_the_ideal_lock():
     for walk in stopped:
         assert walk.outcome is Outcome.WALKED
         assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
-        assert by_channel(scene_of().walker, walk.dissipated_J)["knee_strikes"] < 1e-9
-        assert by_channel(scene_of().walker, walk.dissipated_J)["knee_stop"] > 1e-3
+        assert losses_by_channel(scene_of().walker, walk.dissipated_J)["knee_strikes"] < 1e-9
+        assert losses_by_channel(scene_of().walker, walk.dissipated_J)["knee_stop"] > 1e-3
     apart = [np.abs(walk.touch_time_s - ideal.touch_time_s).max() for walk in stopped]
     assert apart[1] < 0.3 * apart[0]
 

@@ -5,7 +5,7 @@ import pytest
 from contact_walks import scene_of
 
 from walkerlab.physics.ground.terrain import STANCE_FOOT
-from walkerlab.physics.ground.walker import on_ground
+from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.hybrid.contact_events import HEIGHT, PASSING, PER_FOOT
 from walkerlab.physics.hybrid.contact_state import new_walk_state
 from walkerlab.physics.hybrid.contact_transitions import apply_event
@@ -29,7 +29,7 @@ class Feet:
         self.known.sides[[HEIGHT, PER_FOOT + HEIGHT]] = 1 if (height > 0.0 if in_air is None else in_air) else -1
 
     def event(self, event):
-        system = on_ground(self.scene.walker, self.known.has_ground)
+        system = place_on_ground(self.scene.walker, self.known.has_ground)
         assert apply_event(system, None, self.known, event, 0.0, tuple(self.y)) == GOES_ON
         return self
 

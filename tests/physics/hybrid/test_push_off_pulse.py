@@ -9,7 +9,7 @@ from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.motion import foot_wrench
 from walkerlab.physics.ground.pulse import pulse_force
-from walkerlab.physics.ground.walker import LOCKED, OF_BODIES, new_progress, on_ground
+from walkerlab.physics.ground.walker import LOCKED, OF_BODIES, new_progress, place_on_ground
 from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.orbits.contact_map import step_from_section
 from walkerlab.physics.orbits.fixed_point import find_gaits
@@ -55,20 +55,20 @@ def test_paper_compass_walks_on_level_ground_with_short_pulses_only():
 
 def test_pulse_has_the_impulse_of_the_push_off_and_smooth_ends():
     _, scene, _ = scene_of("level")
-    system = on_ground(scene.walker, (True, True), progress=new_progress(steps=1, last_touch=2.0))
+    system = place_on_ground(scene.walker, (True, True), progress=new_progress(steps=1, last_touch=2.0))
     times = 2.0 + np.linspace(-0.001, 0.006, 70_001)
     force = np.array([pulse_force(system, t) for t in times])
     assert np.trapezoid(force, times) == pytest.approx(4.0, rel=1e-6)
     assert not force[(times < 1.99999) | (times > 2.00501)].any()
     assert np.abs(np.diff(force)).max() < 1e-3 * force.max()
-    before_any_touch = on_ground(scene.walker, (True, True), progress=new_progress(last_touch=2.0))
+    before_any_touch = place_on_ground(scene.walker, (True, True), progress=new_progress(last_touch=2.0))
     assert pulse_force(before_any_touch, 2.002) == 0.0
 
 
 @pytest.mark.parametrize("name", PUSHED)
 def test_derivatives_during_a_pulse_equal_finite_differences(name):
     _, scene, gait = scene_of(name, *PUSHED[name])
-    system = on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
+    system = place_on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
     y = np.array(start_state(scene, gait.state))
     J, t = np.zeros((y.size, y.size)), 0.3 * scene.walker.whole.push_off_duration
     jacobian(system, t, y, J)
@@ -87,7 +87,7 @@ def test_derivatives_during_a_pulse_equal_finite_differences(name):
 def test_push_off_force_acts_from_foot_to_hip_without_moment_about_the_hip():
     """About the hip, the root's acceleration taken along, the trailing leg feels no torque of it."""
     _, scene, gait = scene_of("level")
-    system = on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
+    system = place_on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
     form, y = scene.walker.whole, np.array(start_state(scene, gait.state))
     n = int(form.bodies)
     s, c, r = np.sin(y[2 : 2 + n]), np.cos(y[2 : 2 + n]), np.zeros(len(OF_BODIES))

@@ -14,7 +14,7 @@ from tree_equations import mass_matrix_and_bias
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Frictionless
 from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.walker import on_ground
+from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.mechanics.assembly import Anchor
 
 ROUNDING = 1e-12  # a few dozen roundings of terms of the size of the largest entry
@@ -94,7 +94,7 @@ def test_assembled_compass_equals_appendix_a(parts, state, g):
 @given(parts=compasses(), state=states)
 def test_pinned_compass_equals_the_swing_phase_of_appendix_a(parts, state):
     g = 9.81
-    pinned = on_ground(walker_of(parts, 0.0, g), (False, False), pinned=True)
+    pinned = place_on_ground(walker_of(parts, 0.0, g), (False, False), pinned=True)
     D, bias, G = printed_swing(parts, *state, g)
     found = np.array(rate_of(pinned, state)[2:])
     # the residual of D ddq + C dq + G = 0, free of the matrix' condition
@@ -106,9 +106,9 @@ def test_pinned_compass_equals_the_swing_phase_of_appendix_a(parts, state):
 def test_slope_only_rotates_the_frame(parts, state, slope):
     """Absolute angles: the swing phase does not know the slope; the floating base knows it by its axes alone."""
     level, tilted = walker_of(parts, 0.0, 9.81), walker_of(parts, slope, 9.81)
-    pinned = [rate_of(on_ground(w, (False, False), pinned=True), state) for w in (level, tilted)]
+    pinned = [rate_of(place_on_ground(w, (False, False), pinned=True), state) for w in (level, tilted)]
     close(pinned[1], pinned[0], scale=1e3 * (1.0 + np.abs(pinned[0]).max()))
-    falling = rate_of(on_ground(tilted, (False, False)), (0.3, 9.0, *state[:2], 0.1, 0.2, *state[2:]))
+    falling = rate_of(place_on_ground(tilted, (False, False)), (0.3, 9.0, *state[:2], 0.1, 0.2, *state[2:]))
     close(np.hypot(falling[4], falling[5]), 9.81)
     assert math.isclose(math.atan2(falling[4], -falling[5]), slope, abs_tol=1e-12)
 
@@ -125,7 +125,7 @@ def test_free_tree_accelerates_the_same_for_any_root_point(state, inertia):
     central = mass_matrix_and_bias(assembly, None, state[:2], state[2:], 9.81)
     about_centre = np.linalg.solve(central.mass_matrix, -central.bias - central.weight)
     walker = walker_of(parts, 0.0, 9.81)
-    integrated = rate_of(on_ground(walker, (True, True)), (0.0, 50.0, *state[:2], 0.0, 0.0, *state[2:]))
+    integrated = rate_of(place_on_ground(walker, (True, True)), (0.0, 50.0, *state[:2], 0.0, 0.0, *state[2:]))
     size = 1e2 * (1.0 + np.abs(about_foot).max())
     close(about_foot, about_centre[:2], scale=size)
     close(about_centre[2:], [0.0, -9.81])
@@ -135,7 +135,7 @@ def test_free_tree_accelerates_the_same_for_any_root_point(state, inertia):
 @given(state=states, along=st.floats(-1e3, 1e3), depth=st.floats(0.0, 1e-3))
 def test_position_along_the_slope_does_not_matter(state, along, depth):
     parts = CompassParts(1.0, 0.5, 5.0, 10.0, 0.1, 0.001)
-    system = on_ground(walker_of(parts, 0.02, 9.81), (True, True))
+    system = place_on_ground(walker_of(parts, 0.02, 9.81), (True, True))
     height = 0.9 - depth
     here, there = (rate_of(system, (x, height, *state[:2], 0.3, -0.1, *state[2:])) for x in (0.0, along))
     assert here == there

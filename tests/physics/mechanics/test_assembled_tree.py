@@ -13,7 +13,7 @@ from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
 from walkerlab.physics.ground.friction import Frictionless
 from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.walker import on_ground
+from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.mechanics.assembly import Anchor, levers, total_mass, tree_about_centre
 from walkerlab.physics.mechanics.parts import Assembly, Body, Revolute
 
@@ -57,7 +57,7 @@ def flying_walker(slope=0.0):
 
 def flight(theta, omega, velocity, duration):
     """States of the free walker along a flight, (samples, 12)."""
-    system = on_ground(flying_walker(), IN_THE_AIR)
+    system = place_on_ground(flying_walker(), IN_THE_AIR)
     start = np.array([0.0, 5.0, *theta, *velocity, *omega])
     path = solve_ivp(lambda _, y: rate_of(system, y), (0.0, duration), start, method="DOP853", rtol=1e-12, atol=1e-13)
     return path.t, path.y.T
@@ -76,7 +76,7 @@ def test_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, theta, om
 @given(theta=angles, omega=rates)
 def test_pinned_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, theta, omega):
     """The hinge is at the ball's centre: the foot point's rows drop out once its matrix is moved there."""
-    pinned = on_ground(flying_walker(slope=0.1), IN_THE_AIR, pinned=True)
+    pinned = place_on_ground(flying_walker(slope=0.1), IN_THE_AIR, pinned=True)
     at_hinge = Anchor("stance", (0.0, 0.02))
     alpha = np.array(rate_of(pinned, (*theta, *omega))[4:])
     full = mass_matrix_and_bias(kneed.KNEED, at_hinge, theta, omega, GRAVITY)
@@ -94,7 +94,7 @@ def test_pinned_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, th
 def test_integrated_walker_with_four_bodies_obeys_lagrange_equations(lagrange, theta, omega, velocity):
     M, bias, weight = lagrange(theta, omega, velocity, GRAVITY)
     expected = np.linalg.solve(M, -(bias + weight).ravel())
-    rate = rate_of(on_ground(flying_walker(), IN_THE_AIR), (0.0, 5.0, *theta, *velocity, *omega))
+    rate = rate_of(place_on_ground(flying_walker(), IN_THE_AIR), (0.0, 5.0, *theta, *velocity, *omega))
     np.testing.assert_allclose(rate[8:], expected[:4], atol=1e-9 * (1.0 + np.abs(expected).max()))
 
 

@@ -22,7 +22,7 @@ from test_random_walkers import (
 )
 
 from walkerlab.physics.mechanics import impact
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, BENT, STANCE, STRAIGHT, SWING, Mode
 from walkerlab.physics.orbits.similarity import unit_walker
 from walkerlab.physics.solvers.system import jacobian
@@ -44,7 +44,7 @@ def driven(test):
     @given(data=st.data(), slope=slopes, uphill=st.booleans(), hip=hips, push=st.floats(0.01, 5.0), free=numbers)
     def for_type(kind, data, slope, uphill, hip, push, free):
         assembly = assembly_of(data.draw(TYPES[kind]), rigid=True)
-        model = standing(assembly, G, -slope if uphill else slope).changed(**hip, push_off=push)
+        model = rigid_on_slope(assembly, G, -slope if uphill else slope).changed(**hip, push_off=push)
         test(assembly, model, free)
 
     for_type.__name__, for_type.__doc__ = test.__name__, test.__doc__

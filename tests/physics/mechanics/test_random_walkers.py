@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, Torso
 from walkerlab.physics.mechanics.parts import Assembly
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import (
     BENT,
     STANCE,
@@ -154,7 +154,7 @@ def walkers_differ_by(one, other):
 
 @for_each_type
 def test_energy_is_constant_in_a_swing(assembly, slope, free):
-    model = standing(assembly, G, slope)
+    model = rigid_on_slope(assembly, G, slope)
     y, n = state_of(model, BENT, free), len(model.arm_x)
     swing = solve_ivp(
         lambda _, x: (*x[n:], *rates(model, BENT, tuple(x))), (0.0, 0.1), y, "DOP853", rtol=1e-10, atol=1e-12
@@ -166,7 +166,7 @@ def test_energy_is_constant_in_a_swing(assembly, slope, free):
 
 @for_each_type
 def test_kinetic_energy_is_the_sum_over_masses(assembly, slope, free):
-    model = standing(assembly, G, slope)
+    model = rigid_on_slope(assembly, G, slope)
     y = state_of(model, BENT, free)
     points, spins, _ = in_motion(assembly, model, y, np.zeros(2))
     assert kinetic_energy(model, y) == pytest.approx(energy_of(points, spins), rel=1e-10, abs=1e-12)
@@ -174,7 +174,7 @@ def test_kinetic_energy_is_the_sum_over_masses(assembly, slope, free):
 
 @for_each_type
 def test_heel_strike_conserves_angular_momentum_and_gains_no_energy(assembly, slope, free):
-    model = standing(assembly, G, slope)
+    model = rigid_on_slope(assembly, G, slope)
     y = both_feet_down(model, free)
     after = heel_strike(model, y)
     points, spins, foot = in_motion(assembly, model, y, np.zeros(2))
@@ -192,7 +192,7 @@ def test_heel_strike_conserves_angular_momentum_and_gains_no_energy(assembly, sl
 @given(walker=kneed, slope=slopes, free=numbers)
 def test_knee_strike_conserves_angular_momentum_and_gains_no_energy(walker, slope, free):
     assembly = assembly_of(walker, rigid=True)
-    model = standing(assembly, G, slope)
+    model = rigid_on_slope(assembly, G, slope)
     y = state_of(model, BENT, (*free[:2], free[0], *free[3:]))
     parts = [in_motion(assembly, model, state, np.zeros(2)) for state in (y, knee_strike(model, y))]
     contact = np.array((0.0, -model.radius))
@@ -236,8 +236,8 @@ def mapped(assembly: Assembly, place, of_mass=lambda m: m, of_inertia=lambda i: 
 
 @for_each_type
 def test_mirrored_walker_moves_as_the_mirror_image(assembly, slope, free):
-    model = standing(assembly, G, slope)
-    mirror = standing(mapped(assembly, lambda _, at: (-at[0], at[1])), G, -slope)
+    model = rigid_on_slope(assembly, G, slope)
+    mirror = rigid_on_slope(mapped(assembly, lambda _, at: (-at[0], at[1])), G, -slope)
     y, struck = state_of(model, BENT, free), both_feet_down(model, free)
     image, image_struck = (tuple(-x for x in state) for state in (y, struck))
     assert walkers_differ_by(rates(mirror, BENT, image), -np.array(rates(model, BENT, y))) < 1e-9
@@ -251,8 +251,8 @@ def test_mirrored_walker_moves_as_the_mirror_image(assembly, slope, free):
 @for_each_type
 def test_scaled_twin_moves_alike(assembly, slope, free):
     long, heavy = 3.7, 0.2
-    model = standing(assembly, G, slope)
-    twin = standing(
+    model = rigid_on_slope(assembly, G, slope)
+    twin = rigid_on_slope(
         mapped(
             assembly,
             lambda _, at: (long * at[0], long * at[1]),
@@ -296,13 +296,13 @@ def by_parts(assembly, radius_m, leg_length_m):
 
 @for_each_type
 def test_walker_built_from_parts_equals_that_of_its_type(assembly, slope, free):
-    model = standing(assembly, G, slope)
+    model = rigid_on_slope(assembly, G, slope)
     # one and the same shift for like bodies of both legs
     shifts = dict(
         zip(("leg", "thigh", "shank", "torso"), ((0.1, 0.3), (-0.2, 0.1), (0.3, -0.4), (0.0, 0.5)), strict=True)
     )
     moved = mapped(assembly, lambda name, at: tuple(np.add(at, shifts[name.split()[0]])))
-    listed = standing(assembly_of(by_parts(moved, model.radius, model.leg_length)), G, slope)
+    listed = rigid_on_slope(assembly_of(by_parts(moved, model.radius, model.leg_length)), G, slope)
     y, struck = state_of(model, BENT, free), both_feet_down(model, free)
     assert walkers_differ_by(rates(listed, BENT, y), rates(model, BENT, y)) < 1e-9
     assert walkers_differ_by(heel_strike(listed, struck), heel_strike(model, struck)) < 1e-9

@@ -11,7 +11,7 @@ from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalk
 from walkerlab.evidence.paper.appendix_a import impact as impact_of_appendix_a
 from walkerlab.physics.kernels import kernel, uncompiled
 from walkerlab.physics.mechanics import impact
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import (
     AT_STRIKE,
     BENT,
@@ -26,7 +26,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     mode_jacobian,
     swing_foot,
 )
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
+from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, straight_legs
 from walkerlab.physics.solvers.system import derivative
 
 sp = import_late("sympy")
@@ -37,8 +37,10 @@ LEG = Limb(0.9, 1.7, 0.35, 0.03, 0.05)
 RADIUS, AHEAD = 0.18, 0.03
 HIP, TORSO, ABOVE, TORSO_INERTIA = 0.8, 2.3, 0.31, 0.06
 G, SLOPE = 9.81, 0.07
-KNEED = standing(with_torso(kneed_legs(THIGH, SHANK, HIP, Arc(RADIUS, AHEAD)), TORSO, ABOVE, TORSO_INERTIA), G, SLOPE)
-ON_STRAIGHT_LEGS = standing(straight_legs(LEG, HIP, Arc(RADIUS, AHEAD)), G, SLOPE)
+KNEED = rigid_on_slope(
+    add_torso(kneed_legs(THIGH, SHANK, HIP, Arc(RADIUS, AHEAD)), TORSO, ABOVE, TORSO_INERTIA), G, SLOPE
+)
+ON_STRAIGHT_LEGS = rigid_on_slope(straight_legs(LEG, HIP, Arc(RADIUS, AHEAD)), G, SLOPE)
 PAPER = RigidWalker(1.0, 0.5, 5.0, 10.0, 0.0, 9.81, 0.0174, CORRECTED)
 
 angle, rate = st.floats(-0.8, 0.8), st.floats(-3.0, 3.0)
@@ -247,7 +249,9 @@ def test_locked_leg_moves_like_a_leg_of_one_piece(numbers):
     inertia += THIGH.mass_kg * ((THIGH.mass_ahead_m - ahead) ** 2 + (THIGH.mass_below_m - down) ** 2)
     inertia += SHANK.mass_kg * ((SHANK.mass_ahead_m - ahead) ** 2 + (below - down) ** 2)
     leg = Limb(THIGH.length_m + SHANK.length_m, mass, down, ahead, inertia)
-    one_piece = standing(with_torso(straight_legs(leg, HIP, Arc(RADIUS, AHEAD)), TORSO, ABOVE, TORSO_INERTIA), G, SLOPE)
+    one_piece = rigid_on_slope(
+        add_torso(straight_legs(leg, HIP, Arc(RADIUS, AHEAD)), TORSO, ABOVE, TORSO_INERTIA), G, SLOPE
+    )
     y = state_linked(KNEED, STRAIGHT, kneed_state(numbers))
     found = rates(KNEED, STRAIGHT, y)
     expected = rates(one_piece, STRAIGHT, [y[k] for k in (0, 1, 3, 4, 5, 7)])
@@ -274,16 +278,16 @@ def test_both_feet_touch_if_the_legs_lean_symmetrically(leg):
 
 @pytest.mark.parametrize(("order", "walker"), [
     (1, lambda e: straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc(e))),
-    (1, lambda e: with_torso(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), e, 0.3, 0.0)),
+    (1, lambda e: add_torso(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), e, 0.3, 0.0)),
 ])  # fmt: skip
 def test_vanishing_radius_and_torso_leave_the_compass(order, walker):
     """Radius and torso mass: the rates of the legs come back linearly."""
     y = (0.2, -0.1, -0.8, -1.1)
-    compass = standing(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), G, SLOPE)
+    compass = rigid_on_slope(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), G, SLOPE)
     wanted = np.array(rates(compass, BENT, y))
     errors = []
     for e in (1e-3, 1e-4):
-        model = standing(walker(e), G, SLOPE)
+        model = rigid_on_slope(walker(e), G, SLOPE)
         full = y if len(model.zero_state) == 4 else (*y[:2], 0.05, *y[2:], -0.95)
         errors.append(np.abs(np.array(rates(model, BENT, full))[:2] - wanted).max())
     assert np.log10(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)

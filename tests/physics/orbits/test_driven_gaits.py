@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from test_step_derivatives import AGREEMENT, NEAR_THE_GAIT, RIGID_STEP, STEPS, slope_of, stepped
 
 from walkerlab.config import loader
-from walkerlab.physics.hybrid.recorded_walk import take_walk, with_scaled_rates
+from walkerlab.physics.hybrid.recorded_walk import scale_rates, take_walk
 from walkerlab.physics.mechanics.impact import push_off_work
-from walkerlab.physics.mechanics.rigid_model import STANCE, STRAIGHT, SWING, kinetic_energy, on_slope
+from walkerlab.physics.mechanics.rigid_model import STANCE, STRAIGHT, SWING, change_slope, kinetic_energy
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.gradients import gradients
 from walkerlab.physics.orbits.newton import Effort
@@ -56,7 +56,7 @@ def test_gaits_of_kuo_are_reproduced(name):
     (push, spring, slope), (angle, rate, period), multipliers = KUO[name]
     simplest = walker_of("simplest", push_off=push)
     foot_mass = float(simplest.A[SWING, SWING])
-    walker = on_slope(simplest.changed(hip=(spring * foot_mass, 0.0, 0.0)), slope)
+    walker = change_slope(simplest.changed(hip=(spring * foot_mass, 0.0, 0.0)), slope)
     gait = min(find_gaits(walker).gaits, key=lambda each: abs(each.period - period))
     assert gait.state[STANCE] + slope == pytest.approx(angle, abs=1e-9)
     assert gait.state[2 + STANCE] == pytest.approx(rate, abs=1e-9)
@@ -69,7 +69,7 @@ LEVEL = (-0.1931536892, 0.1931536892, -0.8881910818, -1.0417279402)
 
 def test_paper_compass_walks_on_level_ground():
     """Pushed by 4 N s, legs joined by a spring of 10 N m/rad: as an independent prototype has it."""
-    walker = on_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.0, 0.0)), 0.0)
+    walker = change_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.0, 0.0)), 0.0)
     gait = find_gaits(walker).gait
     assert gait.stable
     assert gait.state == pytest.approx(LEVEL, abs=1e-9)
@@ -86,7 +86,7 @@ DRIVEN = {
 
 @pytest.mark.parametrize("name", DRIVEN)
 def test_derivative_of_a_driven_step_map_equals_its_slope(name):
-    walker, _ = unit_walker(on_slope(walker_of(name, **DRIVEN[name]), 0.0))
+    walker, _ = unit_walker(change_slope(walker_of(name, **DRIVEN[name]), 0.0))
     gait = find_gaits(walker).gait
     shooting, section = RigidStepper(walker, EXACT_STEPS), strike_section(walker)
     z = coordinates_of(walker, gait.state)
@@ -100,7 +100,7 @@ NEAR = 0.03  # of m sqrt(g L): a push-off that level gaits of most walkers go wi
 
 @pytest.mark.parametrize("name", ["paper", "rigid-only", "contact-si", "torso", "round-feet", "simplest"])
 def test_push_off_gives_a_stable_gait_on_level_ground(name):
-    walker = on_slope(walker_of(name), 0.0)
+    walker = change_slope(walker_of(name), 0.0)
     gait = find_gaits(walker.changed(push_off=NEAR * unit_walker(walker)[1].impulse)).gait
     assert gait.stable
     assert not gait.objections
@@ -110,7 +110,7 @@ def test_push_off_gives_a_stable_gait_on_level_ground(name):
 def test_gravity_shaping_torques_give_the_passive_gait_on_any_slope(slope):
     """Controlled symmetry: Spong, Bullo (2005)."""
     passive = walker_of("paper")
-    gait, turned = find_gaits(passive).gait, on_slope(passive, slope)
+    gait, turned = find_gaits(passive).gait, change_slope(passive, slope)
     lean = slope - passive.slope
     h, unit = 1e-4, np.eye(2)
 
@@ -155,7 +155,7 @@ def test_push_off_of_kuos_walker_costs_impulse_squared_over_twice_its_mass():
 
 
 def test_work_against_gravity_uphill_is_not_counted_as_input():
-    walker = on_slope(walker_of("paper", push_off=4.0), -0.005)
+    walker = change_slope(walker_of("paper", push_off=4.0), -0.005)
     walk = take_walk(walker, EXACT_STEPS, find_gaits(walker).gait.state, 2)
     assert walk.driven.gravity < 0.0
     spent = walk.driven.push_off / (walk.driven.weight * walk.touch_along_m[-1])
@@ -169,18 +169,18 @@ DRIVES = {**DRIVEN, "paper": {"push_off": 4.0, "hip": (10.0, 0.0, 0.3)}}
 @pytest.mark.parametrize("name", DRIVES)
 def test_energies_of_a_driven_walk_balance(name):
     """And what is given in a gait's step is what its strikes take; a spring gives back what it takes."""
-    walker = on_slope(walker_of(name, **DRIVES[name]), 0.0)
+    walker = change_slope(walker_of(name, **DRIVES[name]), 0.0)
     gait = find_gaits(walker).gait
     weight = walker.mass * walker.gravity * walker.leg_length
     walk = take_walk(walker, EXACT_STEPS, gait.state, 4)
     assert walk.energy_balance_residual < 1e-11 * weight
     assert sum(gait.work[name] for name in GIVERS) == pytest.approx(walk.lost_in_strikes / 4, rel=1e-9)
-    off = with_scaled_rates(walker, gait.state, 1.01, 1.02)
+    off = scale_rates(walker, gait.state, 1.01, 1.02)
     assert take_walk(walker, EXACT_STEPS, off, 2).energy_balance_residual < 1e-11 * weight
 
 
 def test_hip_damper_dissipates_the_integral_of_its_power():
-    walker = on_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.1, 0.0)), 0.0)
+    walker = change_slope(walker_of("paper", push_off=4.0, hip=(10.0, 0.1, 0.0)), 0.0)
     walk = take_walk(walker, EXACT_STEPS, LEVEL, 1, sampled=True)
     y, t = walk.samples.state[:-1], walk.samples.time_s[:-1]
     spring = 5.0 * float(np.diff((y[[-1, 0], 0] - y[[-1, 0], 1]) ** 2)[0])
@@ -198,7 +198,7 @@ TURNED = {
 @pytest.mark.parametrize("name", TURNED)
 def test_positive_work_of_a_hip_torque_is_the_integral_of_positive_power(name):
     """Late in the swing the legs turn back; with knees the knee strike reverses the rate between the thighs at once."""
-    walker = on_slope(walker_of(name, **TURNED[name]), 0.0)
+    walker = change_slope(walker_of(name, **TURNED[name]), 0.0)
     start = find_gaits(walker).gait.state
     net, positive = torque_work_of_a_step(walker, start, take_walk(walker, EXACT_STEPS, start, 1))
     assert positive > net + 1e-3 * abs(net)
@@ -213,7 +213,7 @@ def test_cost_derivative_across_a_knee_strike_equals_an_independent_slope():
     """By the hip's spring, of a walker whose knee strike reverses the rate between its thighs."""
 
     def driven(spring):
-        return on_slope(walker_of("kneed", push_off=0.2, hip=(spring, 0.0, 0.3)), 0.0)
+        return change_slope(walker_of("kneed", push_off=0.2, hip=(spring, 0.0, 0.3)), 0.0)
 
     def cost(spring):
         walker = driven(spring)

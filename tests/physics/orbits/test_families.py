@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.paper.appendix_a import CORRECTED, RigidWalker, assembled
 from walkerlab.outcome import Outcome
-from walkerlab.physics.mechanics.rigid_model import on_slope
+from walkerlab.physics.mechanics.rigid_model import change_slope
 from walkerlab.physics.orbits.attractors import (
     Lyapunov,
     close_returns,
@@ -453,7 +453,7 @@ def test_branch_that_exhausts_its_points_says_so():
 
 def test_closed_branch_is_traced_once_from_any_start():
     """The compass pushed uphill has gaits between two impulses alone, on one closed curve."""
-    uphill = on_slope(assembled(paper_walker(0.0)), np.radians(-0.25))
+    uphill = change_slope(assembled(paper_walker(0.0)), np.radians(-0.25))
     pushed = RigidMap(lambda impulse: uphill.changed(push_off=impulse), 7.0, uphill)
     _, units = unit_walker(uphill)
     seeds = [

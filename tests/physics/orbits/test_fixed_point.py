@@ -15,7 +15,7 @@ from walkerlab.config.walkers import StraightLegs, Torso
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import take_walk
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.orbits.fixed_point import (
     RANDOM_START,
     SEARCH_TOLERANCES,
@@ -24,7 +24,7 @@ from walkerlab.physics.orbits.fixed_point import (
     Search,
     SlopeBranch,
     choose_gait,
-    over_slope,
+    map_over_slope,
     slope_branches,
 )
 from walkerlab.physics.orbits.fixed_point import find_gaits as find_gaits_of_model
@@ -162,7 +162,7 @@ def test_same_seed_draws_the_same_starts():
 
 def test_following_a_seed_costs_at_most_thirty_steps():
     walker = Search(assembled(PAPER)).walker
-    step_map = over_slope(walker, SEARCH_TOLERANCES)
+    step_map = map_over_slope(walker, SEARCH_TOLERANCES)
     counted = step_map._exact = Counted(walker, SEARCH_TOLERANCES)
     assert SlopeBranch(step_map, seeds(walker)[0]).follow(walker.slope)[1] is not None
     # one step of walking takes about 200 right-hand sides
@@ -205,7 +205,7 @@ PAPER_WALKER, ROUND, KNEED = (load(Path(name)).config.walker for name in ("paper
 )
 def test_strike_impulse_equals_the_momentum_change_of_the_masses(walker, gravity, degrees):
     assembly, slope = assembly_of(walker, rigid=True), np.radians(degrees)
-    model = standing(assembly, gravity, slope)
+    model = rigid_on_slope(assembly, gravity, slope)
     for gait in find_gaits_of_model(model).gaits:
         step = take_walk(model, TIGHT, gait.state, 1)
         changes = np.subtract(*(momentum_of_masses(assembly, slope, y) for y in (step.after[0], step.before[0])))
@@ -219,7 +219,7 @@ def test_strike_impulse_equals_the_momentum_change_of_the_masses(walker, gravity
 
 
 def test_gait_whose_strike_needs_a_pull_is_excluded():
-    search = find_gaits_of_model(standing(assembly_of(PULLED, rigid=True), 11.514, np.radians(0.44654)))
+    search = find_gaits_of_model(rigid_on_slope(assembly_of(PULLED, rigid=True), 11.514, np.radians(0.44654)))
     (pulled,) = (gait for gait in search.gaits if gait.objections)
     assert pulled.spectral_radius == pytest.approx(2.391, abs=1e-3)
     assert pulled.min_normal_impulse == pytest.approx(-0.0055, abs=5e-5)

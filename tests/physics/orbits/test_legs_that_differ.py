@@ -8,7 +8,7 @@ from plain_unequal_walk import Leg, Segment, Walker
 
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.mechanics.hinges import HIP_ROW
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import pair, with_fields
 from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_second_leg
 from walkerlab.physics.orbits.fixed_point import SearchSettings, find_gaits, with_mean_legs
@@ -58,7 +58,7 @@ def assembly(leg, hip_mass):
 
 def model_of(plain):
     first, second = (assembly(leg, plain.hip_mass) for leg in plain.legs)
-    model = standing(with_second_leg(first, second), plain.gravity, plain.slope)
+    model = rigid_on_slope(with_second_leg(first, second), plain.gravity, plain.slope)
     if not any(plain.knee_damping):
         return model
     models = zip((model, model.exchanged), plain.knee_damping, strict=True)

@@ -7,8 +7,8 @@ import pytest
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.recorded_walk import take_walk
-from walkerlab.physics.mechanics.rigid import standing
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_torso
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
+from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, straight_legs
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap, RigidStepper, state_on_section, strike_section
@@ -53,7 +53,7 @@ def test_gait_of_a_published_walker_is_reproduced(name):
     parts, slope, gravity, (angle, stance, swing), period, multipliers = PUBLISHED[name]
     massless = stance * (1.0 - math.cos(2.0 * angle))  # the trailing foot's momentum about the hip is lost
     z, gait = solved(
-        standing(parts, gravity, slope), np.array([angle - slope, massless if swing is None else swing, stance])
+        rigid_on_slope(parts, gravity, slope), np.array([angle - slope, massless if swing is None else swing, stance])
     )
     assert gait.residual < 1e-12
     assert z[0] + slope == pytest.approx(angle, abs=2e-7)
@@ -68,7 +68,7 @@ def test_gait_of_a_published_walker_is_reproduced(name):
 
 def test_knee_strikes_at_the_published_time():
     parts, slope, gravity, (angle, stance, swing), *_ = PUBLISHED["kneed"]
-    model = standing(parts, gravity, slope)
+    model = rigid_on_slope(parts, gravity, slope)
     z, _ = solved(model, np.array([angle - slope, swing, stance]))
     walk = take_walk(model, Tolerances("dop853", 1e-12, 1e-14, 10**6), state_on_section(model, z), 3, sampled=True)
     assert walk.outcome is Outcome.WALKED
@@ -81,7 +81,7 @@ def test_knee_strikes_at_the_published_time():
 
 @pytest.mark.parametrize("at_strike", ["locked", "free"])
 def test_step_derivative_through_the_knee_strike_equals_its_slope(at_strike):
-    model = standing(HSU_CHEN, 9.81, 0.0504, at_strike == "locked")
+    model = rigid_on_slope(HSU_CHEN, 9.81, 0.0504, at_strike == "locked")
     shooting = RigidStepper(model, TIGHT)
     z = np.array([0.1881, -0.06, -1.11, -0.06])[: len(model.section_indices)]
     DP, h = shooting.walk(strike_section(model), z).DP[0], 1e-4
@@ -95,23 +95,23 @@ def test_step_derivative_through_the_knee_strike_equals_its_slope(at_strike):
 
 
 def test_kneed_gait_is_found_without_a_guess():
-    search = find_gaits(standing(HSU_CHEN, 9.81, 0.0504))
+    search = find_gaits(rigid_on_slope(HSU_CHEN, 9.81, 0.0504))
     assert search.gait is not None
     assert search.gait.state[1] + 0.0504 == pytest.approx(0.2385854603, abs=1e-8)
     assert search.gait.knee_strike == pytest.approx(0.348612, abs=1e-6)
 
 
 def test_round_footed_gait_is_found_from_small_slopes():
-    search = find_gaits(standing(ROUND_FEET, 9.81, 0.01))
+    search = find_gaits(rigid_on_slope(ROUND_FEET, 9.81, 0.01))
     assert search.gait is not None
     assert search.gait.period == pytest.approx(0.450270, abs=1e-6)
     assert any("seed" in by for by in search.gait.found_by)
 
 
 def test_compass_gait_is_the_linear_limit_of_a_vanishing_torso():
-    compass = find_gaits(standing(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), 9.81, 0.0174)).gait
+    compass = find_gaits(rigid_on_slope(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), 9.81, 0.0174)).gait
     errors = []
     for mass in (1e-2, 1e-3):
-        parts = with_torso(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), mass, 0.3, 0.0)
-        errors.append(abs(find_gaits(standing(parts, 9.81, 0.0174)).gait.period - compass.period))
+        parts = add_torso(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), mass, 0.3, 0.0)
+        errors.append(abs(find_gaits(rigid_on_slope(parts, 9.81, 0.0174)).gait.period - compass.period))
     assert errors[0] / errors[1] == pytest.approx(10.0, rel=0.1)

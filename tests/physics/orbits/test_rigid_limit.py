@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.physics.orbits.contact_gait import with_scaled_laws
+from walkerlab.physics.orbits.contact_gait import scale_laws
 from walkerlab.physics.orbits.contact_map import OwnPads
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.rigid_limit import (
@@ -61,12 +61,12 @@ def test_changes_below_the_numerical_error_do_not_spoil_the_limit():
 @pytest.mark.parametrize("name", [ALL_SERIES, STICTION_SERIES])
 def test_series_begins_at_the_contact_of_the_config(name):
     walker = contact_scene(load().config, 0.37).walker
-    assert with_scaled_laws(walker, *series_settings(name)[0][2:]) == walker
+    assert scale_laws(walker, *series_settings(name)[0][2:]) == walker
 
 
 def test_full_damping_penetration_scales_with_static_penetration():
     walker = contact_scene(load().config, 0.37).walker
-    changed = with_scaled_laws(walker, *series_settings(ALL_SERIES)[4][2:])
+    changed = scale_laws(walker, *series_settings(ALL_SERIES)[4][2:])
     before, after = walker.normal, changed.normal
     static = [(196.2 / law.stiffness) ** (1.0 / law.exponent) for law in (before, after)]
     ratio = after.full_damping_penetration / before.full_damping_penetration
@@ -91,9 +91,7 @@ def test_gait_with_push_off_converges_to_the_rigid_one_in_first_order():
     orders = np.log(np.divide(distances[:-1], distances[1:])) / np.log(np.sqrt(10.0))
     assert orders == pytest.approx(1.0, abs=0.06)
     assert distances[-1] < 2e-4
-    assert not isinstance(
-        off(with_scaled_laws(scene.walker, *series_settings(ALL_POINT_SERIES)[4][2:]), gait)[0], Cycle
-    )
+    assert not isinstance(off(scale_laws(scene.walker, *series_settings(ALL_POINT_SERIES)[4][2:]), gait)[0], Cycle)
 
 
 def test_push_off_is_shortened_only_in_the_series_to_the_rigid_limit():

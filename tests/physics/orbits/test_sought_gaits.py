@@ -9,7 +9,7 @@ from scipy.optimize import fsolve
 
 from walkerlab.config.walkers import Kneed, Torso
 from walkerlab.physics.hybrid.recorded_walk import take_walk
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.orbits.fixed_point import MAX_START, MIN_START, SEARCH_TOLERANCES, SearchSettings, find_gaits
 from walkerlab.physics.orbits.rigid_map import state_on_section
 from walkerlab.physics.orbits.similarity import unit_walker
@@ -25,7 +25,7 @@ STARTS = 3
 def with_torso():
     """A walker whose only gait known is unstable; few starts walk at all."""
     walker = Kneed(type="kneed", thigh=THIGH, shank=SHANK, hip_mass_kg=HIP_MASS, torso=Torso(**TORSO))
-    return standing(assembly_of(walker, rigid=True), GRAVITY, SLOPE)
+    return rigid_on_slope(assembly_of(walker, rigid=True), GRAVITY, SLOPE)
 
 
 def by_hand():
@@ -80,7 +80,7 @@ def test_point_foot_ahead_of_the_shank_agrees_with_an_independent_integration():
         torso=Torso(**dict(zip(("mass_kg", "above_hip_m", "inertia_kg_m2"), torso, strict=True))),
         foot_centre_ahead_m=ahead,
     )
-    found = find_gaits(standing(assembly_of(walker, rigid=True), 9.81, slope)).gaits
+    found = find_gaits(rigid_on_slope(assembly_of(walker, rigid=True), 9.81, slope)).gaits
     hand = walker_of(
         (0.46, 2.345, 0.2, 0.0, 0.02), (0.54, 1.013, 0.24, 0.0, 0.03), 10.0, torso, 9.81, slope, ahead
     )  # fmt: skip

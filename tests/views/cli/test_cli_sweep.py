@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.pipeline.headlines import MOST, Pair, difference
+from walkerlab.pipeline.headlines import MAX_HEADLINES, Pair, difference
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.clean import file_lines
@@ -138,7 +138,7 @@ def test_diff_of_different_walks_is_short_unless_all_is_requested():
     assert [line.split() for line in short if "last_step_period_s" in line] == [
         ["last_step_period_s", "0.7", "0.8", "+14.3", "%"]
     ]
-    assert len(short) <= 2 + 2 + MOST + 1
+    assert len(short) <= 2 + 2 + MAX_HEADLINES + 1
     assert short[-1] == "500 other values differ; list them with --all"
     assert len(whole) > 500
 

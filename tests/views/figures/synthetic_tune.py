@@ -5,7 +5,7 @@ from synthetic_walks import motion, stored
 
 from walkerlab.evidence.paper.figures import ERROR_LOOKS, LIMITS, RUN_TIME
 from walkerlab.outcome import Outcome
-from walkerlab.pipeline.stages.walk import over_time
+from walkerlab.pipeline.stages.walk import variables_over_time
 from walkerlab.pipeline.store.content import Group, Variable
 
 STEPS = 10
@@ -15,7 +15,7 @@ FACTORS = np.linspace(0.0, 2.0, 6)
 def walk(period):
     time, _, angle, velocity = motion(STEPS, period, jumps=True)
     touches = {"touch_time_s": Variable(period * np.arange(1, STEPS + 1), ("step",), "s", "touch")}
-    return Group(over_time(time=time, angle=angle, velocity=velocity) | touches)
+    return Group(variables_over_time(time=time, angle=angle, velocity=velocity) | touches)
 
 
 def starts():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from walkerlab.pipeline.stages.walk import over_time, step_columns
+from walkerlab.pipeline.stages.walk import step_columns, variables_over_time
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.pipeline.store.key import Identity
@@ -53,7 +53,7 @@ def motion(steps, period, jumps):
 
 def energies(time, level):
     kinetic = 4.0 + np.cos(9.0 * time)
-    return over_time(kinetic_J=kinetic, potential_J=level - kinetic, mechanical_J=np.full(time.size, level))
+    return variables_over_time(kinetic_J=kinetic, potential_J=level - kinetic, mechanical_J=np.full(time.size, level))
 
 
 def joints(step, stance, angle):
@@ -61,14 +61,14 @@ def joints(step, stance, angle):
     from_hip = LEG_LENGTH * np.stack((np.sin(tilted), -np.cos(tilted)), axis=-1)
     hip = np.stack((step * STEP_LENGTH, 0.0 * step), axis=-1) - from_hip[np.arange(step.size), stance]
     feet = hip[:, None] + from_hip
-    return over_time(
+    return variables_over_time(
         hip_along_m=hip[:, 0], hip_height_m=hip[:, 1], foot_along_m=feet[..., 0], foot_height_m=feet[..., 1]
     )
 
 
 def trajectory(step, time, angle, velocity, level):
     stance = 1 - step % 2
-    moving = over_time(time=time, stance_leg=stance + 1, angle=angle, velocity=velocity)
+    moving = variables_over_time(time=time, stance_leg=stance + 1, angle=angle, velocity=velocity)
     return {**moving, **energies(time, level), **joints(step, stance, angle)}
 
 
@@ -113,7 +113,7 @@ def ground(step, time, period):
     gone = {"dissipated_damping_J": begun, "dissipated_friction_J": 0.1 * begun, "lost_at_edges_J": 0.0 * begun}
     gone["total_energy_J"] = 150.0 - 1.1 * begun
     energies = {name: Variable(values, ("time",), "J", name) for name, values in gone.items()}
-    return over_time(normal_force_N=load, friction_force_N=0.2 * load) | energies
+    return variables_over_time(normal_force_N=load, friction_force_N=0.2 * load) | energies
 
 
 def steps_of(step):

@@ -3,7 +3,7 @@
 import pytest
 
 import walkerlab
-from walkerlab.pipeline.headlines import HEADLINES, MOST, QUANTITIES, has_quantity, headline_values, headlines
+from walkerlab.pipeline.headlines import HEADLINES, MAX_HEADLINES, QUANTITIES, has_quantity, headline_values, headlines
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.sweeps.chunk import flatten_summary
@@ -40,12 +40,12 @@ def test_every_value_of_a_sweep_point_can_be_requested(stage, tmp_path):
 
 def test_headline_values_are_few_and_belong_to_existing_stages():
     assert HEADLINES.keys() <= {stage.name for stage in PIPELINE.stages}
-    assert max(map(len, HEADLINES.values())) <= MOST
+    assert max(map(len, HEADLINES.values())) <= MAX_HEADLINES
     assert all(has_quantity(stage, name) for stage in QUANTITIES for name in HEADLINES[stage])
     assert not has_quantity("fixedpoint", "froud")
 
 
 def test_user_stage_uses_its_first_values_as_headlines():
     names = ["of.0", *(f"n{place}" for place in range(20))]
-    assert headlines("mine", names) == names[1 : MOST + 1]
+    assert headlines("mine", names) == names[1 : MAX_HEADLINES + 1]
     assert headlines("basin", ["outcomes.walked", "share_walking"]) == ["share_walking", "outcomes.walked"]

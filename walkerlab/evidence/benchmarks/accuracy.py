@@ -23,7 +23,7 @@ from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, Trial
 from walkerlab.evidence.benchmarks.words import words
 from walkerlab.evidence.paper.walker import compass_or_none
 from walkerlab.labels import labels_of
-from walkerlab.physics.hybrid.recorded_walk import with_scaled_rates
+from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import rigid_start
 from walkerlab.pipeline.store.checkpoint import Checkpoint
@@ -92,7 +92,7 @@ def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Itera
     """Yield the walks for the measurement: rigid, on compliant ground and, for the compass, near the rigid limit."""
     length, state = rigid_start(config, inputs)
     walker = rigid_walker(config)
-    start = with_scaled_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
+    start = scale_rates(walker, state, START_RATE_FACTOR, START_RATE_FACTOR)
     yield RigidTrial(walker, start, RIGID_TRIAL_STEPS, compass_or_none(config, config.equations))
     if config.contact is None:
         return

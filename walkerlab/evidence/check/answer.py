@@ -35,7 +35,7 @@ from walkerlab.evidence.check.printed import (
     items_of,
     judge,
 )
-from walkerlab.evidence.check.walks import PLAIN, Walk
+from walkerlab.evidence.check.walks import PLAIN, CheckedStep
 from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
@@ -155,7 +155,7 @@ class Checked:
         return total
 
     @cached_property
-    def walks(self) -> list[Walk]:
+    def walks(self) -> list[CheckedStep]:
         """The right gaits, with their values by the compiled model."""
         names = state_names(self.config)
         found = []
@@ -166,11 +166,11 @@ class Checked:
             step = self.walker.step(start)
             if step is not None:
                 measured = {**values_of(gait_summary(gait)), CHOSEN: gait is self.search.gait}
-                found.append(Walk(self.walker, start, step, measured))
+                found.append(CheckedStep(self.walker, start, step, measured))
         return found
 
     @cached_property
-    def right(self) -> Walk | None:
+    def right(self) -> CheckedStep | None:
         """The right gait nearest to the printed one, or None if there is none."""
         if not self.walks:
             return None
@@ -182,11 +182,11 @@ class Checked:
         if start is None or np.abs(start - nearest.start).max() < SAME_GAIT:
             return nearest
         gait = gait_near(self.walker, start)
-        other = nearest if gait is None else Walk(self.walker, *gait)
+        other = nearest if gait is None else CheckedStep(self.walker, *gait)
         moved = np.abs(other.start - nearest.start).max() > SAME_GAIT
         return other if moved and self.distance(other) < self.distance(nearest) else nearest
 
-    def distance(self, walk: Walk) -> float:
+    def distance(self, walk: CheckedStep) -> float:
         """Return how far a gait is from the printed values, each relative to its size."""
         values = walk.values(self.items, self.convention)
         pairs = [(item.printed.value, values[item.name]) for item in self.items]
@@ -208,7 +208,7 @@ class Checked:
         right = self.right
         if right is None:
             return None
-        plain = Walk(right.walker, right.start, right.step)
+        plain = CheckedStep(right.walker, right.start, right.step)
         values = plain.values(self.items, self.convention)
         items = [item for item in self.items if item.quantity in PLAIN and values[item.name] is not None]
         state = self.printed_state("state", full_state(right.start, self.walker.kneed))
@@ -401,7 +401,7 @@ def energy_drift(checked: Checked) -> dict[str, Any]:
     return {"energy_drift_J": walker.energy(STRAIGHT, end) - walker.energy(STRAIGHT, start)}
 
 
-def nearest_gait(checked: Checked, walk: Walk) -> dict[str, Any]:
+def nearest_gait(checked: Checked, walk: CheckedStep) -> dict[str, Any]:
     """Describe the right gait that is nearest to the printed one."""
     radius = walk.quantity("spectral_radius")
     return {
@@ -415,7 +415,7 @@ def nearest_gait(checked: Checked, walk: Walk) -> dict[str, Any]:
     }
 
 
-def routes(walk: Walk) -> dict[str, Any]:
+def routes(walk: CheckedStep) -> dict[str, Any]:
     """Compare both routes: the compiled model's gait must return to itself in the plain model."""
     unit = scales(walk.walker, len(walk.start))
     difference = float(np.abs((walk.step.after - walk.start) / unit).max())

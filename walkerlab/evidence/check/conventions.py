@@ -19,8 +19,8 @@ from walkerlab.evidence.check.plain_walker import (
     STANCE,
     SWING,
     Floats,
+    PlainStep,
     PlainWalker,
-    Step,
 )
 
 BODIES: Final = {"swing": SWING, "stance": STANCE, "shank": SHANK}
@@ -201,7 +201,7 @@ def coordinates_of(walker: PlainWalker, state: Floats) -> Floats:
     return np.concatenate((state[:2], state[n : n + 2 + int(walker.kneed and walker.free_at_strike)]))
 
 
-def state_at(walker: PlainWalker, start: Floats, step: Step, instant: Instant, vertical: bool) -> Floats | None:
+def state_at(walker: PlainWalker, start: Floats, step: PlainStep, instant: Instant, vertical: bool) -> Floats | None:
     """Return the state of all bodies at an instant of a step, or None if the step has no such instant.
 
     vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope

@@ -20,10 +20,10 @@ from walkerlab.config.reads import RigidConfig
 from walkerlab.evidence.check.conventions import Convention, alternatives, start_from
 from walkerlab.evidence.check.gaits import gait_near
 from walkerlab.evidence.check.misprints import misprints_of, parameters, transposed, walker_with
-from walkerlab.evidence.check.mistakes import Family, families_of, mistakes_of
+from walkerlab.evidence.check.mistakes import MistakeFamily, families_of, mistakes_of
 from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
 from walkerlab.evidence.check.printed import Item
-from walkerlab.evidence.check.walks import Walk
+from walkerlab.evidence.check.walks import CheckedStep
 from walkerlab.labels import join_words
 
 REFINED: Final = 5  # candidates that are solved
@@ -55,9 +55,9 @@ class Question:
     config: RigidConfig
     items: Sequence[Item]
     convention: Convention
-    right: Walk
+    right: CheckedStep
     state: Floats | None  # of all bodies, as printed; None if no state is printed
-    gaits: Sequence[Walk] = ()  # all right gaits
+    gaits: Sequence[CheckedStep] = ()  # all right gaits
 
     @property
     def walker(self) -> PlainWalker:
@@ -67,12 +67,12 @@ class Question:
         reproduced = items or self.items
         return Explanation(kind, what, tuple(each.name for each in reproduced), min(each.digits for each in reproduced))
 
-    def reproduced(self, walk: Walk, convention: Convention | None = None) -> list[Item]:
+    def reproduced(self, walk: CheckedStep, convention: Convention | None = None) -> list[Item]:
         """Return the printed numbers of which a gait has every digit."""
         values = walk.values(self.items, convention or self.convention)
         return [item for item in self.items if item.fits(values[item.name])]
 
-    def fits(self, walk: Walk, convention: Convention | None = None) -> bool:
+    def fits(self, walk: CheckedStep, convention: Convention | None = None) -> bool:
         """Whether a gait has every printed digit."""
         return len(self.reproduced(walk, convention)) == len(self.items)
 
@@ -92,7 +92,7 @@ class Question:
         """Printed numbers of which the right gait has every digit."""
         return self.reproduced(self.right)
 
-    def miss(self, walk: Walk) -> float:
+    def miss(self, walk: CheckedStep) -> float:
         """Return the largest distance of a walk from a printed value, in units of its last digit."""
         values = walk.values(self.quick_items, self.convention)
         return max((item.miss(values[item.name]) for item in self.quick_items), default=math.inf)
@@ -103,7 +103,7 @@ class Question:
         quick = [item for item in self.items if item.quantity not in ("multipliers", "spectral_radius")]
         return [item for item in quick if item.quantity.startswith("state")] or quick
 
-    def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> Walk | None:
+    def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a walk near a walker's gait: a Newton step from the printed state, or from the right gait."""
         start = self.right.start if self.state is None else start_from(walker, self.state, self.convention.instant)
         step = None if start is None else walker.step(start, tolerance)
@@ -113,13 +113,13 @@ class Question:
         if np.abs(move[:2]).max() > FARTHEST_GUESS:
             return None
         after = walker.step(start + move, tolerance) if self.needs_times else step
-        return None if after is None else Walk(walker, start + move, after)
+        return None if after is None else CheckedStep(walker, start + move, after)
 
-    def attempt(self, candidate: Candidate, guess: Walk) -> Iterator[Attempt]:
+    def attempt(self, candidate: Candidate, guess: CheckedStep) -> Iterator[Attempt]:
         """Yield the gait of a candidate near a first guess, if there is one."""
         gait = gait_near(candidate.walker, guess.start, self.right.derivative)
         if gait is not None:
-            yield Attempt(candidate, Walk(candidate.walker, *gait))
+            yield Attempt(candidate, CheckedStep(candidate.walker, *gait))
 
     @property
     def needs_times(self) -> bool:
@@ -140,7 +140,7 @@ class Attempt(NamedTuple):
     """The gait of a walker that may explain the printed values."""
 
     candidate: Candidate
-    gait: Walk
+    gait: CheckedStep
 
 
 def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | None]:
@@ -201,7 +201,7 @@ def solved(question: Question, walkers: Iterable[Candidate]) -> Iterator[Attempt
         yield from question.attempt(candidate, guess)
 
 
-def same(walk: Walk, other: Walk) -> bool:
+def same(walk: CheckedStep, other: CheckedStep) -> bool:
     return bool(np.abs(walk.start - other.start).max() < SAME_WALK * np.abs(other.start).max())
 
 
@@ -219,7 +219,7 @@ def fitted(question: Question) -> Iterator[Attempt]:
                 yield from question.attempt(Candidate("mistake", what, walker, family.what), guess)
 
 
-def fitted_size(question: Question, family: Family) -> float | None:
+def fitted_size(question: Question, family: MistakeFamily) -> float | None:
     """Return the size of a mistake that brings its gait closest to the printed values, or None if none does."""
     low, high = LIMITS[family.unit]
     without = misses(question, question.guess(family.of_size(0.0), EXACT))
@@ -241,7 +241,7 @@ def fitted_size(question: Question, family: Family) -> float | None:
     return best
 
 
-def misses(question: Question, walk: Walk | None) -> Floats | None:
+def misses(question: Question, walk: CheckedStep | None) -> Floats | None:
     """Return the signed distances of a walk from the printed values in units of their last digits."""
     if walk is None:
         return None
@@ -296,9 +296,9 @@ def only_times(convention: Convention, other: Convention) -> bool:
     return replace(other, time=convention.time, steps=convention.steps) == convention
 
 
-def scenes(question: Question) -> Iterator[tuple[str, Walk]]:
+def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     """Yield the right gaits, and those of walkers whose leg length includes or excludes the foot's radius."""
-    yield from (("", Walk(gait.walker, gait.start, gait.step)) for gait in question.gaits)
+    yield from (("", CheckedStep(gait.walker, gait.start, gait.step)) for gait in question.gaits)
     walker = question.walker
     printed = None if question.state is None else start_from(walker, question.state, question.convention.instant)
     starts = [start for start in (printed, question.right.start) if start is not None]
@@ -308,7 +308,7 @@ def scenes(question: Question) -> Iterator[tuple[str, Walk]]:
         gaits = (gait_near(other, start) for start in starts) if foot.imag < 0.0 else iter(())
         gait = next(filter(None, gaits), None)
         if gait is not None:
-            yield f"the stated leg length {how} the foot's radius", Walk(other, *gait)
+            yield f"the stated leg length {how} the foot's radius", CheckedStep(other, *gait)
 
 
 def misprinted_values(question: Question) -> Iterator[Explanation]:

@@ -8,7 +8,16 @@ import numpy as np
 
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
-from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, Part, PlainWalker, Step
+from walkerlab.evidence.check.plain_walker import (
+    EXACT,
+    STANCE,
+    STRAIGHT,
+    SWING,
+    Floats,
+    LegPart,
+    PlainStep,
+    PlainWalker,
+)
 
 DIFFERENCE = 1e-6  # rad, and rad/s times sqrt(L/g)
 MAX_MOVES, SMALLEST_MOVE = 16, 1e-13
@@ -33,14 +42,14 @@ def plain_walker(config: RigidConfig) -> PlainWalker:
     if isinstance(walker, CompassWalker):
         # the compass rolls on its ball feet in the contact model only
         radius, centre = 0.0, -1j * walker.mass_to_hip_m
-        parts: tuple[Part, ...] = (Part(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
+        parts: tuple[LegPart, ...] = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
     elif isinstance(walker, StraightLegs):
         centre = walker.leg_mass_ahead_m - 1j * walker.leg_mass_below_hip_m
-        parts = (Part(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
+        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
     else:
         thigh, shank, knee = walker.thigh, walker.shank, -1j * walker.thigh.length_m
-        upper = Part(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
-        lower = Part(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
+        upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
+        lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
         parts, free = (upper, lower), walker.knee.at_heel_strike == "free"
     torso = walker.torso
     return PlainWalker(
@@ -51,7 +60,7 @@ def plain_walker(config: RigidConfig) -> PlainWalker:
         radius=radius,
         gravity=config.gravity_m_s2,
         slope=config.slope_rad,
-        torso=None if torso is None else Part(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
+        torso=None if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
         hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
         push_off=config.push_off.impulse_N_s,
         free_at_strike=free,
@@ -79,7 +88,7 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
     return np.array(columns).T
 
 
-def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, Step] | None:
+def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, PlainStep] | None:
     """Return start and step of the gait near a start, by Newton's method, or None if there is none.
 
     A  derivative of a similar walker's step map, to begin with

@@ -23,7 +23,7 @@ class Mistake(NamedTuple):
     walker: PlainWalker  # with the mistake
 
 
-class Family(NamedTuple):
+class MistakeFamily(NamedTuple):
     """A mistake of some size, such as a time step."""
 
     what: str  # as for `Mistake`, with a place {} for the size
@@ -80,14 +80,14 @@ def changed_signs(right: PlainWalker, signs: dict[tuple[str, int, int], float]) 
     return replace(right, signs={**right.signs, **merged})
 
 
-def families_of(right: PlainWalker) -> Iterator[Family]:
+def families_of(right: PlainWalker) -> Iterator[MistakeFamily]:
     """Yield the mistakes that have a size."""
     early = "a touch counts already when the sum of the legs' angles is within {} rad of a touch"
-    yield Family(early, "rad", 1e-3, lambda size: replace(right, window=size))
+    yield MistakeFamily(early, "rad", 1e-3, lambda size: replace(right, window=size))
     evened = f"{early}, and both feet are then put on the slope"
-    yield Family(evened, "rad", 1e-3, lambda size: replace(right, window=size, evens_angles=True))
+    yield MistakeFamily(evened, "rad", 1e-3, lambda size: replace(right, window=size, evens_angles=True))
     step = "the equations are integrated by Euler's method with a step of {} s"
     first = 4e-3 * right.pendulum_time
-    yield Family(step, "s", first, lambda size: replace(right, euler_step=size))
+    yield MistakeFamily(step, "s", first, lambda size: replace(right, euler_step=size))
     late = f"{step} that ends a step after the strike"
-    yield Family(late, "s", first, lambda size: replace(right, euler_step=size, interpolates=False))
+    yield MistakeFamily(late, "s", first, lambda size: replace(right, euler_step=size, interpolates=False))

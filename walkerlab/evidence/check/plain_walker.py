@@ -36,7 +36,7 @@ STRAIGHT, BENT = "straight", "bent"
 """Phases of a swing: with a straight leg, and with a free knee."""
 
 
-class Part(NamedTuple):
+class LegPart(NamedTuple):
     """A rigid part of a leg, seen from its upper hinge, with the part upright."""
 
     mass: float  # kg
@@ -48,14 +48,14 @@ class Part(NamedTuple):
 class PlainWalker:
     """A walker on its slope, with the mistakes that its equations contain. SI units."""
 
-    parts: tuple[Part, ...]  # of one leg: the whole leg, or thigh and shank
+    parts: tuple[LegPart, ...]  # of one leg: the whole leg, or thigh and shank
     knee: complex  # m, from hip to knee; 0 for straight legs
     hip_mass: float
     foot: complex  # m, from hip to the centre of the foot's arc, leg upright
     radius: float
     gravity: float
     slope: float
-    torso: Part | None = None  # seen from the hip
+    torso: LegPart | None = None  # seen from the hip
     hip: tuple[float, float, float] = (0.0, 0.0, 0.0)  # spring, damper and torque between the legs
     push_off: float = 0.0  # N s
     free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
@@ -275,7 +275,7 @@ class PlainWalker:
             angles[STANCE] = -2.0 * self.lean - angles[SWING]
         return np.concatenate((angles, np.linalg.solve(M, momentum)))
 
-    def step(self, start: Floats, tolerance: float = EXACT) -> Step | None:
+    def step(self, start: Floats, tolerance: float = EXACT) -> PlainStep | None:
         """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
 
         start  (2 + rates,) rad, rad/s: angles of swing and stance leg, then all rates
@@ -290,7 +290,7 @@ class PlainWalker:
         before = pieces[-1].end
         length = self.swing_foot(before).real - self.radius * (before[STANCE] - start[STANCE])
         period = sum(piece.duration for piece in pieces)
-        return Step(period, length, before, self.after_strike(before), pieces)
+        return PlainStep(period, length, before, self.after_strike(before), pieces)
 
     def land(self, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
         """Return the parts of the swing from a state of all bodies to the heel strike, or None if there is none."""
@@ -404,7 +404,7 @@ class Piece(NamedTuple):
     end: Floats
 
 
-class Step(NamedTuple):
+class PlainStep(NamedTuple):
     """A step of a plain walker, SI units."""
 
     period: float

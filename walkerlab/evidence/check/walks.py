@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.config.check import Instant
 from walkerlab.evidence.check.conventions import Convention, state_at
 from walkerlab.evidence.check.gaits import derivative
-from walkerlab.evidence.check.plain_walker import Floats, PlainWalker, Step
+from walkerlab.evidence.check.plain_walker import Floats, PlainStep, PlainWalker
 from walkerlab.evidence.check.printed import Item, match_multipliers
 
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
@@ -28,12 +28,12 @@ PLAIN = (
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class CheckedStep:
     """One step of a walker: a gait, or a first guess at one."""
 
     walker: PlainWalker
     start: Floats  # coordinates just after the heel strike
-    step: Step
+    step: PlainStep
     measured: Mapping[str, Any] = field(default_factory=dict)  # values of the compiled model by name
 
     @cached_property

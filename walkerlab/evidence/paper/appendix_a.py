@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from walkerlab.evidence.paper.law import as_printed
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.mechanics.walkers import Arc, Limb, straight_legs
@@ -109,5 +109,5 @@ def impact(
 def assembled(walker: RigidWalker) -> RigidModel:
     below_hip = walker.leg_length - walker.foot_to_mass
     leg = Limb(walker.leg_length, walker.leg_mass, below_hip, inertia_kg_m2=walker.leg_inertia)
-    model = standing(straight_legs(leg, walker.hip_mass, Arc()), walker.gravity, walker.slope)
+    model = rigid_on_slope(straight_legs(leg, walker.hip_mass, Arc()), walker.gravity, walker.slope)
     return as_printed(model) if walker.c21_sign == AS_PRINTED else model

@@ -9,9 +9,9 @@ from typing import Any
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.physics.ground.walker import changed_forms
-from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel
 from walkerlab.physics.hybrid.recorded_walk import take_walk
-from walkerlab.physics.mechanics.rigid import standing
+from walkerlab.physics.mechanics.rigid import rigid_on_slope
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.stages.walk import last_step, numbers_of
@@ -45,7 +45,9 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
     for name, at_touch in RELEASES.items():
         released = replace(scene, walker=changed_forms(scene.walker, release_at_touch=at_touch))
         walk = released.walk(start_state(scene, state), CONTACT_STEPS, CONTACT_TOLERANCES)
-        model = standing(assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch)
+        model = rigid_on_slope(
+            assembly_of(config.walker, rigid=True), config.gravity_m_s2, config.slope_rad, not at_touch
+        )
         rigid = take_walk(add_drives(model, config), RIGID_TOLERANCES, state, RIGID_STEPS)
         last = {"period_s": float(rigid.periods_s[-1]), "length_m": float(rigid.lengths_m[-1])} if rigid.steps else {}
         of_rigid = {"outcome": rigid.outcome.label, "steps": rigid.steps, "of": RIGID_STEPS, **last}
@@ -55,7 +57,7 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 
 def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
-    steps, lost = walk.steps, by_channel(scene.walker, walk.dissipated_J)
+    steps, lost = walk.steps, losses_by_channel(scene.walker, walk.dissipated_J)
     return {
         "outcome": walk.outcome.label,
         "steps": steps,

@@ -10,7 +10,7 @@ import numpy as np
 
 from walkerlab.evidence.paper.measured import Errors
 from walkerlab.physics.hybrid import comparison
-from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, legs, over_time
+from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, legs, variables_over_time
 from walkerlab.pipeline.store.columns import numbered
 from walkerlab.pipeline.store.content import Content, Group, Variable
 
@@ -76,7 +76,11 @@ def compare_motion(
     errors = {"raw": raw}
     groups = {
         "errors": Group(
-            {**over_time(time=time), **legs(), **differences("raw", raw, (TIME, LEG), f"{meaning}, at the same time")}
+            {
+                **variables_over_time(time=time),
+                **legs(),
+                **differences("raw", raw, (TIME, LEG), f"{meaning}, at the same time"),
+            }
         )
     }
     missing = ("differences in phase and between the orbits", "step")

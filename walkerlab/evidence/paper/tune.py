@@ -18,8 +18,8 @@ from walkerlab.labels import Label
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
-from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sample_feet
-from walkerlab.physics.hybrid.recorded_walk import as_state, take_walk, with_scaled_rates
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel, sample_feet
+from walkerlab.physics.hybrid.recorded_walk import as_state, scale_rates, take_walk
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 from walkerlab.physics.orbits import scaled_starts
 from walkerlab.physics.orbits.contact_gait import GaitAnswer
@@ -29,7 +29,7 @@ from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress, track
-from walkerlab.pipeline.run.workers import in_order
+from walkerlab.pipeline.run.workers import map_in_order
 from walkerlab.pipeline.stages.numerical_error import numerical_error
 from walkerlab.pipeline.stages.rigid_groups import leg_variables
 from walkerlab.pipeline.stages.walk import (
@@ -38,9 +38,9 @@ from walkerlab.pipeline.stages.walk import (
     count_outcomes,
     legs,
     numbers_of,
-    over_time,
     rigid_start,
     step_columns,
+    variables_over_time,
 )
 from walkerlab.pipeline.store.columns import numbered, real_and_imaginary, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
@@ -123,7 +123,9 @@ class TuneRun:
         self.take("released", self.rigid_state)
         self.as_it_stands = self.starts.walk(*UNCHANGED_START)
         quick = scale_for_map(self.starts, self.as_it_stands.evaluations)
-        rows = in_order([partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs)
+        rows = map_in_order(
+            [partial(scaled_starts.contact_row, quick, swing, float(factor)) for factor in stance], jobs
+        )
         cells_by_row = [*track(progress, "tune: map", swing.size * stance.size, rows, swing.size)]
         self.contact_map = scaled_starts.as_map(swing, stance, cells_by_row)
         progress.start("tune: rigid map and margins")
@@ -132,7 +134,7 @@ class TuneRun:
         if self.adjustment is not None:
             factors = self.adjustment.swing, self.adjustment.stance
             self.margins = scaled_starts.margins(self.starts, factors, **({} if self.pins_foot else COARSE_MARGINS))
-            self.adjusted_state = with_scaled_rates(self.rigid, self.rigid_state, *factors)
+            self.adjusted_state = scale_rates(self.rigid, self.rigid_state, *factors)
             self.take("adjusted", self.adjusted_state)
         if is_own_walker(self.config):
             terrain = require_contact(self.config).terrain
@@ -275,7 +277,7 @@ def gait_summary(tune: TuneRun) -> dict[str, Any]:
         "stable": gait.stable,
         "slip_m": step.slip_m,
         "residual": gait.residual,
-        "lost_J": by_channel(tune.scene.walker, step.dissipated_J),
+        "lost_J": losses_by_channel(tune.scene.walker, step.dissipated_J),
         "height_lost_J": step.driven.gravity,
         "work_per_step_J": step.driven.per_step(1),
         "cost_of_transport": step.driven.cost_of_transport(step.length_m),
@@ -338,14 +340,14 @@ def groups(tune: TuneRun) -> dict[str, Group]:
         stored["gait"] = gait_group(tune.gait.gait, tune.scene)
     rigid = tune.rigid_walk.samples
     if rigid is not None and rigid.time_s.size:
-        in_time = {**legs(), **over_time(time=rigid.time_s), **leg_variables(rigid)}
+        in_time = {**legs(), **variables_over_time(time=rigid.time_s), **leg_variables(rigid)}
         stored["rigid_start"] = Group({**in_time, **step_columns(tune.rigid_walk.touch_time_s)})
     for name, walk in tune.walks.items():
         if walk.samples is not None and walk.samples.time_s.size:
             stored[name] = Group({**legs_in_time(walk, walker), **step_columns(walk.touch_time_s)})
     if tune.paper is not None:
         energy = {"mechanical_J": Variable(tune.paper.mechanical, (TIME,), "J", "kinetic and potential energy")}
-        forces = over_time(normal_force_N=tune.paper.normal)
+        forces = variables_over_time(normal_force_N=tune.paper.normal)
         stored["paper_start"] = Group({**legs_in_time(tune.paper.walk, walker), **forces, **energy})
     return stored
 
@@ -355,7 +357,7 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
     if walk.samples is None:
         return {}
     angle, velocity = leg_motion(walk.samples.states, walker)
-    return {**legs(), **over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
+    return {**legs(), **variables_over_time(time=walk.samples.time_s, angle=angle, velocity=velocity)}
 
 
 def map_group(tune: TuneRun) -> Group:

@@ -23,7 +23,7 @@ from walkerlab.evidence.verification.verdict import (
 )
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS, Method, method_named
-from walkerlab.pipeline.run.workers import in_order
+from walkerlab.pipeline.run.workers import map_in_order
 
 TIGHTER_FACTOR = 0.1
 SAMPLED_STEPS = 100  # walks of more steps are not sampled
@@ -58,7 +58,7 @@ def run_cells(cells: Sequence[CaseCell], jobs: int) -> Iterator[tuple[CaseResult
     """Yield results in case order. One case per model runs first, to compile. The others start by decreasing budget."""
     models = [cell.case.model for cell in cells]
     first = [models.index(model) for model in ("contact", "rigid") if model in models]
-    return in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
+    return map_in_order([cell.run for cell in cells], jobs, first, lambda place: -cells[place].case.budget)
 
 
 def judge(case: Case, config: Config) -> CaseResult:

@@ -24,7 +24,7 @@ from walkerlab.evidence.verification.scaling import pendulum_time
 from walkerlab.evidence.verification.starts import ContactStart, RigidStart, prepare_start
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.physics.ground.on_pads import OnPads
-from walkerlab.physics.ground.walker import on_ground
+from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.solvers.registry import Tolerances
@@ -144,7 +144,7 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
     """Walk a contact scene with SciPy's solve_ivp at default settings."""
     from scipy.integrate import solve_ivp
 
-    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
+    system = OnPads(place_on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     start = np.array(ready.start)
     counts = new_counts(MAX_ORDINARY_EVALUATIONS)
     right_hand_side = counting_rhs(counts, system, start.size)
@@ -159,7 +159,7 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
 
 def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINARY_EVALUATIONS) -> Choice:
     """Walk a contact scene by semi-implicit Euler with at most `cap` steps of h (s)."""
-    system = OnPads(on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
+    system = OnPads(place_on_ground(ready.scene.walker, (True, True)), ready.scene.ground.terrain)
     y = np.array(ready.start)
     began = time.perf_counter()
     steps = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))

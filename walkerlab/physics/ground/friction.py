@@ -11,7 +11,7 @@ import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
 from walkerlab.physics.ground.smooth_step import smooth_step
-from walkerlab.physics.kernels import by_type, by_type_or_default
+from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default
 
 
 class FrictionLaw(Protocol):
@@ -40,18 +40,18 @@ class FrictionLaw(Protocol):
         """Describe the law and its parameters as a phrase that can follow 'there is'."""
 
 
-@by_type
+@dispatch_by_type
 def friction_coefficient(law: Any, slip: float) -> tuple[float, float]:
     """Compute the signed ratio of friction to normal force at a slip velocity (m/s), and its derivative (s/m)."""
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def switching_count(law: Any) -> int:
     """Return the number of event functions that mark changes of the law's formula: at most four, none by default."""
     return 0
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def sample_switching(law: Any, slip: float, values: Any, first: int, j: int) -> None:
     """Write the event functions that `switching_count` counts, at a slip velocity (m/s), into values[first:, j]."""
 

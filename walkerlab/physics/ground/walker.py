@@ -14,7 +14,7 @@ import numpy as np
 
 from walkerlab.physics.ground.friction import friction_coefficient
 from walkerlab.physics.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
-from walkerlab.physics.kernels import by_reference, kernel_part, vector
+from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.mechanics import tree
 from walkerlab.physics.mechanics.hinges import HIP_ROW
 from walkerlab.physics.mechanics.tree import lever_motion
@@ -146,7 +146,7 @@ def new_progress(stance: int = 1, steps: int = 0, last_touch: float = 0.0) -> Wa
     return progress
 
 
-@by_reference
+@pass_by_reference
 class OnGround(NamedTuple):
     """Walker in one form on the ground, with variables that the walk may change without changing the form."""
 
@@ -160,7 +160,7 @@ class OnGround(NamedTuple):
     progress: WalkProgress
 
 
-def on_ground(
+def place_on_ground(
     walker: ContactWalker,
     has_ground: Any,
     knee: Any = (RELEASED, RELEASED),

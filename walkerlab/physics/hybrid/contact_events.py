@@ -8,7 +8,7 @@ constants because kernels treat members of an IntEnum as objects and compile a t
 from typing import NamedTuple
 
 from walkerlab.physics.ground.terrain import Terrain
-from walkerlab.physics.kernels import by_reference, kernel_part
+from walkerlab.physics.kernels import kernel_part, pass_by_reference
 
 # event functions of each foot
 HEIGHT, LEFT_EDGE, RIGHT_EDGE, RELEASE, FULL_DAMPING = range(5)
@@ -35,7 +35,7 @@ class Frame(NamedTuple):
     locate_switching: bool  # whether solver steps end at the switching points of the force law
 
 
-@by_reference
+@pass_by_reference
 class JudgedGround(NamedTuple):
     """Ground of a walk, with the criteria for its events."""
 

@@ -24,7 +24,14 @@ from walkerlab.physics.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT,
 from walkerlab.physics.hybrid.contact_state import WalkState
 from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
 from walkerlab.physics.hybrid.hip_work import torque_work
-from walkerlab.physics.kernels import by_reference, by_type_or_default, kernel, kernel_part, matrix, vector
+from walkerlab.physics.kernels import (
+    dispatch_by_type_or_default,
+    kernel,
+    kernel_part,
+    matrix,
+    pass_by_reference,
+    vector,
+)
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.tree import fast_fields, record_type
 from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_crossing
@@ -43,7 +50,7 @@ OF_ORDER_9: Quadrature = (
 )
 
 
-@by_reference
+@pass_by_reference
 class ContactSamples(NamedTuple):
     time_s: Any  # (samples,)
     states: Any  # (samples, 4 + 2 n) states of the free walker with all bodies
@@ -79,7 +86,7 @@ class ContactTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one o
 CONTACT_TALLY = record_type(ContactTally, {})
 
 
-@by_reference
+@pass_by_reference
 class ContactObserver(NamedTuple):
     """Samples, energy balance and tangent of a walk. Each is skipped if not requested."""
 
@@ -181,7 +188,7 @@ def end_energy(system: OnGround, y: Any) -> float:
     return total_energy(system, y)
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def quadrature(method: Any) -> Quadrature:
     """Return the quadrature rule for powers over a method's step, as accurate as the best dense output."""
     return OF_ORDER_9

@@ -19,7 +19,7 @@ from walkerlab.physics.ground.walker import (
     feet_motion,
     floating_state,
     foot_force,
-    on_ground,
+    place_on_ground,
     sines_cosines,
     to_form,
     to_full,
@@ -60,7 +60,7 @@ class Stopped:
 def sample_energies(walker: ContactWalker, samples: ContactSamples) -> Floats:
     """Compute kinetic, potential and total energy (J) of every sample, (samples, 3)."""
     energies = np.zeros((samples.time_s.size, 3))
-    fill_energies(on_ground(walker, (False, False)), samples, energies)
+    fill_energies(place_on_ground(walker, (False, False)), samples, energies)
     return energies
 
 
@@ -144,7 +144,7 @@ def new_observer(
     samples = times.size
     tally = new_record(CONTACT_TALLY)
     if track_energy or walker.whole.sprung:
-        system = on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
+        system = place_on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
         tally.start_energy, tally.start_spring = total_energy(system, y), hinge_energies(system, y)[0]
         tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
@@ -160,9 +160,11 @@ def new_observer(
     return ContactObserver(track_energy, room, np.zeros(ENTRIES), np.zeros(ENTRIES), tally, tangent)
 
 
-def in_walk(walker: ContactWalker, walk_state: WalkState, pinned: bool = False) -> OnGround:
+def present_walker(walker: ContactWalker, walk_state: WalkState, pinned: bool = False) -> OnGround:
     """Return the walker in its present form. It shares memory with the walk state."""
-    return on_ground(walker, walk_state.has_ground, walk_state.knee, pinned, walk_state.level, walk_state.progress)
+    return place_on_ground(
+        walker, walk_state.has_ground, walk_state.knee, pinned, walk_state.level, walk_state.progress
+    )
 
 
 def walk_on(
@@ -180,7 +182,7 @@ def walk_on(
     balance does not close.
     """
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
-    system = in_walk(walker, walk_state, pinned)
+    system = present_walker(walker, walk_state, pinned)
     tangent = observer.tangent.Phi
     half, root = len(start) // 2, 2 if pinned else 0
     y = to_form(system.form, (*start[root:half], *start[half + root :]))
@@ -197,7 +199,7 @@ def walk_on(
         ended, event = walk(system, method, finder, observer, walk_state, until)
         if ended != CHANGES_FORM:
             break
-        before, system = system, in_walk(walker, walk_state, pinned)
+        before, system = system, present_walker(walker, walk_state, pinned)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
         tangent[:] = to_full(system.form, tangent[: method.y.size], walker.size)
@@ -266,7 +268,7 @@ def run_parts(
     return replace(stopped, work=spent + stopped.work)
 
 
-def by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
+def losses_by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
     """Return the dissipated energies (J) by channel, without the knees' channels for a walker without knees."""
     pairs = zip(LOSSES, dissipated.tolist(), strict=True)
     return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}

@@ -33,7 +33,7 @@ from walkerlab.physics.hybrid.contact_events import (
     JudgedGround,
 )
 from walkerlab.physics.hybrid.endings import ON_GROUND, STRAIGHT_KNEE
-from walkerlab.physics.kernels import by_reference, kernel_part
+from walkerlab.physics.kernels import kernel_part, pass_by_reference
 from walkerlab.physics.solvers.system import State
 
 # release of the trailing knee: not due, due when the leading foot stops sinking in, due when the push-off ends
@@ -41,7 +41,7 @@ NOT_DUE, AT_COMPRESSION, AT_PULSE_END = range(3)
 START_ROUNDING = 1e-14  # relative rounding error of a start's coordinates and velocities
 
 
-@by_reference
+@pass_by_reference
 class WalkState(NamedTuple):
     """State of a walk apart from its coordinates. Events change it, and the result is gathered from it."""
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.physics.ground.walker import OF_STATES
-from walkerlab.physics.kernels import by_reference, kernel_part, vector
+from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.solvers.linear import factor, solve
 from walkerlab.physics.solvers.radau5 import RADAU_NODES
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate
@@ -29,7 +29,7 @@ RADAU_WEIGHTS = np.array(
 )
 
 
-@by_reference
+@pass_by_reference
 class Tangent(NamedTuple):
     """Derivative Phi of the state, and workspace. `n` is the size of the free walker's state with all bodies."""
 

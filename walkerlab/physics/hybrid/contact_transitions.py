@@ -46,7 +46,7 @@ from walkerlab.physics.hybrid.contact_state import (
     material_along,
 )
 from walkerlab.physics.hybrid.endings import BENT_KNEE, FELL, GOES_ON, OFF_PAD, SLID, STUBBED
-from walkerlab.physics.kernels import by_type_or_default, kernel_part
+from walkerlab.physics.kernels import dispatch_by_type_or_default, kernel_part
 
 STEP_AHEAD = 0.25  # fraction of the pitch; a touch less than this ahead of the other foot ends no step
 AT_SURFACE = 1e-11  # m; a foot this close to the surface is on it, within the error of an event's time
@@ -221,7 +221,7 @@ def touch(
     return GOES_ON
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def catches(stop: Any) -> bool:
     """Whether a knee locks as soon as it is straight. A compliant stop turns the knee back first."""
     return False

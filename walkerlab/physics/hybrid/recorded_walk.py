@@ -311,7 +311,7 @@ class Recorder:
         )
 
 
-def with_scaled_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
+def scale_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
     """Return a state just after heel strike with the velocities of swing and stance leg scaled."""
     n = len(state) // 2
     rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]

@@ -13,7 +13,7 @@ import numpy as np
 
 from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.rigid_walk import LONGEST_SWING, hip_above_fall, hull
-from walkerlab.physics.kernels import by_type, kernel, kernel_part, vector
+from walkerlab.physics.kernels import dispatch_by_type, kernel, kernel_part, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, SpringDamper, hinge_law, hinge_torque
 from walkerlab.physics.mechanics.impact import strike
 from walkerlab.physics.mechanics.rigid_model import AT_STRIKE, RigidModel, feet_on_slope
@@ -144,7 +144,7 @@ def new_fates(n: int) -> Fates:
     return Fates(np.zeros(n, np.int64), np.zeros(n, np.int64))
 
 
-@by_type
+@dispatch_by_type
 def record_strike(observer: Any, walk: int, step: int, t: float, y: Any) -> int:
     """Record a heel strike at time t (s), with state y after it, and return GOES_ON or the outcome's number."""
 
@@ -333,7 +333,7 @@ def event_function(rows: Any, row: int, lane: int, swing: float, stance: float) 
 
 
 @kernel_part
-def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
+def interpolate_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant: float) -> Quintic:
     """Interpolate swing * theta_1 + stance * theta_2 + constant over a lane's solver step by a quintic."""
     rows = memory.rows
     a = event_function(rows, START_STATE, lane, swing, stance)
@@ -344,12 +344,12 @@ def in_step(memory: LaneMemory, lane: int, swing: float, stance: float, constant
 @kernel_part
 def strike_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     """Find the fraction of a lane's solver step at which the heel strikes with the swing leg ahead, or NO_CROSSING."""
-    guard = in_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
+    guard = interpolate_step(memory, lane, 1.0, 1.0, feet_on_slope(walker, 0.0, 0.0))
     at_start = memory.rows[FIRST_TRY, lane] > 0.0
     strike_at = first_fall(memory.finder, guard, at_start, 0.0)
     if strike_at > 1.0:
         return NO_CROSSING
-    ahead = in_step(memory, lane, 1.0, -1.0, 0.0)
+    ahead = interpolate_step(memory, lane, 1.0, -1.0, 0.0)
     while strike_at <= 1.0 and evaluate_quintic(ahead, strike_at) <= 0.0:
         strike_at = first_fall(memory.finder, guard, at_start, strike_at + 1e-12)
     return strike_at
@@ -365,5 +365,5 @@ def fall_in_step(walker: TwoLegs, memory: LaneMemory, lane: int) -> float:
     if abs(angle) <= walker.fallen:
         return NO_CROSSING
     side = 1.0 if angle > 0.0 else -1.0
-    height = in_step(memory, lane, 0.0, -side, walker.fallen - side * from_upright)
+    height = interpolate_step(memory, lane, 0.0, -side, walker.fallen - side * from_upright)
     return first_fall(memory.finder, height, False, 0.0)

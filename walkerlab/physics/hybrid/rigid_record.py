@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.physics.hybrid.hip_work import torque_work
-from walkerlab.physics.kernels import by_reference, kernel_part, vector
+from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.mechanics.hinges import HIP_ROW, hinge_law
 from walkerlab.physics.mechanics.impact import push_off
 from walkerlab.physics.mechanics.rigid_model import (
@@ -55,7 +55,7 @@ class RigidTally(np.record):  # type: ignore[misc]  # NumPy's stubs call one of 
 RIGID_TALLY = record_type(RigidTally, {})
 
 
-@by_reference
+@pass_by_reference
 class Observer(NamedTuple):
     """Record of a walk besides its heel strikes. It is empty unless `watching`."""
 

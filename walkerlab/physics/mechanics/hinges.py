@@ -10,10 +10,10 @@ knees on compliant ground, where each also has a stop.
 
 from typing import Any, NamedTuple
 
-from walkerlab.physics.kernels import by_type_or_default, forced_inline, kernel_part
+from walkerlab.physics.kernels import dispatch_by_type_or_default, forced_inline, kernel_part
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def legs_apart(system: Any, y: Any) -> tuple[float, float]:
     """Return the angle (rad) by which the swing leg is ahead of the stance leg, and its rate (rad/s)."""
     return 0.0, 0.0
@@ -28,7 +28,7 @@ class HingeTorque(NamedTuple):
     by_rate: float  # N m s/rad
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def hinge_torque(law: Any, angle: float, rate: float) -> HingeTorque:
     """Compute the torque of a law at an angle (rad) and rate (rad/s), or zero for instantaneous laws such
     as IdealLock.
@@ -36,7 +36,7 @@ def hinge_torque(law: Any, angle: float, rate: float) -> HingeTorque:
     return HingeTorque(0.0, 0.0, 0.0, 0.0)
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def hinge_energy(law: Any, angle: float) -> float:
     """Compute the elastic energy (J) of a law at an angle (rad)."""
     return 0.0

@@ -13,13 +13,13 @@ from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     SWING,
     RigidModel,
+    change_slope,
     new_rigid_model,
-    on_slope,
     pair,
 )
 from walkerlab.physics.solvers.system import Floats
 
-ALIKE = 1e-12  # relative difference up to which two legs count as equal
+SYMMETRY_TOLERANCE = 1e-12  # relative difference up to which two legs count as equal
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,12 @@ class BodyPlaces:
     lower: int  # number of lower bodies of the swing leg; of unequal legs, the larger number
 
 
-def standing(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
+def rigid_on_slope(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
     """Build the rigid model of an assembly on a slope (rad). The other arguments are as in `on_level_ground`."""
-    return on_slope(on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
+    return change_slope(rigid_on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
-def on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
+def rigid_on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
     """Build the rigid model of an assembly, which is a pair of models if the legs differ. Gravity in m/s^2.
 
     The trailing knee is released just after the heel strike if `knee_locked_at_strike`, otherwise just before it.
@@ -180,7 +180,7 @@ def have_equal_legs(assembly: Assembly) -> bool:
 
 
 def are_equal(one: Floats, other: Floats) -> bool:
-    return bool(np.allclose(one, other, rtol=ALIKE, atol=ALIKE * np.abs(one).max()))
+    return bool(np.allclose(one, other, rtol=SYMMETRY_TOLERANCE, atol=SYMMETRY_TOLERANCE * np.abs(one).max()))
 
 
 def leg_measures(assembly: Assembly, k: int) -> tuple[Floats, ...]:

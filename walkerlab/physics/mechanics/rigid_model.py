@@ -178,7 +178,7 @@ def new_rigid_model(n: int, **fields: Any) -> RigidModel:
     return model.changed(**fields)
 
 
-def on_slope(model: RigidModel, slope: float) -> RigidModel:
+def change_slope(model: RigidModel, slope: float) -> RigidModel:
     along, down = model.gravity * math.sin(slope), model.gravity * math.cos(slope)
     return model.changed(slope=slope, gravity_along=along, gravity_down=down)
 

@@ -81,7 +81,7 @@ def kneed_legs(thigh: Limb, shank: Limb, hip_mass_kg: float, foot: Arc) -> Assem
     )
 
 
-def with_torso(walker: Assembly, mass_kg: float, above_hip_m: float, inertia_kg_m2: float) -> Assembly:
+def add_torso(walker: Assembly, mass_kg: float, above_hip_m: float, inertia_kg_m2: float) -> Assembly:
     """Add a torso that is hinged at the hip and kept on the bisector of the legs.
 
     Source: Wisse, Schwab, van der Helm, Passive dynamic walking model with upper body, Robotica 22 (2004).

@@ -110,7 +110,7 @@ def solve_gait_on(pads: OwnPads, z: Floats, steps: int, rigidity: float = 0.0) -
     return gait
 
 
-def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
+def scale_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
     """Return the walker with the ground's stiffness, damping and friction velocities multiplied by these factors."""
     # The full-damping penetration shrinks like the static penetration, so that the damping ratio is unchanged.
     normal = walker.normal
@@ -122,10 +122,10 @@ def with_scaled_laws(walker: ContactWalker, stiffness: float, damping: float, cr
     return walker._replace(normal=changed, friction=walker.friction.with_creep(creep))
 
 
-def with_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
+def set_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
     """Return the walker on ground of a rigidity between 0 (actual ground) and 1 (nearly rigid ground)."""
     stiffer = MAX_STIFFENING**rigidity
-    return with_scaled_laws(walker, stiffer, math.sqrt(stiffer), MAX_CREEP_FACTOR**-rigidity)
+    return scale_laws(walker, stiffer, math.sqrt(stiffer), MAX_CREEP_FACTOR**-rigidity)
 
 
 def follow_from_rigid(
@@ -134,11 +134,9 @@ def follow_from_rigid(
     count = len(pitches_m)
 
     def gait_at(rigidity: float, z: Floats, pitches_m: Sequence[float]) -> Cycle | str:
-        return solve_gait_on(
-            OwnPads(partial(with_rigidity, walker), ground, tolerances, *pitches_m), z, count, rigidity
-        )
+        return solve_gait_on(OwnPads(partial(set_rigidity, walker), ground, tolerances, *pitches_m), z, count, rigidity)
 
-    points = section_points(with_rigidity(walker, 1.0), ground, tolerances, start)
+    points = section_points(set_rigidity(walker, 1.0), ground, tolerances, start)
     hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
     tried = (gait_at(1.0, z, pitches_m) for _, z in points)
     last = next((gait for gait in tried if isinstance(gait, Cycle)), None)
@@ -150,14 +148,16 @@ def follow_from_rigid(
         )
     gaits = {0.0: last}
 
-    def softer(state: float, expected: Floats) -> Floats | None:
+    def evaluate_softer(state: float, expected: Floats) -> Floats | None:
         near = gait_at(1.0 - state, expected[:-count], expected[-count:].tolist())
         if not isinstance(near, Cycle):
             return None
         gaits[state] = near
         return append_length(near)
 
-    state = Follower(softer, FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),)), RIGIDITY_STRIDES).to(1.0)
+    state = Follower(
+        evaluate_softer, FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),)), RIGIDITY_STRIDES
+    ).to(1.0)
     if state.value == 1.0:
         return GaitAnswer(gaits[1.0], "followed from nearly rigid ground")
     rigidity = 1.0 - state.value

@@ -28,7 +28,7 @@ from walkerlab.physics.ground.walker import (
     ContactWalker,
     OnGround,
     feet_motion,
-    on_ground,
+    place_on_ground,
     sines_cosines,
     to_form,
     to_full,
@@ -36,7 +36,7 @@ from walkerlab.physics.ground.walker import (
 from walkerlab.physics.hybrid.contact_events import PASSING, JudgedGround
 from walkerlab.physics.hybrid.contact_jumps import state_rate
 from walkerlab.physics.hybrid.contact_loop import NO_LIMIT
-from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, in_walk, new_observer, walk_on
+from walkerlab.physics.hybrid.contact_result import Stopped, driven_work, new_observer, present_walker, walk_on
 from walkerlab.physics.hybrid.contact_state import WalkState, material_along, new_walk_state
 from walkerlab.physics.hybrid.walk_record import DrivenWork
 from walkerlab.physics.mechanics.links import factor_linked, solve_linked
@@ -203,7 +203,7 @@ def step_from_section(
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
     if derived:  # project the flow's derivative onto the section, along the flow
-        system = in_walk(walker, walk_state)
+        system = present_walker(walker, walk_state)
         rate = state_rate(system, to_form(system.form, end), end.size, stopped.time_s)
         gradient, n = np.zeros(end.size), int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
@@ -238,7 +238,7 @@ def walk_from_section(
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
     start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
-    walk_state = walk_state_on_section(walker, over_footholds(ground, heights), start, steps + 1)
+    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
         return walk_on(walker, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
@@ -246,7 +246,9 @@ def walk_from_section(
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
         stopped = go_on(shorten(walk_state, 1), start)
-        pushed = pushed_at_hip(on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push)
+        pushed = pushed_at_hip(
+            place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
+        )
         stopped = replace(stopped, state=pushed)
     if stopped.outcome is Outcome.WALKED:
         stopped = go_on(walk_state, stopped.state, steps)
@@ -272,14 +274,14 @@ def legs_sampled_from_section(
 ) -> Floats:
     """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
     start = state_on_section(walker, z, STANCE_FOOT)
-    walk_state = walk_state_on_section(walker, over_footholds(ground, heights), start, heights.size)
+    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, heights.size)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
     walk_on(walker, tolerances, walk_state, observer, start, NO_LIMIT)
     legs = [ANGLES + walker.legs[foot][0] for foot in (STANCE_FOOT, 1 - STANCE_FOOT)]
     return np.asarray(observer.samples.states[:, legs])
 
 
-def over_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround:
+def ground_with_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround:
     over = np.append(heights[0], heights) - heights[0]
     return ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
 
@@ -330,7 +332,7 @@ class WalkerOnGround:
     ground: JudgedGround
 
 
-def on_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
+def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
     return replace(site, ground=site.ground._replace(terrain=terrain))
 
 
@@ -362,7 +364,7 @@ class ContactMap(StepMap):
             site = walker_at(p)
             if site is None or not site.ground.terrain.has_pads:
                 return site
-            return on_terrain(site, after_mid_swing(step_length_m))
+            return replace_terrain(site, after_mid_swing(step_length_m))
 
         self._at = site_at
         self.scale, self.tolerances, self._on_pads = scale, tolerances, like.ground.terrain.has_pads
@@ -396,7 +398,7 @@ class ContactMap(StepMap):
             step = self._walk(site, start, False, swing)
             slip, start = max(slip, abs(step.slip_m)), step.z / self._units
             if self._on_pads and steps == 1:
-                on_pads = on_terrain(site, checkerboard(step.length_m, (0.0, 0.0)))
+                on_pads = replace_terrain(site, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(self._walk(on_pads, z, False).outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 

@@ -18,8 +18,8 @@ from walkerlab.physics.mechanics.rigid_model import (
     STANCE,
     SWING,
     RigidModel,
+    change_slope,
     feet_on_slope,
-    on_slope,
     pair,
     swing_foot_motion,
     with_fields,
@@ -320,12 +320,12 @@ def slope_branches(walker: RigidModel) -> tuple[SlopeBranch, ...]:
     """Return the branches of the small-slope gaits of a walker on level ground. They are cached, since they serve all
     slopes.
     """
-    looking = over_slope(walker, SEARCH_TOLERANCES)
+    looking = map_over_slope(walker, SEARCH_TOLERANCES)
     return tuple(SlopeBranch(looking, seed) for seed in seeds(walker))
 
 
-def over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
-    return RigidMap(partial(on_slope, walker), 1.0, walker, tolerances)
+def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
+    return RigidMap(partial(change_slope, walker), 1.0, walker, tolerances)
 
 
 def with_mean_legs(walker: RigidModel, share: float) -> RigidModel:
@@ -342,10 +342,10 @@ def with_mean_legs(walker: RigidModel, share: float) -> RigidModel:
     return between(0) if share == 0.0 else pair(between(0), between(1))
 
 
-def with_partial_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
+def scale_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
     """Return the walker with a fraction `share` of its drive, on a slope (rad) between `slope` and the walker's."""
     parts = {name: share * walker[name] for name in ("laws", "push_off")}
-    return on_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
+    return change_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
 
 
 @dataclass
@@ -365,12 +365,12 @@ class Search:
         if walker.legs_differ:
             self.followed = MEAN_LEGS_SOURCE
         self.looking = RigidStepper(self.walker, SEARCH_TOLERANCES)
-        self.step_map = over_slope(self.walker, EXACT_STEPS)
+        self.step_map = map_over_slope(self.walker, EXACT_STEPS)
 
     def follow_seeds(self) -> None:
         if self.walker.slope <= 0.0 or not self.walker.passive or self.walker.legs_differ:
             return
-        for branch in slope_branches(on_slope(self.walker, 0.0)):
+        for branch in slope_branches(change_slope(self.walker, 0.0)):
             (slope, z), name = branch.follow(self.walker.slope), branch.seed.name
             if z is None:
                 self.lost.append(f"the gait from the {name} is lost at a slope of {slope:.3g} rad")
@@ -407,10 +407,10 @@ class Search:
         goal = self.walker
         own = (goal.slope,) if goal.slope > 0.0 else ()
         for slope in (*own, *PASSIVE_SLOPES):
-            passive = Search(with_partial_drive(goal, slope, 0.0))
+            passive = Search(scale_drive(goal, slope, 0.0))
             passive.follow_seeds()
             passive.draw(generator, starts)
-            family = RigidMap(partial(with_partial_drive, goal, slope), 1.0, goal)
+            family = RigidMap(partial(scale_drive, goal, slope), 1.0, goal)
             follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=MAX_DRIVE_POINTS)
             name, lost = f"passive gait at {slope:.3g} rad", "is lost at {:.0%} of the way to this slope and drive"
             followed = follower.family([Seed(record.cycle.z, 0.0) for record in passive.records], 1)
@@ -442,7 +442,7 @@ class Search:
 
     def draw_strides(self, starts: Floats) -> None:
         """Solve the map of a stride from starts (starts, d)."""
-        quick = over_slope(self.walker, SEARCH_TOLERANCES)
+        quick = map_over_slope(self.walker, SEARCH_TOLERANCES)
         effort = Effort(NEAR_RESIDUAL, MAX_START_EVALUATIONS, SMALLEST_MOVE)
         for start in starts:
             gait = gait_near(quick, start, float(self.walker.slope), effort, STRIDE)

@@ -24,7 +24,7 @@ from walkerlab.physics.hybrid.comparison import (
 )
 from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
-from walkerlab.physics.orbits.contact_gait import CONTACT_EFFORT, with_scaled_laws
+from walkerlab.physics.orbits.contact_gait import CONTACT_EFFORT, scale_laws
 from walkerlab.physics.orbits.contact_map import OwnPads, contact_step
 from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
@@ -76,7 +76,7 @@ def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
     """Return the walker on the ground of a setting, with a shortened push-off if the series varies all parameters."""
     # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
-    changed, law = with_scaled_laws(walker, *setting[2:]), walker.normal
+    changed, law = scale_laws(walker, *setting[2:]), walker.normal
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
     static = (walker.mass * walker.gravity / law.stiffness) ** (1.0 / law.exponent)

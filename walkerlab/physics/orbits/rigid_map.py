@@ -415,7 +415,7 @@ class RigidMap(StepMap):
         observer = new_observer(times_s / unit.units.time, len(unit.walker.zero_state))
         floor = unit.floor(z, heights_m)
         self._exact.walk(unit.section, z, heights_m.size - 1, False, floor, observer=observer)
-        return by_leg(observer.states[:, [SWING, STANCE]], observer.steps)
+        return reorder_by_leg(observer.states[:, [SWING, STANCE]], observer.steps)
 
     def varied(
         self,
@@ -465,8 +465,8 @@ class RigidMap(StepMap):
             durations * units.time,
             lengths * units.length,
             angles,
-            by_leg(rates, of_step) / units.time,
-            by_leg(samples, of_step),
+            reorder_by_leg(rates, of_step) / units.time,
+            reorder_by_leg(samples, of_step),
         )
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
@@ -525,7 +525,7 @@ def length_of_step(model: Any, before: float, end: Floats) -> float:
     return float(ahead)
 
 
-def by_leg(angles: Floats, steps: Integers) -> Floats:
+def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
     """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
     swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
     return np.where(swaps, angles[..., ::-1], angles)

@@ -19,7 +19,7 @@ from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
 from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
-from walkerlab.physics.hybrid.recorded_walk import take_walk, with_scaled_rates
+from walkerlab.physics.hybrid.recorded_walk import scale_rates, take_walk
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.stepping import RHS
@@ -210,7 +210,7 @@ def rigid_map(walker: RigidModel, state: State, swing: Floats, stance: Floats, s
     """Compute the map of starts of the rigid model. If its ground would have to pull, the outcome is `lifted-off`."""
 
     def cell(factor_1: float, factor_2: float) -> tuple[int, int, bool]:
-        walk = take_walk(walker, RIGID_TOLERANCES, with_scaled_rates(walker, state, factor_1, factor_2), steps)
+        walk = take_walk(walker, RIGID_TOLERANCES, scale_rates(walker, state, factor_1, factor_2), steps)
         return int(walk.outcome), walk.steps, walk.steps == steps
 
     rows = [[cell(swing_factor, stance_factor) for swing_factor in swing.tolist()] for stance_factor in stance.tolist()]

@@ -26,9 +26,9 @@ from walkerlab.physics.mechanics.rigid_model import (
     STRAIGHT,
     RigidModel,
     apply_couplings,
+    change_slope,
     equations,
     kinetic_energy,
-    on_slope,
     swing_foot,
 )
 from walkerlab.physics.solvers.system import Floats, State
@@ -65,7 +65,7 @@ class Modes(NamedTuple):
 
 def linear_modes(walker: RigidModel) -> Modes | None:
     """Return the modes of the swing phase about upright legs, or None if the legs have too little inertia."""
-    legs, n, level = leg_columns(walker), len(walker.arm_x), on_slope(walker, 0.0)
+    legs, n, level = leg_columns(walker), len(walker.arm_x), change_slope(walker, 0.0)
     inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
     equations(level, level.zero_state, s, c, F, U, inertias, r)
     M, K = legs.T @ inertias @ legs, walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
@@ -131,7 +131,7 @@ def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: flo
 def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
     """Return slope / angle^3, where the slope balances the heel strike's loss at this angle between the legs."""
     # In the limit the gait ends a step as it began it, with both legs at the same rates.
-    flat, angle = on_slope(walker, 0.0), LOSS_ANGLE
+    flat, angle = change_slope(walker, 0.0), LOSS_ANGLE
     omega = angle * float(per_angle[2])
     before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
     after = apply_strike(flat, before)
@@ -188,7 +188,7 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
     """Return the linearised conditions on a step on a slope of one radian: matrices (..., 4, 4) for durations t (s)."""
     # The matrices act on (z, 1). Three rows require that z repeats after t, one that both feet are down. A solution
     # exists if the determinant vanishes.
-    flat, n = on_slope(walker, 0.0), len(walker.arm_x)
+    flat, n = change_slope(walker, 0.0), len(walker.arm_x)
     swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
     strike = np.zeros((3, 4))  # the heel strike at vanishing angles, including the exchange of roles
     strike[0, 0] = 1.0

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.kernels import by_reference, kernel_part, vector
+from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.solvers import dop853_tableau as tableau
 from walkerlab.physics.solvers import stepping
 from walkerlab.physics.solvers.fused import fused
@@ -50,7 +50,7 @@ D = rows([tableau.D_4, tableau.D_5, tableau.D_6, tableau.D_7], ALL_STAGES)
 ERROR_WEIGHTS_5, ERROR_WEIGHTS_3 = np.array(tableau.ERROR_5), np.array(tableau.ERROR_3)
 
 
-@by_reference
+@pass_by_reference
 class Dop853(NamedTuple):
     """DOP853 with memory for n equations. See `stepping` for the first six fields."""
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import polynomial
 
-from walkerlab.physics.kernels import by_reference, kernel_part
+from walkerlab.physics.kernels import kernel_part, pass_by_reference
 
 NO_CROSSING = 2.0
 FALLING, RISING = -1, 1
@@ -26,7 +26,7 @@ ROOT_RESOLUTION = 2.0**-52  # resolution of a crossing, as a fraction of its pie
 DEPTH = 64  # maximum number of pieces on the stack
 
 
-@by_reference
+@pass_by_reference
 class CrossingFinder(NamedTuple):
     """Memory and matrices for event functions sampled at `nodes` (fractions of a step)."""
 

@@ -5,7 +5,7 @@ from typing import Any
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from walkerlab.physics.kernels import by_type, kernel_part
+from walkerlab.physics.kernels import dispatch_by_type, kernel_part
 from walkerlab.physics.solvers import dop853_tableau as tableau
 from walkerlab.physics.solvers.dop853_tableau import nonzero
 from walkerlab.physics.solvers.lanes import VECTOR, multiply_add, spread_over
@@ -19,7 +19,7 @@ A_11, A_12, A_13 = nonzero(tableau.A_11), nonzero(tableau.A_12), nonzero(tableau
 LANE_ERROR_5, LANE_ERROR_3 = nonzero(tableau.ERROR_5), nonzero(tableau.ERROR_3)
 
 
-@by_type
+@dispatch_by_type
 def derivative(system: Any, t: float, y: State) -> State:
     """Return dy/dt of `system` at time t (s) and state y, both tuples of numbers or lanes."""
 

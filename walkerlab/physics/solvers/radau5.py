@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.kernels import by_reference, kernel_part
+from walkerlab.physics.kernels import kernel_part, pass_by_reference
 from walkerlab.physics.solvers import stepping
 from walkerlab.physics.solvers.fused import fused
 from walkerlab.physics.solvers.shifted_system import factor_shifted, solve_shifted, unknowns
@@ -57,7 +57,7 @@ MAX_NEWTON = 7
 H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = 0, 1, 2, 3, 4, 5, 6
 
 
-@by_reference
+@pass_by_reference
 class Radau5(NamedTuple):
     """Radau IIA with memory for n equations. See `stepping` for the first six fields."""
 

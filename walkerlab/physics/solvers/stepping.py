@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.physics.kernels import by_type, by_type_or_default, kernel_part
+from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default, kernel_part
 from walkerlab.physics.solvers.system import Integers
 
 # indices into `clock`
@@ -25,32 +25,32 @@ STEP_DONE, OUT_OF_BUDGET, STEP_TOO_SMALL = 0, 1, 2
 SMALLEST_STEP = 1e-15
 
 
-@by_type
+@dispatch_by_type
 def begin(method: Any, system: Any, t: float, y: Any, h: float) -> None:
     """Start, or start again after an event, from state y (n,) at time t (s). For h = 0 the method chooses its step."""
 
 
-@by_type
+@dispatch_by_type
 def advance(method: Any, system: Any, t_end: float) -> int:
     """Take one accepted step, not beyond t_end (s), and keep the previous state in `y_old`. Return a status."""
 
 
-@by_type
+@dispatch_by_type
 def rewind(method: Any, system: Any) -> None:
     """Go back to the start of the last step, to take it again up to an event."""
 
 
-@by_type
+@dispatch_by_type
 def prepare_dense(method: Any, system: Any) -> None:
     """Prepare the dense output of the last step for `interpolate`."""
 
 
-@by_type
+@dispatch_by_type
 def interpolate(method: Any, system: Any, fraction: float, y: Any) -> None:
     """Write the state at `fraction` (0 to 1) of the last step, or as many of its components as y holds, into y."""
 
 
-@by_type_or_default
+@dispatch_by_type_or_default
 def sample(method: Any, system: Any, fractions: Any, states: Any) -> None:
     """Write the states at fractions (m,) of the last step, or their first components, into the rows of `states`."""
     for k in range(len(fractions)):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.physics.kernels import by_type
+from walkerlab.physics.kernels import dispatch_by_type
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -17,16 +17,16 @@ State = tuple[float, ...]
 """Immutable state, outside compiled code."""
 
 
-@by_type
+@dispatch_by_type
 def block(system: Any) -> Any:
     """Return a value whose length, fixed at compile time, is the block size of loops over the state. It divides n."""
 
 
-@by_type
+@dispatch_by_type
 def derivative(system: Any, t: float, y: Any, f: Any) -> None:
     """Write dy/dt of `system` at time t (s) and state y (n,) into f (n,)."""
 
 
-@by_type
+@dispatch_by_type
 def jacobian(system: Any, t: float, y: Any, J: Any) -> None:
     """Write the derivatives of dy/dt with respect to y into J (n, n). Implicit methods need it."""

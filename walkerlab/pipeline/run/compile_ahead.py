@@ -15,7 +15,7 @@ from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.physics import kernel_cache
-from walkerlab.pipeline.run.workers import in_order
+from walkerlab.pipeline.run.workers import map_in_order
 
 HALF_ANGLE = 0.2  # rad, from the slope's normal to each leg at the start of a walk
 BUDGET = 200  # right-hand sides, enough for the first step of each method
@@ -63,7 +63,7 @@ def compile_contact(method: str, config: Config) -> None:
 def compile_plain_systems(config: Config) -> None:
     """Compile what solvers without our events call, with which `stability` compares the contact walk."""
     from walkerlab.physics.ground.on_pads import OnPads
-    from walkerlab.physics.ground.walker import on_ground
+    from walkerlab.physics.ground.walker import place_on_ground
     from walkerlab.physics.solvers.scipy_methods import right_hand_side
     from walkerlab.physics.solvers.semi_implicit_euler import semi_implicit_euler
     from walkerlab.scene.contact import contact_scene
@@ -71,7 +71,7 @@ def compile_plain_systems(config: Config) -> None:
     if config.contact is None:
         return
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
-    system, y = OnPads(on_ground(scene.walker, (True, True)), scene.ground.terrain), np.zeros(scene.walker.size)
+    system, y = OnPads(place_on_ground(scene.walker, (True, True)), scene.ground.terrain), np.zeros(scene.walker.size)
     right_hand_side(system, 0.0, y, np.empty_like(y))
     semi_implicit_euler(system, y, np.empty_like(y), 0.0, 1e-4, 1)
 
@@ -108,7 +108,7 @@ def compile_ahead(configs: Iterable[Config], jobs: int) -> set[str]:
     their files.
     """
     calls = [partial(compile_part, part, config) for config, part in product(configs, PARTS)]
-    return set[str]().union(*in_order(calls, jobs))
+    return set[str]().union(*map_in_order(calls, jobs))
 
 
 def build(folder: str) -> None:

@@ -76,14 +76,14 @@ class Options:
     dry: bool = False  # only report the plan, without changing a file
 
 
-USUAL = Options()
+DEFAULT_OPTIONS = Options()
 
 
 def execute(
     config: Config,
     target: str,
     folder: RunFolder,
-    options: Options = USUAL,
+    options: Options = DEFAULT_OPTIONS,
     reporter: Reporter | None = None,
     graph: Graph = PIPELINE,
 ) -> StageReport:
@@ -122,7 +122,11 @@ def execute(
 
 
 def run_and_write(
-    run: ResolvedRun, target: str, options: Options = USUAL, reporter: Reporter | None = None, graph: Graph = PIPELINE
+    run: ResolvedRun,
+    target: str,
+    options: Options = DEFAULT_OPTIONS,
+    reporter: Reporter | None = None,
+    graph: Graph = PIPELINE,
 ) -> StageReport:
     """Execute a stage of a run. If it found parameters, write a config with them and add its file to the summary.
 

@@ -1,4 +1,4 @@
-"""Worker processes: `in_order` for a list of calls, `WorkerPool` for calls that arrive one by one.
+"""Worker processes: `map_in_order` for a list of calls, `WorkerPool` for calls that arrive one by one.
 
 A worker is a separate interpreter that receives calls and returns their results. It never runs the caller's script, so
 scripts without a guard, code from standard input and notebooks can use workers. Workers end when their parent ends,
@@ -228,7 +228,7 @@ class WorkerPool(SizedExecutor):
         self.shutdown(wait=False, cancel_futures=True)
 
 
-def in_order(
+def map_in_order(
     calls: Sequence[Callable[[], R]], jobs: int, first: Sequence[int] = (), rank: Callable[[int], float] = float
 ) -> Iterator[R]:
     """Iterate over the results of independent calls, in order.

@@ -11,7 +11,7 @@ from walkerlab.physics.energy_channels import SAMPLED
 from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain
 from walkerlab.physics.hybrid.contact_record import ContactSamples
-from walkerlab.physics.hybrid.contact_result import ContactWalkResult, by_channel, sample_energies, sample_feet
+from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel, sample_energies, sample_feet
 from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
@@ -20,11 +20,11 @@ from walkerlab.pipeline.stages.walk import (
     content_of_walk,
     legs,
     numbers_of,
-    over_time,
     pace_of,
     rigid_start,
     steps_of,
     turning,
+    variables_over_time,
 )
 from walkerlab.pipeline.store.columns import numbered
 from walkerlab.pipeline.store.content import Content, Group, Variable
@@ -98,7 +98,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
         "rolling_per_step_m": mean_of(walk.rolling_m),
         "rolling_m": walk.rolling_m.tolist(),
         "energy_balance_residual_J": walk.energy_balance_residual_J,
-        "dissipated_J": by_channel(scene.walker, walk.dissipated_J),
+        "dissipated_J": losses_by_channel(scene.walker, walk.dissipated_J),
         # old key of the knee strike times, kept until version 0.3; -1 where a knee did not lock
         **(
             {} if strikes is None or not strikes.size else {"knee_strikes_s": np.nan_to_num(strikes, nan=-1.0).tolist()}
@@ -145,18 +145,18 @@ def trajectory_group(
     config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult, samples: ContactSamples
 ) -> Group:
     """Build the group of the sampled quantities that the config's `outputs` select."""
-    variables = {**over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
+    variables = {**variables_over_time(time=samples.time_s, stance_leg=samples.stance + 1), **legs()}
     feet = sample_feet(scene.walker, samples)
     if "states" in config.outputs:
         variables |= state_variables(scene, samples.states)
-        variables |= over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
+        variables |= variables_over_time(foot_along_m=feet[:, :, 0], foot_height_m=feet[:, :, 1] + samples.level)
     if "energies" in config.outputs:
         footholds = np.append(feet[:1, STANCE_FOOT, 0], walk.touch_along_m)
         step = np.searchsorted(walk.touch_time_s, samples.time_s, side="right")
         variables |= energy_variables(scene, samples, footholds[step], walk.ground_m[step])
     if "forces" in config.outputs:
         depth = np.where(samples.has_ground > 0, np.maximum(0.0, -feet[:, :, 1]), 0.0)
-        variables |= over_time(
+        variables |= variables_over_time(
             normal_force_N=feet[:, :, 2],
             friction_force_N=feet[:, :, 3],
             penetration_m=depth,
@@ -176,7 +176,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     along = y[:, 0] + c @ layout.hip_x[:n] - s @ layout.hip_y[:n]
     height = y[:, 1] + s @ layout.hip_x[:n] + c @ layout.hip_y[:n]
     of_legs = {"angle": angle[:, upper], "velocity": velocity[:, upper]}
-    variables = over_time(**of_legs, hip_along_m=along, hip_height_m=height)
+    variables = variables_over_time(**of_legs, hip_along_m=along, hip_height_m=height)
     if walker.kneed:
         shanks, thighs = layout.knees.T.tolist()
         variables |= turning("shank", angle[:, shanks], velocity[:, shanks])
@@ -187,7 +187,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
             ahead, up = knee[0] - hip[0], knee[1] - hip[1]
             knees[0, :, leg] = along + c[:, thigh] * ahead - s[:, thigh] * up
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
-        variables |= over_time(knee_along_m=knees[0], knee_height_m=knees[1])
+        variables |= variables_over_time(knee_along_m=knees[0], knee_height_m=knees[1])
     if TORSO in names:
         variables |= turning(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
     return variables
@@ -202,7 +202,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
     driven = samples.driven_J.T
     lost, walker = samples.dissipated_J, scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
-    return over_time(
+    return variables_over_time(
         kinetic_J=kinetic,
         potential_J=potential - at_foothold,
         mechanical_J=total - at_foothold,

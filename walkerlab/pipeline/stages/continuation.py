@@ -25,7 +25,7 @@ from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.orbits.two_parameters import Plane
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.family_groups import groups
-from walkerlab.pipeline.stages.numerical_error import SAMPLE, USUAL, evenly_spread, tightened
+from walkerlab.pipeline.stages.numerical_error import DEFAULT_TIGHTENING, SAMPLE, evenly_spread, tightened
 from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.families import contact_map, model_differs, rigid_map, steps_of_stride, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
@@ -317,7 +317,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
     ]
     counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
     largest = dict(zip(OF_A_GAIT, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
-    return {**counts, **largest, **({} if by == USUAL else {"by": by})}
+    return {**counts, **largest, **({} if by == DEFAULT_TIGHTENING else {"by": by})}
 
 
 def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> Iterator[dict[str, Any]]:

@@ -24,7 +24,7 @@ from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, doubts_about, read_divisions, read_measured
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
-from walkerlab.pipeline.stages.walk import legs, over_time
+from walkerlab.pipeline.stages.walk import legs, variables_over_time
 from walkerlab.pipeline.store.columns import numbered, rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.identification import identify_walk
@@ -274,7 +274,7 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
         bodies = np.zeros((rows.size, len(walker.arm_x)))
         bodies[:, :2] = reorder_by_leg(angle, stance)
         straight = np.array([apply_couplings(walker, STRAIGHT, row) for row in bodies])
-        variables = {**over_time(time=time, step=step, stance_leg=stance + 1, angle=angle), **legs()}
+        variables = {**variables_over_time(time=time, step=step, stance_leg=stance + 1, angle=angle), **legs()}
         variables |= place_variables(places(walker, (), footholds, straight, step), stance)
         groups[f"{name}_motion"] = Group(variables, about)
     return groups

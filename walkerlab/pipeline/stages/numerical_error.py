@@ -15,7 +15,7 @@ LEAST_RTOL: Final = 1e-14  # minimum that the schema allows
 TIGHTER: Final = {100.0: "a hundred times tighter tolerances", 10.0: "ten times tighter tolerances"}
 MORE_WORK: Final = 10  # factor on the evaluation budget at tighter tolerances
 SAMPLE: Final = 16  # maximum number of walks to repeat
-USUAL: Final = TIGHTER[100.0]
+DEFAULT_TIGHTENING: Final = TIGHTER[100.0]
 ROUNDING: Final = 1e-6  # relative rounding error allowed in a divided tolerance
 
 Summary = Mapping[str, Any]
@@ -49,7 +49,7 @@ def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
     return replace(tolerances, method=method), f"another method, {method}"
 
 
-def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
+def change(first: Summary, again: Summary, by: str = DEFAULT_TIGHTENING) -> dict[str, Any]:
     """Return the largest changes between two summaries of a walk, in the form that `numerical_error` returns."""
     if (first["outcome"], first["steps"]) != (again["outcome"], again["steps"]):
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
@@ -66,7 +66,7 @@ def change(first: Summary, again: Summary, by: str = USUAL) -> dict[str, Any]:
     if any(work for giver, work in first.get("work_per_step_J", {}).items() if giver != "gravity"):
         changes["cost_of_transport"] = abs(first["cost_of_transport"] - again["cost_of_transport"])
     changes |= {"of_steps": of_steps} if of_steps else {}
-    return changes if by == USUAL else {**changes, "by": by}
+    return changes if by == DEFAULT_TIGHTENING else {**changes, "by": by}
 
 
 def steps_later(first: Summary, again: Summary) -> int | None:

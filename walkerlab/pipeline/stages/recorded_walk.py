@@ -20,7 +20,7 @@ from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps, f
 from walkerlab.outcome import Outcome
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import OVER_TIME, legs, over_time, step_columns
+from walkerlab.pipeline.stages.walk import OVER_TIME, legs, step_columns, variables_over_time
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
@@ -158,7 +158,9 @@ def content_of(
         "columns": walk.sources,
         "doubts": [*doubts],
     }
-    return Content({"steps": Group(columns), "trajectory": Group({**over_time(**samples), **legs()})}, summary)
+    return Content(
+        {"steps": Group(columns), "trajectory": Group({**variables_over_time(**samples), **legs()})}, summary
+    )
 
 
 def recorded_besides(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:

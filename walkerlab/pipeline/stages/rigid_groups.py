@@ -7,7 +7,7 @@ import numpy as np
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
 from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, by_turns, energy_at_touch
-from walkerlab.pipeline.stages.walk import COORDINATE, legs, over_time, steps_of, turning
+from walkerlab.pipeline.stages.walk import COORDINATE, legs, steps_of, turning, variables_over_time
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.rigid import RigidScene
 
@@ -35,7 +35,7 @@ def rolled(walker: RigidModel, turned: Any) -> Any:
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
     """Build the group of the sampled quantities that `outputs` select, with both sides of each heel strike."""
     stance = stance_leg(samples)
-    variables = {**over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
+    variables = {**variables_over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
     if "states" in scene.outputs:
         variables |= leg_variables(samples)
         variables |= body_variables(scene, samples, stance)
@@ -46,13 +46,13 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
         kinetic, potential = by_turns(scene.walker, samples.step, energies, samples.state).T
         touched = np.append(walk.start[STANCE], walk.after[:, STANCE])
         potential -= by_turns(scene.walker, np.arange(touched.size), energy_at_touch, touched)[samples.step]
-        variables |= over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
+        variables |= variables_over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
     if "forces" in scene.outputs:
         friction, normal = (
             reorder_by_leg(np.column_stack((np.zeros_like(force), force)), stance)
             for force in by_turns(scene.walker, samples.step, reactions, samples.state, samples.bent).T
         )
-        variables |= over_time(normal_force_N=normal, friction_force_N=friction)
+        variables |= variables_over_time(normal_force_N=normal, friction_force_N=friction)
     return Group(variables)
 
 
@@ -65,7 +65,7 @@ def leg_variables(samples: Samples) -> dict[str, Variable]:
     """Return angles and velocities by leg. The legs change roles at each heel strike."""
     n, stance = samples.state.shape[1] // 2, stance_leg(samples)
     angle, velocity = samples.state[:, :2], samples.state[:, n : n + 2]
-    return over_time(angle=reorder_by_leg(angle, stance), velocity=reorder_by_leg(velocity, stance))
+    return variables_over_time(angle=reorder_by_leg(angle, stance), velocity=reorder_by_leg(velocity, stance))
 
 
 def reorder_by_leg(by_role: Any, stance: Any) -> Any:
@@ -91,8 +91,8 @@ def place_variables(positions: Places, stance: Any) -> dict[str, Variable]:
     points = {"foot": np.stack((positions.swing_foot, positions.contact), axis=1)} | (
         {} if positions.knees is None else {"knee": positions.knees}
     )
-    variables = over_time(hip_along_m=positions.hip[:, 0], hip_height_m=positions.hip[:, 1])
+    variables = variables_over_time(hip_along_m=positions.hip[:, 0], hip_height_m=positions.hip[:, 1])
     for name, point in points.items():
         along, height = (reorder_by_leg(point[:, :, axis], stance) for axis in range(2))
-        variables |= over_time(**{f"{name}_along_m": along, f"{name}_height_m": height})
+        variables |= variables_over_time(**{f"{name}_along_m": along, f"{name}_height_m": height})
     return variables

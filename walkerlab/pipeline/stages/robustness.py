@@ -33,7 +33,7 @@ from walkerlab.physics.orbits.robustness import (
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.work import WorkUnit, complete
-from walkerlab.pipeline.run.workers import in_order
+from walkerlab.pipeline.run.workers import map_in_order
 from walkerlab.pipeline.stages.rigid_groups import groups as groups_of_walk
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
@@ -284,7 +284,7 @@ def sensitivities(
     """Return rows of derivatives in order of decreasing relative effect. Parameters of value 0 come last."""
     keys = numbers_read(subject, requested)
     label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
-    results = in_order([partial(gradients_of, subject, key) for key in keys], jobs)
+    results = map_in_order([partial(gradients_of, subject, key) for key in keys], jobs)
     for key, gradients in track(progress, label, len(keys), zip(keys, results, strict=True)):
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)

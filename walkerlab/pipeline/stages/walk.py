@@ -163,7 +163,7 @@ def only_at(samples: Any, mask: NDArray[Any]) -> Any:
     return type(samples)(*(each[mask] for each in samples))
 
 
-def over_time(**values: ArrayLike) -> dict[str, Variable]:
+def variables_over_time(**values: ArrayLike) -> dict[str, Variable]:
     """Build variables over time from values (samples,), or (samples, 2) by leg. Their names are keys of `OVER_TIME`."""
     return {name: labelled(column, OVER_TIME[name], *(TIME, LEG)[: np.ndim(column)]) for name, column in values.items()}
 

@@ -9,7 +9,7 @@ from walkerlab.extensions import registry
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.views.cli.command import Offer
 from walkerlab.views.cli.failures import exit_on_failure, print_result
-from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request
+from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Request
 
 STAGES = ", ".join(PIPELINE.names)
 
@@ -93,9 +93,9 @@ def clean(
 
 
 COMMANDS = (
-    Offer(status, (*OF_A_RUN, *OF_TALK)),
-    Offer(show, (*OF_A_RUN, *OF_TALK)),
+    Offer(status, (*OF_A_RUN, *OUTPUT_FIELDS)),
+    Offer(show, (*OF_A_RUN, *OUTPUT_FIELDS)),
     Offer(schema, ("as_json",)),
     Offer(list_extensions, ("as_json",), name="extensions"),
-    Offer(clean, (*OF_A_RUN, "dry_run", "no_wait", *OF_TALK)),
+    Offer(clean, (*OF_A_RUN, "dry_run", "no_wait", *OUTPUT_FIELDS)),
 )

@@ -10,7 +10,7 @@ import typer
 from walkerlab.errors import StoppedError
 from walkerlab.pipeline.run.interrupts import raise_on
 from walkerlab.views.cli.command import Offer
-from walkerlab.views.cli.request import OF_TALK, Request
+from walkerlab.views.cli.request import OUTPUT_FIELDS, Request
 from walkerlab.views.figures.style import EXPORT_DPI
 
 RunArgument = Annotated[
@@ -208,7 +208,7 @@ COMMANDS = (
     Offer(init, ("quiet",)),
     Offer(compile_kernels, ("config", "sets", "runs", "jobs", "quiet", "verbose"), name="compile"),
     Offer(open_run, ("runs", "quiet", "verbose"), name="open"),
-    Offer(rerun, (*OF_TALK,)),
+    Offer(rerun, (*OUTPUT_FIELDS,)),
     Offer(export, ("sets", "runs")),
     Offer(draw, ()),
     Offer(explore, ("config", "sets", "runs")),

@@ -19,7 +19,7 @@ from walkerlab.pipeline.run.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
 from walkerlab.views.cli import runs as whole_runs
 from walkerlab.views.cli.command import Offer, add_command
-from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request
+from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Request
 
 
 def main() -> None:
@@ -33,14 +33,16 @@ def main() -> None:
     atexit.register(gc.freeze)
     as_python_has_it = warnings.formatwarning
 
-    def worded(message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None) -> str:
+    def format_warning(
+        message: Any, category: type[Warning], filename: str, lineno: int, line: str | None = None
+    ) -> str:
         # Imported here: help must not load the compiler; when a cache warning appears, the compiler is loaded already.
         from walkerlab.physics.kernel_cache import CacheWarning
 
         own = category is CacheWarning
         return f"warning: {message}\n" if own else as_python_has_it(message, category, filename, lineno, line)
 
-    warnings.formatwarning = worded
+    warnings.formatwarning = format_warning
     tolerate_output_errors()
     program()()
 
@@ -134,7 +136,7 @@ def print_version(verbose: bool) -> None:
 
 def add_stage(app: typer.Typer, stage: Stage, graph: Graph) -> None:
     """Add the command of a stage to a program, with the options that apply to it."""
-    shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OF_TALK]
+    shared = [*OF_A_RUN, "jobs", "force", "dry_run", "no_wait", *OUTPUT_FIELDS]
     if STRIDES not in stage.options:
         shared.remove("strides")
     shared += ["open_page"] if stage is graph.stages[-1] else []

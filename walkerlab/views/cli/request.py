@@ -180,5 +180,5 @@ class Request:
 
 OF_A_RUN = ("config", "sets", "strides", "name", "runs")
 """Options that select the run."""
-OF_TALK = ("as_json", "quiet", "verbose")
+OUTPUT_FIELDS = ("as_json", "quiet", "verbose")
 """Options for the form and amount of output."""

@@ -12,7 +12,7 @@ from walkerlab.pipeline.store.runfolder import RunFolder
 from walkerlab.views.cli.failures import print_result
 from walkerlab.views.cli.request import Request
 
-SHORT = 12
+DIGEST_CHARACTERS = 12
 
 
 def rerun_artifact(path: Path, request: Request) -> None:
@@ -44,12 +44,12 @@ def rerun_artifact(path: Path, request: Request) -> None:
         "same_code": same_code,
     }
     if before == after:
-        print_result(request, value, [f"{path} is reproduced bit for bit: content {before[:SHORT]}."])
+        print_result(request, value, [f"{path} is reproduced bit for bit: content {before[:DIGEST_CHARACTERS]}."])
         return
     why = "the code is the same" if same_code else "the code has changed since"
     another = StaleError(
-        f"{path} is not reproduced: its content digest was {before[:SHORT]} "
-        f"and is now {(after or 'missing')[:SHORT]}; {why}.",
+        f"{path} is not reproduced: its content digest was {before[:DIGEST_CHARACTERS]} "
+        f"and is now {(after or 'missing')[:DIGEST_CHARACTERS]}; {why}.",
         "Results agree bit for bit only on the same platform with the same versions; `walkerlab show` lists both.",
     )
     print_result(request, value, [], another)

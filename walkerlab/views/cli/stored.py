@@ -18,7 +18,7 @@ from walkerlab.views.cli.request import Request
 from walkerlab.views.report.tables import aligned
 from walkerlab.views.report.text import describe_summary
 
-SHORT = 12
+DIGEST_CHARACTERS = 12
 """Number of a digest's characters shown in text output."""
 NOT_CURRENT = ("stale", "missing", "damaged")
 
@@ -37,7 +37,7 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
     is_selected = run is not None or request.config is not None or request.settings or request.strides is not None
     listed = None if is_selected else list(runs_in(request.runs, request.graph))
     steps = survey(config, folder, request.graph)
-    error = failing(steps, request.graph.stages[-1].name)
+    error = check_error(steps, request.graph.stages[-1].name)
     rows = [
         {
             "stage": step.stage.name,
@@ -57,7 +57,9 @@ def print_status(request: Request, check: bool, run: str | None) -> None:
         "stages": rows,
     }
     names = [step.stage.name for step in steps]
-    table = aligned([["stage", "state", "why"], *map(list, zip(names, map(state_of, steps), whys(steps), strict=True))])
+    table = aligned(
+        [["stage", "state", "why"], *map(list, zip(names, map(state_of, steps), explain_states(steps), strict=True))]
+    )
     changed = [f"changed: {', '.join(folder.changes)}"] if folder.changes else []
     running = [f"running in {path}: {worker}" for path, worker in working.items()]
     lines = [*running, f"{folder.path}:", *changed, *table]
@@ -93,7 +95,7 @@ def why(step: Step) -> str:
     return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
 
-def whys(steps: Sequence[Step]) -> Iterator[str]:
+def explain_states(steps: Sequence[Step]) -> Iterator[str]:
     """Explain each stage's state. A repeated reason refers to the first stage that has it."""
     first: dict[str, str] = {}
     for step in steps:
@@ -103,7 +105,7 @@ def whys(steps: Sequence[Step]) -> Iterator[str]:
             first.setdefault(reason, step.stage.name)
 
 
-def failing(steps: tuple[Step, ...], last: str) -> StaleError | None:
+def check_error(steps: tuple[Step, ...], last: str) -> StaleError | None:
     """Return the error for `--check`, or None if every result is current."""
     counts = Counter(state for step in steps if (state := state_of(step)) in NOT_CURRENT)
     if not counts:
@@ -164,8 +166,8 @@ def lines(stored: Stored) -> list[str]:
     where = stored.provenance
     versions = {"walkerlab": where.package_version, **where.library_versions}
     facts = {
-        "key": stored.identity.key[:SHORT],
-        "content": stored.digest()[:SHORT],
+        "key": stored.identity.key[:DIGEST_CHARACTERS],
+        "content": stored.digest()[:DIGEST_CHARACTERS],
         "made": f"{where.started_utc} to {where.ended_utc}",
         "command": where.command_line,
         "commit": where.git_commit,

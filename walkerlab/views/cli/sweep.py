@@ -12,7 +12,7 @@ import typer
 
 from walkerlab.views.cli.command import Offer
 from walkerlab.views.cli.failures import print_result
-from walkerlab.views.cli.request import OF_A_RUN, OF_TALK, Request, option
+from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Request, option
 from walkerlab.views.report.text import paragraph
 
 if TYPE_CHECKING:
@@ -195,5 +195,5 @@ def result_lines(swept: "Swept", page: Path) -> list[str]:
 
 
 COMMANDS = (
-    Offer(sweep, (*SWEEP_FIELDS, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OF_TALK), asks=SweepRequest),
+    Offer(sweep, (*SWEEP_FIELDS, *OF_A_RUN, "force", "dry_run", "no_wait", "every", *OUTPUT_FIELDS), asks=SweepRequest),
 )

@@ -21,7 +21,7 @@ from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
 from walkerlab.physics.ground.terrain import STANCE_FOOT
-from walkerlab.physics.ground.walker import changed_forms, on_ground, to_form, to_full
+from walkerlab.physics.ground.walker import changed_forms, place_on_ground, to_form, to_full
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.hybrid.contact_state import knees_at_start
 from walkerlab.physics.solvers.registry import Tolerances
@@ -276,7 +276,7 @@ def swing_truth(scene: EngineScene, start: Floats, until_s: float = SWING_S) -> 
 
     knee = knees_at_start(scene.ours, STANCE_FOOT, scene.start)
     passive = changed_forms(scene.ours, push_off=0.0, laws=0.0)
-    system = on_ground(passive, (False, False), knee, pinned=True)
+    system = place_on_ground(passive, (False, False), knee, pinned=True)
     free_form = passive.forms[1, 0]
 
     def rate(t: float, y: Floats) -> Any:

@@ -16,7 +16,7 @@ from walkerlab.physics.ground.external import feet_and_forces
 from walkerlab.physics.ground.knees import FLEXED, lock_knee
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
-from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, on_ground
+from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, place_on_ground
 from walkerlab.physics.hybrid import contact_events, contact_state, contact_transitions
 from walkerlab.physics.hybrid.contact_loop import LONGEST_FLIGHT, LONGEST_STEP
 from walkerlab.physics.hybrid.contact_state import new_walk_state
@@ -69,7 +69,7 @@ class RuleFollower:
         """Bind the compiled function to a scene's model and its constant arguments, and evaluate it once."""
         size, state = scene.model.size, self.walk_state
         # the system shares the walk state's progress array, which is therefore current at every call
-        system = on_ground(scene.walker, self._ground, progress=state.progress)
+        system = place_on_ground(scene.walker, self._ground, progress=state.progress)
         self.scene, self._fixed = scene, (system, scene.model.chain)
         self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)
         self._call = entry_point(
