@@ -33,7 +33,8 @@ def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
 
 def without_key(options: str, key: str) -> str:
     """Return options, each preceded by a space, without settings of a key. The slope has two keys."""
-    words, same = shlex.split(options), SLOPES if key in SLOPES else (key,)
+    words = shlex.split(options)
+    same = SLOPES if key in SLOPES else (key,)
     settings = [place for place, word in enumerate(words[:-1]) if word == "--set"]
     dropped = [place for place in settings if words[place + 1].partition("=")[0].strip() in same]
     kept = (word for place, word in enumerate(words) if not {place, place - 1} & {*dropped})

@@ -209,7 +209,8 @@ def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> 
 @cache
 def versions() -> str:
     """Describe the usable extensions of other packages: names, versions and code digests, or return '' without any."""
-    sources, described = Sources(), []
+    sources = Sources()
+    described = []
     for found in foreign():
         if found.extension is not None:
             modules = {code.partition(":")[0] for code in (found.code, *found.extension.code())}
@@ -233,7 +234,8 @@ def announced() -> Iterator[tuple[str, str, str]]:
     # `os.path`, which raises no error where a user has no home
     cache = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or "~/.cache")  # noqa: PTH111
     cache_file = Path(cache) / "walkerlab-extensions.json"
-    stored, changed = read_scans(cache_file), False
+    stored = read_scans(cache_file)
+    changed = False
     seen: set[tuple[str, str]] = set()
     for folder in dict.fromkeys(map(os.path.abspath, sys.path)):
         if not os.path.isdir(folder):  # noqa: PTH112

@@ -112,6 +112,7 @@ def _export_texts(config: Config, kind: "Kind", law: str, slope: str, stem: str 
         if gait.no_answer is not None:
             raise NoAnswer(gait.no_answer)
         inputs["fixedpoint"] = gait.content
-    adams_law, tilted = export.law_named(law), export.slope_named(slope)
+    adams_law = export.law_named(law)
+    tilted = export.slope_named(slope)
     start = rigid_start(config, inputs)
     return export.export_model(config, *start, kind, adams_law, git_commit(), stem, tilted).files

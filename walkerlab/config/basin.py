@@ -61,7 +61,8 @@ class Basin(Block):
     @field_validator("cells", "lower", "upper")
     @classmethod
     def _one_for_each_coordinate(cls, value: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        plane, usual = info.data.get("plane"), not value and info.field_name != "cells"
+        plane = info.data.get("plane")
+        usual = not value and info.field_name != "cells"
         if plane is not None and not usual and len(value) != len(plane):
             raise meaning_error(f"must have {len(plane)} numbers, one for each coordinate in plane")
         return value

@@ -66,7 +66,8 @@ def parse_printed(text: str) -> PrintedValue | None:
         sign = "-" if match[1] == "-" else ""
         return PrintedValue(text, Digits(0.0, digits_of(match[2]).unit, 1), digits_of(sign + match[2]))
     if match := re.fullmatch(rf"({_SIGNED})±({_NUMBER})", compact):
-        value, error = digits_of(match[1]), float(match[2])
+        value = digits_of(match[1])
+        error = float(match[2])
         return PrintedValue(text, value, bounds=(value.value - error, value.value + error))
     between = rf"(?:between|from)?({_SIGNED})(?:to|and|\.\.)({_SIGNED})"
     if match := re.fullmatch(between, compact) or re.fullmatch(rf"\[({_SIGNED}),({_SIGNED})\]", compact):

@@ -43,7 +43,8 @@ class PushOff(Block):
 
 def drives_of(config: Any) -> tuple[str, ...]:
     """Describe the drives that supply energy to a config's walker."""
-    push, torque = config.push_off.impulse_N_s, config.walker.hip.torque_N_m
+    push = config.push_off.impulse_N_s
+    torque = config.walker.hip.torque_N_m
     return nonzero_words(
         {f"a push-off of {short_number(push)} N s": push, f"a hip torque of {short_number(torque)} N m": torque}
     )
@@ -51,7 +52,8 @@ def drives_of(config: Any) -> tuple[str, ...]:
 
 def springs_of(config: Any) -> tuple[str, ...]:
     """Describe the spring and damper between a walker's legs, which supply no energy."""
-    stiffness, damping = config.walker.hip.spring_N_m_per_rad, config.walker.hip.damping_N_m_s_per_rad
+    stiffness = config.walker.hip.spring_N_m_per_rad
+    damping = config.walker.hip.damping_N_m_s_per_rad
     return nonzero_words({
         f"a hip spring of {short_number(stiffness)} N m/rad": stiffness,
         f"a hip damper of {short_number(damping)} N m s/rad": damping,

@@ -105,7 +105,8 @@ def leaves(
     held  instance of `block` that selects the kind of each inner block; by default the first kind
     """
     for name, field in block.model_fields.items():
-        inner, own = block_of(field), getattr(held, name, None)
+        inner = block_of(field)
+        own = getattr(held, name, None)
         if inner is None:
             yield (*prefix, name), field
         else:
@@ -162,7 +163,8 @@ def words_of(annotation: Any) -> tuple[str, ...]:
 
 def bounds_of(field: FieldInfo) -> str:
     """Describe a key's bounds without unit, e.g. `from 0.001 to 1000`, or return '' if it has none."""
-    description, what = annotation_of(field, "bounds"), type_words(field.annotation)
+    description = annotation_of(field, "bounds")
+    what = type_words(field.annotation)
     if description:
         return description
     if what in ("word", _KINDS[bool]):
@@ -178,7 +180,9 @@ def describe_allowed(field: FieldInfo) -> str:
     if block_of(field) is not None:
         optional = type(None) in get_args(field.annotation)
         return "a block of keys, or null to leave it out" if optional else "a block of keys"
-    bounds, unit, what = bounds_of(field), annotation_of(field, "unit"), type_words(field.annotation)
+    bounds = bounds_of(field)
+    unit = annotation_of(field, "unit")
+    what = type_words(field.annotation)
     if what == "word":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():

@@ -144,14 +144,16 @@ def replace_cases_file(layer: BlockNode, folder: Path) -> BlockNode:
 
     Raises ConfigError if the file cannot be read or holds no list.
     """
-    located, block = cases_file(layer, folder), layer.entries.get("stability")
+    located = cases_file(layer, folder)
+    block = layer.entries.get("stability")
     if located is None or not isinstance(block, BlockNode):
         return layer
     file, position = located
     cases = read(_text_of(file, position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, ListNode):
         raise problem_error(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
-    result, inner = layer.without(), block.without()
+    result = layer.without()
+    inner = block.without()
     inner.put("cases", cases, block.keys["cases"])
     result.put("stability", inner, layer.keys["stability"])
     return result

@@ -104,7 +104,8 @@ def _place_setting(block: BlockNode, setting: ConfigSetting, depth: int, copies:
     if inner is None or (isinstance(inner, Scalar) and inner.value is None):
         inner = BlockNode(setting.position)
     if not isinstance(inner, BlockNode):
-        above, full_key = ".".join(setting.path[: depth + 1]), ".".join(setting.path)
+        above = ".".join(setting.path[: depth + 1])
+        full_key = ".".join(setting.path)
         raise problem_error(
             setting.position, f"{printable(full_key)}: {printable(above)} is a value, not a block of keys"
         )

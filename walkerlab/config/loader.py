@@ -124,11 +124,14 @@ def safe_name(text: str) -> str:
 
 def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
     """Yield warnings about likely mistakes: leg mass not moved with the leg, wrong units, pad pitch without pads."""
-    walker, block = config.walker, tree.entries.get("walker")
+    walker = config.walker
+    block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}
     length = short_number(walker.leg_length_m)
     if isinstance(walker, CompassWalker) and {"leg_length_m", "foot_to_mass_m"} <= places.keys():
-        leg, mass, stays = places["leg_length_m"], places["foot_to_mass_m"].source, walker.foot_to_mass_m
+        leg = places["leg_length_m"]
+        mass = places["foot_to_mass_m"].source
+        stays = walker.foot_to_mass_m
         moved = leg.source.startswith("built-in") or mass.startswith("--")  # the user changed the mass, not the leg
         if leg.source != mass and not moved and stays != walker.leg_length_m / 2:
             yield (
@@ -148,7 +151,8 @@ def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
         text = f"contact.pad_pitch has no effect on {contact.terrain}, which has no pads"
         yield str(Problem(key_at(tree, ("contact", "pad_pitch")), f"{text}; only checkerboard has pads"))
     for path, value in numbers_in(("walker",), walker.model_dump(mode="json")):
-        key, text = str(path[-1]), f"{'.'.join(map(str, path))} is {short_number(value)}"
+        key = str(path[-1])
+        text = f"{'.'.join(map(str, path))} is {short_number(value)}"
         if key.endswith("length_m") and value > LONG_M:
             yield str(Problem(key_at(tree, path), f"{text} m; lengths are in m, not in mm"))
         if key.endswith("mass_kg") and value > HEAVY_KG_M3 * walker.leg_length_m**3:

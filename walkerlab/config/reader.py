@@ -81,11 +81,14 @@ class _Composer:
     """Builder of a tree of limited depth from parser events."""
 
     def __init__(self, source: str, column: int, events: Iterator[Any]) -> None:
-        self._source, self._column, self._events = source, column, events
+        self._source = source
+        self._column = column
+        self._events = events
         self._twice: list[Problem] = []
 
     def document(self) -> Node | None:
-        root, documents = None, 0
+        root = None
+        documents = 0
         for event in self._events:
             name = type(event).__name__
             if name == "DocumentStartEvent":
@@ -101,7 +104,8 @@ class _Composer:
         return root
 
     def _node(self, event: Any, depth: int) -> Node:
-        name, position = type(event).__name__, _position(event.start_mark, self._source, self._column)
+        name = type(event).__name__
+        position = _position(event.start_mark, self._source, self._column)
         if name == "AliasEvent":
             self._refuse(
                 event, f"alias *{printable(event.anchor)}: aliases are not supported; repeat the value, or use extends"
@@ -120,7 +124,8 @@ class _Composer:
         for word in self._read_until("MappingEndEvent"):
             if type(word).__name__ in ("MappingStartEvent", "SequenceStartEvent"):
                 self._refuse(word, "a key must be a word, not a list or a block")
-            key, value = self._node(word, depth + 1), self._node(next(self._events), depth + 1)
+            key = self._node(word, depth + 1)
+            value = self._node(next(self._events), depth + 1)
             assert isinstance(key, Scalar), "keys that are lists or blocks are refused"
             if key.text in block.keys:
                 first = block.keys[key.text]

@@ -108,7 +108,9 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
     if isinstance(config.start, str):
         return config, ()
     stated: Sequence[float | None] = config.start.state if isinstance(config.start, MidStep) else config.start
-    where, start, moved = tree.entries["start"].position, list(stated), list[str]()
+    where = tree.entries["start"].position
+    start = list(stated)
+    moved = list[str]()
     following = following_values(config, stated)
     for place, value in enumerate(stated):
         if value is None and place not in following:
@@ -140,8 +142,10 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     for walkers of parts. Coupled bodies, such as a torso on the legs' bisector, always have the angles and rates of
     their coupling.
     """
-    walker, bodies = config.walker, len(stated) // 2
-    values, following = [0.0 if value is None else value for value in stated], dict[int, FollowingValue]()
+    walker = config.walker
+    bodies = len(stated) // 2
+    values = [0.0 if value is None else value for value in stated]
+    following = dict[int, FollowingValue]()
     if not isinstance(config.start, MidStep) and not isinstance(walker, PartsWalker):
         because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
         values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
@@ -204,7 +208,8 @@ def _problems(error: ValidationError, tree: BlockNode, model: type[Block]) -> li
 
 
 def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Problem:
-    location, what = detail["loc"], detail["type"]
+    location = detail["loc"]
+    what = detail["type"]
     kinds = kinds_of(model.model_fields[str(location[0])]) if location[0] in model.model_fields else {}
     if what == "union_tag_invalid":
         node, position = node_at(tree, (*location, "type"))
@@ -274,7 +279,8 @@ def _locate_key(
 
 def _unknown_key(location: Location, tree: BlockNode) -> Problem:
     above, field, inner = _locate_key(Config, location[:-1], tree)
-    name, block = str(location[-1]), inner or Config
+    name = str(location[-1])
+    block = inner or Config
     kinds = {} if field is None else kinds_of(field)
     parent, _ = node_at(tree, location[:-1])
     assert isinstance(parent, BlockNode), "the parent holds the key"
@@ -338,7 +344,8 @@ def node_at(tree: BlockNode, location: Location) -> tuple[Node | None, Position]
         if isinstance(node, BlockNode) and isinstance(part, str):
             if part not in node.entries:
                 return None, position
-            position, node = node.keys[part], node.entries[part]
+            position = node.keys[part]
+            node = node.entries[part]
         elif isinstance(node, ListNode) and isinstance(part, int) and part < len(node.items):
             node = node.items[part]
             position = node.position

@@ -602,7 +602,8 @@ def leg_inertia(walker: Any) -> float:
         squared = walker.leg_mass_below_hip_m**2 + walker.leg_mass_ahead_m**2
         return float(walker.leg_mass_kg * squared + walker.leg_inertia_kg_m2)
     if walker.type == "kneed":
-        upper, lower = walker.thigh, walker.shank
+        upper = walker.thigh
+        lower = walker.shank
         squared = (upper.length_m + lower.mass_below_knee_m) ** 2 + lower.mass_ahead_m**2
         thigh = upper.mass_kg * (upper.mass_below_hip_m**2 + upper.mass_ahead_m**2) + upper.inertia_kg_m2
         return float(thigh + lower.mass_kg * squared + lower.inertia_kg_m2)
@@ -623,9 +624,11 @@ def why_no_push_on(walker: Any) -> str:
         free = walker.knee.at_heel_strike == "free"
         return "cannot act: it needs a locked trailing knee, but walker.knee.at_heel_strike is free" if free else ""
     if isinstance(walker, CompassWalker):
-        above, ahead = walker.foot_to_mass_m, 0.0
+        above = walker.foot_to_mass_m
+        ahead = 0.0
     else:
-        above, ahead = walker.leg_length_m - walker.leg_mass_below_hip_m, walker.leg_mass_ahead_m
+        above = walker.leg_length_m - walker.leg_mass_below_hip_m
+        ahead = walker.leg_mass_ahead_m
     leading = walker.leg_mass_kg * (above**2 + ahead**2) + walker.leg_inertia_kg_m2
     if walker.hip_mass_kg + torso_mass(walker.torso) + leading > 0.0:
         return ""
@@ -661,7 +664,8 @@ def why_no_state(start: Any, walker: Any) -> str:
 
 def contact_to_add(walker: Any) -> str:
     """Suggest a contact block in YAML: the paper's values scaled by mass, on terrain that suits the legs."""
-    share, paper = walker.total_mass_kg / CompassWalker().total_mass_kg, Contact()
+    share = walker.total_mass_kg / CompassWalker().total_mass_kg
+    paper = Contact()
     stiffness, damping = (short_number(float(f"{share * value:.3g}")) for value in (paper.stiffness, paper.damping))
     numbers = f"stiffness: {stiffness}, damping: {damping}"
     return f"contact: {{{numbers}, terrain: {'plane' if has_knees(walker) else 'after-mid-swing'}}}"

@@ -61,7 +61,8 @@ def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
 
 def _commented(block: Block, values: dict[str, Any], indent: str, path: str = "") -> Iterator[str]:
     for name, value in values.items():
-        field, content = type(block).model_fields[name], getattr(block, name)
+        field = type(block).model_fields[name]
+        content = getattr(block, name)
         if isinstance(content, Block):
             yield from [""] * (not indent)
             yield from _comment(field.description or "", indent)

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from walkerlab.exchange.adams_model import GROUND, ORIGIN, REFERENCE, AdamsContact, AdamsModel, values
 from walkerlab.exchange.exported import finite
 
-MAX_STEP_S, ERROR = 1e-3, 1e-6
+MAX_STEP_S = 1e-3
+ERROR = 1e-6
 
 
 def dataset_text(model: AdamsModel, head: Iterable[str]) -> str:
@@ -33,7 +34,8 @@ def statements(model: AdamsModel) -> Iterator[str]:
         head = f"{'JPRIM' if joint.kind == 'INLINE' else 'JOINT'}/{ids[name]}"
         yield from named_statement(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
     for name, weights in model.couplers.items():
-        coupled, kinds_of_joint = ", ".join(str(ids[joint]) for joint in weights), ":".join("R" for _ in weights)
+        coupled = ", ".join(str(ids[joint]) for joint in weights)
+        kinds_of_joint = ":".join("R" for _ in weights)
         scales = f"SCALES = {values(*weights.values())}"
         yield from named_statement(
             name, f"COUPLER/{ids[name]}", f"JOINTS = {coupled}", f"TYPE = {kinds_of_joint}", scales

@@ -24,7 +24,9 @@ from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.scene.contact import knee_rules
 
 MM = 1000.0
-GROUND, ORIGIN, BELOW = "ground", "ground.origin", "ground.below"
+GROUND = "ground"
+ORIGIN = "ground.origin"
+BELOW = "ground.below"
 FREE_LENGTH_MM = 100.0
 """Free length in IMPACT for a point foot: the foot's height is measured from a marker this far below the ground."""
 PAD_MM = 50.0
@@ -40,7 +42,8 @@ SLOWER = 1.05
 """Longest simulation between events, over the duration of walkerlab's walk."""
 SHORTEST_HIP = 0.5
 """Height of the hip, as a fraction of the leg, below which a walker has fallen."""
-ERROR_RAD, ERROR_MM = 1e-6, 1e-6
+ERROR_RAD = 1e-6
+ERROR_MM = 1e-6
 """Errors to which sensors are located; ADAMS's default is 1e-3 in the unit of the expression."""
 Place = tuple[float, float, float]
 
@@ -246,7 +249,8 @@ def marker_at(part: str, point_m: Position, across_m: float = 0.0) -> Marker:
 
 def add_bodies(model: AdamsModel, export: Exported) -> None:
     """Add parts, markers, hinges, feet and couplers. A planar joint keeps the base in the plane of the walk."""
-    planar, names = export.model, export.names
+    planar = export.model
+    names = export.names
     q, v = ([float(x) for x in part] for part in export.start)
     frames: list[MovingFrame] = []
     for k, (name, link) in enumerate(zip(names, planar.links, strict=True)):
@@ -332,7 +336,8 @@ class FootTerms:
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
-        pitch, lane = MM * terrain.pitch, round(terrain.lanes[self.foot] / terrain.pitch)
+        pitch = MM * terrain.pitch
+        lane = round(terrain.lanes[self.foot] / terrain.pitch)
         wave = f"{'-' if lane % 2 else ''}COS(PI*DX({self.place()})/{finite(pitch)})"
         return f"IF({wave}:{elsewhere},{elsewhere},{expression})"
 
@@ -341,7 +346,8 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
     """Add the pads or floors as boxes, with one lane for each foot."""
     for number, pad in enumerate(export.pads):
         marker = f"{GROUND}.pad_{number + 1}"
-        left, ball = pad.centre_m - 0.5 * pad.length_m, export.model.balls[pad.foot]
+        left = pad.centre_m - 0.5 * pad.length_m
+        ball = export.model.balls[pad.foot]
         across = export.lane_across_m(pad.foot) - export.half_lane_m
         top = MM * (pad.height_m + ball.ground_m)
         model.markers[marker] = Marker(GROUND, (MM * left, top - PAD_MM, MM * across))
@@ -354,7 +360,8 @@ def laws(export: Exported) -> tuple[NormalLaw, Coulomb | None]:
 
     Raises ConfigError for other friction.
     """
-    normal, friction = export.scene.ours.normal, export.scene.ours.friction
+    normal = export.scene.ours.normal
+    friction = export.scene.ours.friction
     in_mm = NormalLaw(
         normal.stiffness / MM**normal.exponent,
         normal.exponent,
@@ -410,7 +417,8 @@ def add_normal_and_friction(model: AdamsModel, export: Exported) -> None:
 
 def friction_function(leg: str, law: Coulomb) -> str:
     """Return the expression for the friction force on a leg's foot, a function of the foot's slip and normal force."""
-    slip, normal = f"VARVAL({{{leg}_slip}})", f"VARVAL({{{leg}_normal}})"
+    slip = f"VARVAL({{{leg}_slip}})"
+    normal = f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = map(finite, law)
     rise = f"STEP({slip},-{v},-{mu},{v},{mu})"
     return f"-{normal}*({rise}+SIGN(1,{slip})*(STEP(ABS({slip}),{v},{mu},{w},{less})-{mu}))"
@@ -418,7 +426,8 @@ def friction_function(leg: str, law: Coulomb) -> str:
 
 def add_push_offs(model: AdamsModel, export: Exported) -> None:
     """Add the push-off pulses on the trailing feet. They begin at the touchdown times of walkerlab's walk."""
-    impulse, duration = export.config.push_off.impulse_N_s, export.config.push_off.duration_s
+    impulse = export.config.push_off.impulse_N_s
+    duration = export.config.push_off.duration_s
     if impulse == 0.0:
         return
     for number, leg in enumerate(LEGS):
@@ -426,7 +435,8 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
         # leg_1 touches down first, so leg_2 is the first to trail
         pulses = [f"{leg}_pulse_{pulse + 1}" for pulse in range(len(export.touches_s[1 - number :: 2]))]
         for pulse, time in zip(pulses, export.touches_s[1 - number :: 2], strict=True):
-            begin, end = finite(time), finite(time + duration)
+            begin = finite(time)
+            end = finite(time + duration)
             share = f"(TIME-{begin})*({end}-TIME)/{finite(duration**2)}"
             force = finite(30.0 * impulse / duration)
             model.variables[pulse] = f"IF(TIME-{begin}:0,0,IF({end}-TIME:0,0,{force}*({share})**2))"
@@ -458,7 +468,8 @@ def add_forces(model: AdamsModel, export: Exported) -> None:
 
 def add_hip(model: AdamsModel, export: Exported) -> None:
     """Add the hip's spring, damper and torque. The torque changes sign at the touchdowns of walkerlab's walk."""
-    hip, name = export.hip, export.names[export.hip_link]
+    hip = export.hip
+    name = export.names[export.hip_link]
     i, j = f"{name}.hinge", model.joints[f"hinge_of_{name}"].j
     terms = []
     if hip.spring_N_m_per_rad:
@@ -486,9 +497,12 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     assert isinstance(law, NormalLaw), "the export has a compliant stop"
     stop = ",".join(finite(value) for value in (1.0, MM * law.stiffness, *law[1:2], MM * law.damping, law[3]))
     for number, leg in enumerate(LEGS):
-        shank, foot, other = export.names[export.knee_links[number]], FootTerms(export, number), LEGS[1 - number]
+        shank = export.names[export.knee_links[number]]
+        foot = FootTerms(export, number)
+        other = LEGS[1 - number]
         i, j = f"{shank}.hinge", model.joints[f"hinge_of_{shank}"].j
-        angle, rate = f"AZ({{{i}}},{{{j}}})", f"WZ({{{i}}},{{{j}}},{{{j}}})"
+        angle = f"AZ({{{i}}},{{{j}}})"
+        rate = f"WZ({{{i}}},{{{j}}},{{{j}}})"
         model.torques[f"stop_{number + 1}"] = Torque(i, j, f"-IMPACT(1-{angle},-{rate},{stop})")
         model.motions[f"lock_{number + 1}"] = f"hinge_of_{shank}"
         place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
@@ -504,7 +518,8 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
             f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM),
             f"{leg}_on_bent_knee": Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM, halts=True),
         }
-    hip, lowest = f"{{{export.names[0]}.hinge}}", SHORTEST_HIP * MM * export.config.walker.leg_length_m
+    hip = f"{{{export.names[0]}.hinge}}"
+    lowest = SHORTEST_HIP * MM * export.config.walker.leg_length_m
     model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
     model.inactive = ("stop_1", "stop_2", "lock_1", *(name for name in model.sensors if name != "fell"))
     for step in range(export.walk.steps):
@@ -513,7 +528,9 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
 
 def step_events(export: Exported, swing: int) -> Iterator[Event]:
     """Yield the events of a step in which a leg swings: its knee bends and locks, its foot lands and sinks in."""
-    leg, number, trailing = LEGS[swing], swing + 1, 2 - swing
+    leg = LEGS[swing]
+    number = swing + 1
+    trailing = 2 - swing
     on_bent_knee = f"{leg}_on_bent_knee"
     yield Event(f"{leg}_bent", (f"stop_{number}", on_bent_knee))
     yield Event(f"{leg}_straight", (f"lock_{number}",), (f"stop_{number}", on_bent_knee))

@@ -137,7 +137,8 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
             motion = {"vx": vx, "vy": vy, "vz": "0", "wx": "0", "wy": "0", "wz": f"({finite(part.spin)}(rad/sec))"}
             yield command("part create rigid_body initial_velocity", part_name=full(name), **motion)
     for name, shape in model.shapes.items():
-        own, sizes = full(model.shape_name(name)), [finite(edge) for edge in shape.size]
+        own = full(model.shape_name(name))
+        sizes = [finite(edge) for edge in shape.size]
         if shape.kind == "BOX":
             corner = {"corner_marker": full(shape.marker), "diag_corner_coords": ", ".join(sizes)}
             yield command("geometry create shape block", block_name=own, **corner)
@@ -146,7 +147,8 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
             centre = {"center_marker": full(shape.marker)}
             yield command("geometry create shape ellipsoid", ellipsoid_name=own, **centre, **scales)
     for name, ends in model.outlines.items():
-        own, points = full(f"{model.markers[ends[0]].part}.{name}"), ", ".join(full(end) for end in ends)
+        own = full(f"{model.markers[ends[0]].part}.{name}")
+        points = ", ".join(full(end) for end in ends)
         yield command("geometry create curve outline", outline_name=own, marker_name=points)
 
 

@@ -126,7 +126,8 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     rows, cut, gaps = without_gaps(recording, needed, rows)
     left_out |= {"samples": cut} if cut else {}
     within = replace(recording, columns={name: values[rows] for name, values in recording.columns.items()})
-    values, lines = {}, dict[str, Line]()
+    values = {}
+    lines = dict[str, Line]()
     for name, column in sources.items():
         try:
             refuse_gaps(recording, column, rows)
@@ -217,7 +218,8 @@ def with_likely_places(recording: Recording, lines: Sequence[str], least: float 
             f"{recording.path} has no likelihoods of {' and '.join(markers) or 'markers'}.",
             "They would be in columns such as HIP.likelihood. Leave out --min-likelihood.",
         )
-    columns, unseen = dict(recording.columns), dict(recording.unseen)
+    columns = dict(recording.columns)
+    unseen = dict(recording.unseen)
     for marker, likelihood in likelihoods.items():
         for column in axes_of(recording, marker).values():
             columns[column] = np.where(likelihood < least, np.nan, columns[column])
@@ -305,7 +307,8 @@ def within_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
 
     Raises ConfigError if there are none.
     """
-    begin, end = (-math.inf if asked.from_s is None else asked.from_s), (math.inf if asked.to_s is None else asked.to_s)
+    begin = -math.inf if asked.from_s is None else asked.from_s
+    end = math.inf if asked.to_s is None else asked.to_s
     # samples without a time are no part that could be left out
     rows = ~((time < begin) | (time > end))
     if rows.size and not rows.any():
@@ -646,7 +649,8 @@ def parse_pairs(option: str, texts: Sequence[str]) -> dict[str, str]:
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
     """Return units by kind, quantity or column. A unit alone, such as `deg`, applies to its kind (angles)."""
-    pairs, alone = [], {}
+    pairs = []
+    alone = {}
     for part in (part.strip() for text in texts for part in text.split(",") if part.strip()):
         kinds = [kind for kind in UNIT_VALUES if value_in_si(part, kind) is not None]
         if "=" in part:

@@ -72,15 +72,18 @@ class EngineScene:
     def from_base(self, y: State) -> tuple[Floats, Floats]:
         """Convert a state of the free walker to the engine's coordinates and velocities."""
         n = len(self.model.chain)
-        angles, rates = np.array(y[2 : 2 + n]) + self.ours.slope, np.array(y[4 + n :])
+        angles = np.array(y[2 : 2 + n]) + self.ours.slope
+        rates = np.array(y[4 + n :])
         shift, drift = self._centre(angles, rates)
-        position, velocity = np.array(y[:2]) - shift, np.array(y[2 + n : 4 + n]) - drift
+        position = np.array(y[:2]) - shift
+        velocity = np.array(y[2 + n : 4 + n]) - drift
         relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
     def about_centre(self, q: Floats, v: Floats) -> Floats:
         """Convert an engine's coordinates and velocities to a state of the free walker."""
-        angles, rates = self.model.chain @ q[2:], self.model.chain @ v[2:]
+        angles = self.model.chain @ q[2:]
+        rates = self.model.chain @ v[2:]
         shift, drift = self._centre(angles, rates)
         return np.concatenate((q[:2] + shift, angles - self.ours.slope, v[:2] + drift, rates))
 
@@ -88,7 +91,8 @@ class EngineScene:
         """Position (m) and velocity (m/s) of the centre of mass relative to the base."""
         s, c = np.sin(angles), np.cos(angles)
         d = self.centre_levers
-        forward, upward = c * d[:, 0] - s * d[:, 1], s * d[:, 0] + c * d[:, 1]
+        forward = c * d[:, 0] - s * d[:, 1]
+        upward = s * d[:, 0] + c * d[:, 1]
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
     def scale_start(self, factor: float) -> EngineScene:
@@ -106,7 +110,8 @@ def engine_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
 
 def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
-    assembly, start = scene.assembly, start_state(scene, rigid_state)
+    assembly = scene.assembly
+    start = start_state(scene, rigid_state)
     upper = assembly.legs[STANCE_FOOT][0]
     base = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     d = np.zeros((2, MAX_BODIES, 2))
@@ -142,10 +147,12 @@ def creep_velocity(friction: FrictionLaw, load: float) -> float:
 def contact_target(scene: EngineScene) -> EngineContact | None:
     """Linearise the walker's contact under its weight on one foot, or None on frictionless ground."""
     walker = scene.ours
-    law, friction = walker.normal, walker.friction
+    law = walker.normal
+    friction = walker.friction
     if friction.largest == 0.0:
         return None
-    mass, g = walker.mass, walker.gravity_down
+    mass = walker.mass
+    g = walker.gravity_down
     foot = resting_foot(mass * g, mass, law.stiffness, law.exponent, law.damping)
     creep = creep_velocity(friction, CREEP_LOAD)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]

@@ -27,7 +27,8 @@ from walkerlab.scene.rigid import refuse_different_legs
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
-PADS_BEHIND, PADS_AHEAD = 2, 4
+PADS_BEHIND = 2
+PADS_AHEAD = 4
 RESERVED = ("ground", "world", "walker")
 COUPLED = 1e-12  # smaller weights of a coupling count as zero
 
@@ -104,11 +105,13 @@ class Exported:
     def pads(self) -> tuple[Pad, ...]:
         """Ground under the feet: one floor per foot, or pads from behind the start to beyond the end of the walk."""
         terrain = self.scene.ground.terrain
-        pitch, last = terrain.pitch, self.steps + PADS_AHEAD
+        pitch = terrain.pitch
+        last = self.steps + PADS_AHEAD
         if not terrain.has_pads:
             span = (PADS_BEHIND + last) * pitch
             return tuple(Pad(foot, 0.5 * span - PADS_BEHIND * pitch, span, 0.0) for foot in range(2))
-        pads, uneven = [], terrain._replace(heights=self.heights)
+        pads = []
+        uneven = terrain._replace(heights=self.heights)
         for number in range(-PADS_BEHIND, last + 1):
             height = 0.0 if self.heights is None else float(foothold_height(uneven, number))
             foot = STANCE_FOOT if number % 2 == 0 else 1 - STANCE_FOOT

@@ -104,7 +104,8 @@ def swap_back(walk: RecordedWalk) -> RecordedWalk:
 def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
     """Leave out samples at which a leg is off its course, and cut where an angle jumps and stays beside it."""
     stretches = find_stretches(walk.time_s, legs(walk))
-    off, numbers = np.zeros((walk.time_s.size, 2), bool), walk.quantities[SAMPLE]
+    off = np.zeros((walk.time_s.size, 2), bool)
+    numbers = walk.quantities[SAMPLE]
     for stretch in stretches:
         if not stretch.lasts:
             off[stretch.first : stretch.end, stretch.leg] = True
@@ -152,7 +153,8 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     turns = [find_turn(walk, before, after) for before, after in pairwise(ways)]
     if not turns:
         return walk
-    begin, end = [0, *turns][place], [*turns, walk.time_s.size - 1][place]
+    begin = [0, *turns][place]
+    end = [*turns, walk.time_s.size - 1][place]
     spelled = ", ".join(f"{walk.time_s[turn]:.6g} s" for turn in turns)
     kept = f"the longest stretch one way, from time {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
     rows = np.arange(walk.time_s.size)
@@ -163,7 +165,8 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
 
 def find_ways(time: Array, angle: Array) -> list[Way]:
     """Return the stretches of a walk in one direction. A single passing of the legs the other way does not count."""
-    spread, total = angle[:, 0] - angle[:, 1], angle.sum(axis=1)
+    spread = angle[:, 0] - angle[:, 1]
+    total = angle.sum(axis=1)
     runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.percentile(np.abs(spread), FAR_PERCENT), spread > 0.0)
     trends = [
         (last, first, trend(time[last : first + 1], total[last : first + 1]))
@@ -188,7 +191,8 @@ def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
     """Return the sample between two stretches at which the hip turns round, or the one in the middle
     without markers.
     """
-    begin, end = before.passings[-1][1], after.passings[0][0]
+    begin = before.passings[-1][1]
+    end = after.passings[0][0]
     hip = walk.quantities.get(HIP_OF_LINES)
     if hip is None:
         return (begin + end) // 2

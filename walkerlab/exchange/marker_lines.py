@@ -92,12 +92,16 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     def uneven(before: Array, between: Array, after: Array) -> Array:
         return np.asarray(np.sum((between - (1.0 - share) * before - share * after) ** 2, axis=1))
 
-    before, between, after = apart[:-2], apart[1:-1], apart[2:]
+    before = apart[:-2]
+    between = apart[1:-1]
+    after = apart[2:]
     costs = [[uneven(first * before, between, last * after) for last in (1.0, -1.0)] for first in (1.0, -1.0)]
     fast = float(np.percentile(np.sum(np.diff(apart, axis=0) ** 2, axis=1), FAST_PERCENT))
     least = max(EXCHANGE * fast, SCATTER * float(np.median(costs[0][0])))
     # the cheapest way to each gap between samples, without and with an exchange there
-    stays, changes, ways = 0.0, least, list[tuple[bool, bool]]()
+    stays = 0.0
+    changes = least
+    ways = list[tuple[bool, bool]]()
     for (no_no, no_yes), (yes_no, yes_yes) in np.array(costs).transpose(2, 0, 1).tolist():
         ways.append((changes + yes_no < stays + no_no, changes + yes_yes < stays + no_yes))
         stays, changes = min(stays + no_no, changes + yes_no), min(stays + no_yes, changes + yes_yes) + least
@@ -117,13 +121,15 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
     """Swap the ends of both legs' lines back where they change places, and return the lines, and what was done."""
-    mended, doubts = dict(lines), list[str]()
+    mended = dict(lines)
+    doubts = list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
         if second not in lines:
             continue
         (top, bottom), (other_top, other_bottom) = mended[first], mended[second]
         rows = [swapped_rows(time, top - other_top), swapped_rows(time, bottom - other_bottom)]
-        tops, bottoms = rows[0][:, None], rows[1][:, None]
+        tops = rows[0][:, None]
+        bottoms = rows[1][:, None]
         mended[first] = np.where(tops, other_top, top), np.where(bottoms, other_bottom, bottom)
         mended[second] = np.where(tops, top, other_top), np.where(bottoms, bottom, other_bottom)
         if (swapped := rows[0] | rows[1]).any():
@@ -193,7 +199,8 @@ def unseen_as_gaps(
     places = [np.clip(np.stack([columns[name] for name in names], axis=1), -HUGE, HUGE) for names in ends]
     length = np.linalg.norm(places[1] - places[0], axis=1)
     seen = length[np.isfinite(length)]
-    gaps, unseen = dict(columns), dict[str, str]()
+    gaps = dict(columns)
+    unseen = dict[str, str]()
     if not seen.size:
         return gaps, unseen
     usual = float(np.median(seen))
@@ -217,7 +224,8 @@ def frozen_rows(places: Array) -> NDArray[np.bool_]:
     because a foot may have stood still before.
     """
     change = np.linalg.norm(np.diff(places, axis=0, append=places[-1:]), axis=1)
-    still, frozen = np.append(False, change[:-1] == 0.0), np.zeros(len(places), bool)
+    still = np.append(False, change[:-1] == 0.0)
+    frozen = np.zeros(len(places), bool)
     for first, last in apart_runs(still, still):
         pace = float(np.max(change[last + 1 : last + 3], initial=0.0))
         missing = change[last] / pace - 1.0 if pace > 0.0 else 0.0
@@ -231,7 +239,8 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
 
     Legs are rigid, and knees bend smoothly.
     """
-    off, doubts = np.zeros(time.size, bool), []
+    off = np.zeros(time.size, bool)
+    doubts = []
     for name, (top, bottom) in lines.items():
         frozen = frozen_rows(top) | frozen_rows(bottom)
         if frozen.any():
@@ -247,7 +256,8 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
         sudden = change - np.median(around, axis=1)
         limit = max(JUMP * NORMAL * float(np.median(np.abs(sudden))), SMALLEST_JUMP * float(np.median(length)))
         jumps = np.flatnonzero(np.abs(sudden) > limit).tolist()
-        brief, lasting = np.zeros(length.size, bool), np.zeros(length.size, bool)
+        brief = np.zeros(length.size, bool)
+        lasting = np.zeros(length.size, bool)
         while jumps:
             first = jumps.pop(0)
             if jumps and sudden[first] * sudden[jumps[0]] < 0.0:
@@ -264,7 +274,8 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
 
 def body_doubts(lines: Mapping[str, Line], plane: WalkPlane) -> list[str]:
     """Name legs whose length changes slowly, and legs that do not meet at one hip."""
-    doubts, lengths = [], list[float]()
+    doubts = []
+    lengths = list[float]()
     for name, (top, bottom) in lines.items():
         length = np.linalg.norm(top - bottom, axis=1)
         parts = [float(np.median(part)) for part in np.array_split(length, min(LENGTH_PARTS, length.size))]

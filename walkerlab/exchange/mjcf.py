@@ -40,7 +40,9 @@ MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
 IMPEDANCE = 1e-3  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
 IMPRATIO = 10.0  # large, so that sliding feet are not pushed off the ground
 JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
-STEP_S, DAMPED_STEP, PAD_M = 2.5e-5, 0.33, 0.05
+STEP_S = 2.5e-5
+DAMPED_STEP = 0.33
+PAD_M = 0.05
 """Time step, and its maximum as a multiple of the time constant with which a damper stops a foot or a shank."""
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
@@ -200,7 +202,8 @@ def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, 
 
 def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: Mapping[str, float]) -> str:
     """Write the contact between a foot and a named ground, of which only a pair can tune the friction's damping."""
-    mu, creep = contact["friction"], inverse_weights(model).bodies[ball.link] * contact["friction_damping_N_s_m"]
+    mu = contact["friction"]
+    creep = inverse_weights(model).bodies[ball.link] * contact["friction_damping_N_s_m"]
     return (
         f'<pair name="{foot.name} on {ground}" geom1="{foot.name}" geom2="{ground}" condim="3" '
         f'friction="{mu!r} {mu!r} 0 0 0" '
@@ -210,7 +213,8 @@ def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: 
 
 def normal_text(model: PlanarModel, ball: Ball, contact: Mapping[str, float]) -> str:
     """Write spring and damper of a foot, which follow from the contact settings and the weight of the foot's link."""
-    inverse_weight, d = inverse_weights(model).bodies[ball.link], contact["solimp_d"]
+    inverse_weight = inverse_weights(model).bodies[ball.link]
+    d = contact["solimp_d"]
     stiffness = inverse_weight * contact["stiffness_N_m"]
     damping = inverse_weight * contact["damping_N_s_m"]
     return f'solref="{-stiffness!r} {-damping!r}" solimp="{d!r} {d!r} 1 0.5 1"'
@@ -246,7 +250,8 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
         )
     )
     if slope == "geometry":
-        half, down = 0.5 * export.scene.ours.slope, math.hypot(model.gravity_along, model.gravity_down)
+        half = 0.5 * export.scene.ours.slope
+        down = math.hypot(model.gravity_along, model.gravity_down)
         model = replace(model, gravity_along=0.0, gravity_down=down)
         scene = f'<body name="slope" quat="{math.cos(half)!r} 0 {math.sin(half)!r} 0">{scene}</body>'
     pairs = "".join(
@@ -275,7 +280,8 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
 
 def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
     """Return a time step, rounded to one digit, that resolves the damping of the lightest foot and the knees' stops."""
-    weights, stop = inverse_weights(export.model), export.scene.ours.stop
+    weights = inverse_weights(export.model)
+    stop = export.scene.ours.stop
     rates = [contact["damping_N_s_m"] * weights.bodies[ball.link] for ball in export.model.balls]
     if isinstance(stop, NormalLaw):
         shanks = [weights.joints[link] for link in export.knee_links]
@@ -285,11 +291,14 @@ def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
 
 def hinge_names(export: Exported) -> dict[int, Hinge]:
     """Name the hip and the knees, with the hip's spring and damper and the stops of compliant knees."""
-    hip, weights, stop = export.hip, inverse_weights(export.model).joints, export.scene.ours.stop
+    hip = export.hip
+    weights = inverse_weights(export.model).joints
+    stop = export.scene.ours.stop
     acts = f'stiffness="{hip.spring_N_m_per_rad!r}" damping="{hip.damping_N_m_s_per_rad!r}"'
     hinges = {export.hip_link: Hinge(HIP, acts)}
     for leg, link in enumerate(export.knee_links):
-        acts, d = "", IMPEDANCE
+        acts = ""
+        d = IMPEDANCE
         if isinstance(stop, NormalLaw):
             stiffness, damping = ((1.0 - d) * weights[link] * x for x in (stop.stiffness, stop.damping))
             acts = f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
@@ -300,9 +309,12 @@ def hinge_names(export: Exported) -> dict[int, Hinge]:
 def limbs(export: Exported, foot: int) -> dict[int, Position]:
     """Return the lower end (m) of each link of a leg, from its foot up to the hip."""
     ball = export.model.balls[foot]
-    link, end, ends = ball.link, ball.centre_m, {ball.link: ball.centre_m}
+    link = ball.link
+    end = ball.centre_m
+    ends = {ball.link: ball.centre_m}
     while link not in (0, export.hip_link):
-        end, link = export.model.links[link].parent_point_m, export.model.links[link].parent
+        end = export.model.links[link].parent_point_m
+        link = export.model.links[link].parent
         ends[link] = end
     return ends
 
@@ -331,7 +343,9 @@ def pad_text(export: Exported, number: int, pad: Pad) -> str:
 
 def custom_texts(export: Exported) -> Iterator[str]:
     """Yield what the script reads: drives, rules of the knees, and periods and lengths of walkerlab's steps."""
-    push_off, hip, walk = export.config.push_off, export.hip, export.walk
+    push_off = export.config.push_off
+    hip = export.hip
+    walk = export.walk
     yield f'<numeric name="push_off" data="{push_off.impulse_N_s!r} {push_off.duration_s!r}"/>'
     yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
     if export.knee_links:

@@ -25,7 +25,8 @@ class Walk:
     """
 
     def __init__(self, model: Any) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
+        self.model = model
+        self.data = mujoco.MjData(model)
         self.impulse, self.duration = model.numeric("push_off").data
         (self.torque,) = model.numeric("hip_torque").data
         self.hip = model.joint("hip")
@@ -49,7 +50,8 @@ class Walk:
 
     def begin(self) -> None:
         """Stand on the second leg, with its knee locked and the other one free."""
-        self.time_s, self.stance = -1.0, 1
+        self.time_s = -1.0
+        self.stance = 1
         self.touches_s: list[float] = []
         self.touches_m: list[float] = []
         # what the release of the trailing knee waits for: the leading foot's sinking in, then the push-off
@@ -76,7 +78,8 @@ class Walk:
 
     def look_for_touch(self) -> None:
         """Swap feet if the swing foot is on the ground ahead of the stance foot, its knee locked."""
-        data, swing = self.data, 1 - self.stance
+        data = self.data
+        swing = 1 - self.stance
         if (self.knees and not data.eq_active[self.locks[swing]]) or self.feet[swing] not in data.contact.geom:
             return
         along = data.geom_xpos[self.feet] @ self.along
@@ -110,7 +113,9 @@ class Walk:
 
     def turn_knees(self) -> None:
         """Release the trailing knee when nothing holds it any longer. Lock a knee that comes straight from behind."""
-        model, data, trailing = self.model, self.data, 1 - self.stance
+        model = self.model
+        data = self.data
+        trailing = 1 - self.stance
         if self.pushes:
             motion = np.zeros(6)
             mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, self.feet[self.stance], motion, 0)
@@ -121,7 +126,8 @@ class Walk:
         for leg, knee in enumerate(self.knees):
             if data.eq_active[self.locks[leg]]:
                 continue
-            bend, rate = data.qpos[model.jnt_qposadr[knee]], data.qvel[model.jnt_dofadr[knee]]
+            bend = data.qpos[model.jnt_qposadr[knee]]
+            rate = data.qvel[model.jnt_dofadr[knee]]
             if bend < -self.flexed:
                 self.bent[leg] = True
                 model.jnt_limited[knee] = self.stops[leg]
@@ -130,7 +136,9 @@ class Walk:
 
     def lock(self, leg: int) -> None:
         """Stop a knee by a plastic impact that leaves the other constraints in force, and hold it from now on."""
-        model, data, knee = self.model, self.data, self.knees[leg]
+        model = self.model
+        data = self.data
+        knee = self.knees[leg]
         model.jnt_limited[knee] = 0
         # a knee that locks by its stop keeps the stop's compression
         model.eq_data[self.locks[leg], 0] = data.qpos[model.jnt_qposadr[knee]] if self.stops[leg] else 0.0
@@ -144,12 +152,15 @@ class Walk:
 
 def main(path: str, steps: int, view: bool) -> None:
     """Walk for `steps` touchdowns, or until the hip is on the ground, and compare with walkerlab's walk."""
-    walk, viewer = Walk(mujoco.MjModel.from_xml_path(path)), None
+    walk = Walk(mujoco.MjModel.from_xml_path(path))
+    viewer = None
     if view:
         from mujoco.viewer import launch_passive
 
         viewer = launch_passive(walk.model, walk.data)
-    begun, shown_s, seen = time.monotonic(), 0.0, 0
+    begun = time.monotonic()
+    shown_s = 0.0
+    seen = 0
     while len(walk.touches_s) < steps and walk.data.time < 2.0 * steps and walk.data.qpos[1] > 0.0:
         mujoco.mj_step(walk.model, walk.data)
         if len(walk.touches_s) > seen:

@@ -128,7 +128,8 @@ def lump_bodies(
         for mass, anchor in masses(assembly)
         if anchor.body == name and mass > 0.0
     ]
-    weights, places = np.array([mass for mass, _ in particles]), np.array([place for _, place in particles])
+    weights = np.array([mass for mass, _ in particles])
+    places = np.array([place for _, place in particles])
     total = float(weights.sum())
     centre = weights @ places / total
     inertia = sum(assembly.bodies[assembly.index(name)].inertia_kg_m2 for name, _ in members)

@@ -35,7 +35,8 @@ def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) ->
     angle  (samples, 2) rad, from the vertical
     total  function from angles (samples, 2), from the vertical, to their sum (samples,), from the slope's normal
     """
-    spread, sums = angle[:, 0] - angle[:, 1], total(angle)
+    spread = angle[:, 0] - angle[:, 1]
+    sums = total(angle)
     runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.abs(spread).max(), spread > 0.0)
     half = WINDOW * typical_interval([0.5 * (time[first] + time[last]) for first, last in runs], time)
     evidence = np.array([evidence_for(time, angle, sums - tried, runs[:MOST_RUNS], half) for tried in SUMS])

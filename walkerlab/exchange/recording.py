@@ -341,7 +341,8 @@ def table_of(
 
     Raises ConfigError for a row with too many or too few cells.
     """
-    numbers, table = [], []
+    numbers = []
+    table = []
     for number, row in rows:
         cells = trim_blank_end(row, len(names))
         if len(cells) != len(names):
@@ -575,7 +576,8 @@ def read_c3d(path: Path) -> Recording:
     if find_spec("ezc3d") is None:
         raise ConfigError(f"{path}: reading C3D needs ezc3d.", 'Install it: pip install "walkerlab[data]"')
     arrays = c3d_arrays(path)
-    places, labels = arrays["places"], [str(label).strip() for label in arrays["labels"]]
+    places = arrays["places"]
+    labels = [str(label).strip() for label in arrays["labels"]]
     rate = float(arrays["rate"][0]) if arrays["rate"].size else 0.0
     if not any(labels) or not rate > 0.0 or places.ndim != 3 or places.shape[1] < len(labels):
         raise ConfigError(f"{path} holds no markers, or no frame rate.", "Export it again.")

@@ -135,7 +135,8 @@ class Strike:
         low, high = self.inside(BORDER)
         firsts = np.arange(low, high)
         short = np.stack(np.broadcast_arrays(firsts[:, None], firsts[:, None] + lengths), axis=2).reshape(-1, 2)
-        inner, count = np.arange(*self.inside(LASTING, whole=False)), self.time.size
+        inner = np.arange(*self.inside(LASTING, whole=False))
+        count = self.time.size
         lasting = np.stack((inner, np.full(inner.size, count)), axis=1)
         spans = np.concatenate((short[short[:, 1] <= high], lasting))
         first, end, leg = best_span(sums, spans)
@@ -199,7 +200,8 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     for place in np.argsort(worst)[::-1].tolist():
         if worst[place] > SUSPECT * limit:
             new = stretches_near(course, place, limit, SMALLEST * far)
-            found, course = found + new, course.without(new)
+            found = found + new
+            course = course.without(new)
     return found
 
 
@@ -258,7 +260,8 @@ class Course:
 
     def without(self, stretches: Sequence[Stretch]) -> Course:
         """Return the course without the samples of stretches, and with lasting offsets taken off."""
-        angle, kept = self.angle.copy(), np.ones(self.rows.size, bool)
+        angle = self.angle.copy()
+        kept = np.ones(self.rows.size, bool)
         for stretch in stretches:
             if stretch.lasts:
                 angle[self.rows >= stretch.first, stretch.leg] -= stretch.offset_rad
@@ -269,7 +272,8 @@ class Course:
     def strike(self, place: int) -> Strike:
         """Return the steps around the heel strike in a span."""
         begin, end = self.spans[place]
-        at, margin = self.guess(place), MARGIN * self.step_s
+        at = self.guess(place)
+        margin = MARGIN * self.step_s
         farthest = WIDEST * self.step_s
         first = max(self.guess(place - 1) + margin, at - farthest) if place else float(self.time[0])
         following = place + 1 < len(self.spans)
@@ -293,7 +297,8 @@ class Course:
 def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:
     """Return the course of a recording without some stretches: rates jump while one leg is far ahead of the other."""
     course = Course(time, angle, np.arange(time.size), [], 0.0).without(stretches)
-    time, angle = course.time, course.angle
+    time = course.time
+    angle = course.angle
     spread = angle[:, 0] - angle[:, 1]
     far = WINDOW_AHEAD * float(np.percentile(np.abs(spread), FAR_PERCENT))
     apart = apart_runs(np.abs(spread) > far, spread > 0.0)

@@ -96,7 +96,8 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     # A recording may end with a heel strike, so its last two samples are continued by half an interval.
     time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
     angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
-    spread, over = angle[:, 0] - angle[:, 1], height(angle)
+    spread = angle[:, 0] - angle[:, 1]
+    over = height(angle)
     apart = WINDOW_AHEAD * np.abs(spread).max()
     crossings = []
     for i in np.flatnonzero((over[:-1] > 0.0) != (over[1:] > 0.0)):
@@ -123,7 +124,8 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
 
     The height fitted at the first sample is zero within three of its standard errors, which are small in time.
     """
-    spread, begin = angle[:, 0] - angle[:, 1], float(time[0])
+    spread = angle[:, 0] - angle[:, 1]
+    begin = float(time[0])
     if abs(spread[0]) <= WINDOW_AHEAD * np.abs(spread).max():
         return None
     rows = time - begin <= WIDEST * period
@@ -142,7 +144,10 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     """
     t, y = samples_near(time, angle, near, period)
     farthest = 0.5 * float(np.abs(t).max())
-    at, correction, degree, touch = 0.0, 0.0, DEGREES[0], None
+    at = 0.0
+    correction = 0.0
+    degree = DEGREES[0]
+    touch = None
     for iteration in range(ITERATIONS):
         # The best degree shows only once the polynomials meet near the strike.
         degree = best_degree(t, y, at) if iteration < DEGREE_ITERATIONS else degree
@@ -206,7 +211,8 @@ def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
     sides = {name: side for name, side in both.items() if np.sum(side) >= fewest}
     if not sides:
         return None
-    used, scale = np.any(list(sides.values()), axis=0), float(np.ptp(t))
+    used = np.any(list(sides.values()), axis=0)
+    scale = float(np.ptp(t))
     powers = ((t - at) / scale)[:, None] ** np.arange(1, degree + 1)
     basis = np.concatenate([np.ones((t.size, 1)), *(side[:, None] * powers for side in sides.values())], axis=1)[used]
     count, columns = basis.shape
@@ -215,7 +221,8 @@ def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
     orthonormal, triangle = np.linalg.qr(basis)
     inverse = np.linalg.inv(triangle)
     coefficients = inverse @ (orthonormal.T @ y[used])
-    squares, freedoms = float(np.sum((y[used] - basis @ coefficients) ** 2)) + SMALLEST, 2 * (count - columns)
+    squares = float(np.sum((y[used] - basis @ coefficients) ** 2)) + SMALLEST
+    freedoms = 2 * (count - columns)
     rates = {name: coefficients[1 + place * degree] / scale for place, name in enumerate(sides)}
     deviation = float(np.sqrt(squares / freedoms) * np.linalg.norm(inverse[0]))
     criterion = 2 * count * float(np.log(squares)) + 2 * columns * float(np.log(2 * count)) * count / (count - columns)
@@ -247,7 +254,8 @@ def angles_at_jumps(
     if not inside or 0.0 not in squares:
         return None
     place = min(range(len(shifts)), key=lambda place: squares[shifts[place]])
-    best, least = shifts[place], squares[shifts[place]]
+    best = shifts[place]
+    least = squares[shifts[place]]
     variance = least / sum(fit.freedoms for fit in trials[best])
     if squares[0.0] - least <= errors**2 * variance or not 0 < place < len(shifts) - 1:
         return None

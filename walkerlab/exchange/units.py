@@ -31,7 +31,8 @@ SI: Final = {kind: next(iter(units)) for kind, units in UNIT_VALUES.items()}
 
 def value_in_si(unit: str, kind: str) -> float | None:
     """Return the SI value of a unit, such as mm, Millimeters or [mm], or None if no quantity of this kind has it."""
-    name, values = unit.strip().strip("[]()").strip().lower(), UNIT_VALUES[kind]
+    name = unit.strip().strip("[]()").strip().lower()
+    values = UNIT_VALUES[kind]
     return values.get(name, values.get(name.removesuffix("s")))
 
 

@@ -313,7 +313,8 @@ def is_plausible(size: float) -> bool:
 
 def refuse_noise(angle: Array, source: str) -> None:
     """Raise ConfigError if scatter hides the heel strikes."""
-    noise, apart = noise_of(angle), float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
+    noise = noise_of(angle)
+    apart = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
     if noise > LOUDEST * apart:
         raise ConfigError(
             f"{source}: the angles scatter by {noise:.2g} rad from sample to sample, and the legs are {apart:.2g} rad "
@@ -385,12 +386,15 @@ def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
 
 
 def divided(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts: tuple[str, ...]) -> RecordedSteps:
-    origin, swapped = touches[0].time_s, touches[1].leg == 1
+    origin = touches[0].time_s
+    swapped = touches[1].leg == 1
     times = np.array([touch.time_s for touch in touches[1:]]) - origin
     order = [1, 0] if swapped else [0, 1]
-    angle, velocity = legs(walk), walk.both_legs("velocity")
+    angle = legs(walk)
+    velocity = walk.both_legs("velocity")
     columns = angle[:, order] if velocity is None else np.column_stack((angle[:, order], velocity[:, order]))
-    time, side = walk.time_s - origin, SIDE * float(times[-1])
+    time = walk.time_s - origin
+    side = SIDE * float(times[-1])
     spans = list(zip((0.0, *times), (*(times - side), float(time[-1])), strict=True))
     if not is_recorded_beyond(time, times):
         spans.pop()

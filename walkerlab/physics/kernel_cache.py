@@ -129,7 +129,8 @@ def why_not_built() -> str:
 def describe_origin() -> list[str]:
     """Describe in lines where kernels come from, and why."""
     versions = ", ".join(f"{name} {here}" for name, here in circumstances().items())
-    why, folder = why_not_built(), f"compiled when a run needs them, and kept in {cache_root()}"
+    why = why_not_built()
+    folder = f"compiled when a run needs them, and kept in {cache_root()}"
     if why:
         return [versions, f"kernels: {folder}", f"The package's kernels are not used: {why}"]
     return [versions, f"kernels: {len(list(BUILT.glob('*.kernel')))} from the package; others are {folder}"]
@@ -196,7 +197,8 @@ def cache_folder() -> Path:
     # The first call of a process creates it if necessary, and then deletes folders unused for a long time.
     import numba
 
-    root, host = cache_root(), processor_name()
+    root = cache_root()
+    host = processor_name()
     compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
     folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
     if os.path.lexists(folder):

@@ -138,7 +138,8 @@ class ByAddress(types.Type):
     """Numba's type of a NamedTuple that is passed by its address: see `pass_by_reference`."""
 
     def __init__(self, held: Any) -> None:
-        self.held, self.instance_class = held, held.instance_class
+        self.held = held
+        self.instance_class = held.instance_class
         super().__init__(f"reference to {held.name}")
 
     @property

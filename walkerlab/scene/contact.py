@@ -74,8 +74,11 @@ def contact_scene(
     """
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
-    assembly, leg, gravity = assembly_of(config.walker), config.walker.leg_length_m, config.gravity_m_s2
-    laws, rules = (normal_law(contact), friction_law(contact)), knee_rules(config.walker)
+    assembly = assembly_of(config.walker)
+    leg = config.walker.leg_length_m
+    gravity = config.gravity_m_s2
+    laws = (normal_law(contact), friction_law(contact))
+    rules = knee_rules(config.walker)
     walker = apply_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
@@ -160,7 +163,8 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
     rigid_step_length_m  initial pad pitch
     """
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
-    start, legs_differ = start_state(scene, rigid_state), have_different_legs(config)
+    start = start_state(scene, rigid_state)
+    legs_differ = have_different_legs(config)
     return find_gait_from(scene.walker, scene.ground, GAIT_TOLERANCES, start, legs_differ)
 
 
@@ -197,7 +201,8 @@ def friction_law(contact: Contact) -> FrictionLaw:
 
     Raises ConfigError if a law that an extension added is incomplete.
     """
-    word, added = contact.friction, declared("friction")
+    word = contact.friction
+    added = declared("friction")
     try:
         if word in added:
             FRICTION_LAWS[word] = load(added[word])
@@ -229,7 +234,8 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:
-    walker, law = scene.walker, scene.walker.normal
+    walker = scene.walker
+    law = scene.walker.normal
     return resting_foot(walker.mass * walker.gravity, walker.mass, law.stiffness, law.exponent, law.damping)
 
 

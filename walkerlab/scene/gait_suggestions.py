@@ -25,7 +25,8 @@ from walkerlab.scene.rigid import rigid_walker
 SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # slopes to try in this order, relative to the config's slope
 COMMON_SLOPES = (0.03, 0.12)  # rad; most walkers that have gaits have them on these slopes
 # rad; the steepest slope to which gaits are followed lies between these
-MIN_FOLLOWED_TO, MAX_FOLLOWED_TO = 0.2, 0.35
+MIN_FOLLOWED_TO = 0.2
+MAX_FOLLOWED_TO = 0.35
 SUGGESTION_SEARCH = SearchSettings(random_starts=50, further_starts=100)
 SUGGESTION_POINTS = 60  # maximum number of points of a branch
 INSET = 0.1  # distance kept from the end of a range, as a fraction of the range
@@ -89,7 +90,8 @@ def suggest_gaits(scene: RigidConfig) -> str:
     if scene.slope_rad <= 0.0:
         return ""
     config = rigid_alone(scene)
-    feet, suitable = find_gait_with_feet_ahead(config), find_slopes_with_gaits(config)
+    feet = find_gait_with_feet_ahead(config)
+    suitable = find_slopes_with_gaits(config)
     advice = []
     if feet is not None:
         ahead_m, gait = feet

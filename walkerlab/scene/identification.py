@@ -177,7 +177,8 @@ def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
     """Refit angles at their sample times, from the fit at equal phase, or return None for measured steps or a failed
     fit.
     """
-    forecast, u = first.forecast, first.u
+    forecast = first.forecast
+    u = first.u
     if not forecast.measured.sampled:
         return None
     nuisances = forecast.nuisances if DELAY in forecast.nuisances else (*forecast.nuisances, DELAY)
@@ -195,13 +196,15 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
     priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
-    leg_m, loss = subject.config.walker.leg_length_m, question.loss
+    leg_m = subject.config.walker.leg_length_m
+    loss = question.loss
     return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
 
 
 def starts_of(problem: FitProblem, count: int) -> list[Floats]:
     """Return the starts of the fit, each (unknowns,): the config's values, then random values near them."""
-    rng, own = np.random.default_rng(0), problem.forecast.scales.size
+    rng = np.random.default_rng(0)
+    own = problem.forecast.scales.size
     starts = [problem.first() for _ in range(count)]
     for start in starts[1:]:
         start[:own] *= 1.0 + SPREAD_OF_STARTS * rng.uniform(-1.0, 1.0, own)
@@ -213,7 +216,9 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
 
     steps  fit that predicts the step periods; differs from `best` only if angles were fitted at their sample times
     """
-    problem, forecast, keys = best.problem, best.forecast, question.keys
+    problem = best.problem
+    forecast = best.forecast
+    keys = question.keys
     information = information_on(best, keys)
     combinations, left_open = open_combinations(information)
     errors = np.sqrt(np.diag(information.covariance)).tolist()
@@ -263,7 +268,8 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
 
 def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
     """Yield how far the data would move each estimate that is at a bound, in standard errors of the free estimate."""
-    problem, scales = fitted.problem, fitted.forecast.scales
+    problem = fitted.problem
+    scales = fitted.forecast.scales
     errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True)), 1e-300))
     for key, u, move, error, bounds, scale in zip(
         keys, fitted.u, fitted.evaluation.move, errors, problem.bounds, scales, strict=False
@@ -301,16 +307,19 @@ def better_with(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Ite
     The gain is that of a linearised step with new standard deviations. It is reduced by the share of the values that
     the unknowns use up, since any parameter fits a short walk better.
     """
-    data, problem = fitted.data, fitted.problem
+    data = fitted.data
+    problem = fitted.problem
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
     left = (data.residuals.size - fitted.u.size - 1) / data.residuals.size
-    best, wider = fitted.evaluation.likelihood, None
+    best = fitted.evaluation.likelihood
+    wider = None
     for other in others:
         rows = reduce(replace(data, J=np.column_stack((data.J, other.slope)), prior=priors))
         evaluation = evaluate(rows, fitted.noise)
         moves = np.abs([*evaluation.move[:parameters], evaluation.move[-1] if other.value else 0.0])
         if evaluation.likelihood > best and moves.max() < LINEAR_MOVE:
-            best, wider = evaluation.likelihood, (other, rows)
+            best = evaluation.likelihood
+            wider = (other, rows)
     if wider is not None:
         other, rows = wider
         noise = estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise)
@@ -358,7 +367,9 @@ def one_percent(parameter: Fixed, config: ContactConfig) -> float:
 
 def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted) -> Iterator[Fixed]:
     """Yield each parameter and nuisance that is not estimated and along which walks can be predicted."""
-    config, forecast, count = subject.config, fitted.forecast, len(question.keys)
+    config = subject.config
+    forecast = fitted.forecast
+    count = len(question.keys)
     estimated = {parameter_of(key, config).path for key in question.keys}
     others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
     fixed = [key for key in others if model_reads(subject.model, config, key)]
@@ -401,7 +412,8 @@ def measurement_noise(fitted: Fitted) -> dict[str, float]:
 
 def process_noise(fitted: Fitted) -> dict[str, Any]:
     """Return the floor's roughness and the kicks, with standard errors. Kicks are None if they are not estimated."""
-    noise, kicks = fitted.noise, fitted.data.kicks
+    noise = fitted.noise
+    kicks = fitted.data.kicks
     reason = "" if kicks else "only lengths or angles tell kicks from a rough floor, and only with the rigid model"
     return {
         "roughness_m": noise.roughness_m,
@@ -418,7 +430,8 @@ def error_of_noise(fitted: Fitted, name: str) -> float | None:
     """Return the standard error of a disturbance from the curvature of the restricted likelihood, or None if the
     disturbance is zero.
     """
-    h, value = 1e-2, getattr(fitted.noise, name)
+    h = 1e-2
+    value = getattr(fitted.noise, name)
     if value == 0.0:
         return None
     logs = evaluate(fitted.rows, fitted.noise._replace(**{name: value * np.exp([-h, 0.0, h])})).restricted
@@ -438,7 +451,8 @@ def rms_residuals(fitted: Fitted) -> dict[str, float]:
 def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
     """Tabulate measured steps, predicted steps on even ground, and the standard deviation of their difference."""
     forecast = fitted.forecast
-    steps, variance = forecast.measured.count, fitted.noise.measurement[forecast.quantity] ** 2
+    steps = forecast.measured.count
+    variance = fitted.noise.measurement[forecast.quantity] ** 2
     total = np.sqrt(variance + ((fitted.data.G * fitted.data.spread(fitted.noise)) ** 2).sum(axis=1))
     return tuple(
         StepTable(name, values, fitted.predicted.values[first : first + steps], total[first : first + steps])
@@ -474,7 +488,8 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
     centre = quantities(0.0 * fitted.u)
     if centre is None:
         return {}
-    slopes, names = np.zeros((forecast.scales.size, centre.size)), GAIT_NAMES[: centre.size]
+    slopes = np.zeros((forecast.scales.size, centre.size))
+    names = GAIT_NAMES[: centre.size]
     for place, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
         # for measured steps, the derivatives of the walk take the same step, so these walkers are cached
         slope = derivative(lambda share, unit=unit: quantities(share * unit), EXACT_STEP)  # type: ignore[misc]

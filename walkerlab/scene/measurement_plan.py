@@ -38,7 +38,8 @@ STEP_MEASUREMENTS: Final = {
 }
 ANGLES: Final = "angles over time"
 SHORTER_WALK: Final = "Plan a shorter walk (plan.max_steps), or one that starts nearer to the gait (plan.start_change)."
-AT_GAIT, OFF_GAIT = "at the gait", "off the gait"
+AT_GAIT = "at the gait"
+OFF_GAIT = "off the gait"
 CURVE: Final = (2, 3, 5, 7, 10, 14, 20, 30, 50, 70, 100, 150, 200, 300, 500)
 """Numbers of steps at which errors are listed."""
 
@@ -94,7 +95,8 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     Raises NoAnswer if the walk ends early.
     """
     family = ConfigFamily(subject.config, question.keys)
-    walks, level = step_map_of(subject, family), np.zeros(plan.max_steps + 2)
+    walks = step_map_of(subject, family)
+    level = np.zeros(plan.max_steps + 2)
     walk = walks.disturbed(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
         raise NoAnswer(
@@ -143,7 +145,8 @@ def expected_errors(
 ) -> Errors:
     """Return the errors that remain after the `measured` quantities of the first steps, and what remains open."""
     noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
-    data, quantities = walk.data, walk.forecast.quantities
+    data = walk.data
+    quantities = walk.forecast.quantities
     rows = np.isin(data.quantity, [quantities.index(name) for name in measured]) & (walk.step < steps)
     seen = replace(data, residuals=data.residuals[rows], J=data.J[rows], G=data.G[rows], quantity=data.quantity[rows])
     deviations = Noise(np.array([noise[name] for name in quantities]), plan.roughness_m)

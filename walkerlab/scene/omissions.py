@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from walkerlab.config.walkers import Walker
 
 # Reasons why a figure or page drawn early lacks a result.
-STILL_COMPUTED, STOPPED = "still being computed", "the command was stopped"
+STILL_COMPUTED = "still being computed"
+STOPPED = "the command was stopped"
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
         omissions.append(omission("tangential velocity and friction force", "contact.friction is none", saved))
     if contact is not None and contact.stance == "pinned":
         angles = count_step_angles(config.walker)
-        what, why = "floating base and stance contact in the first step", "contact.stance is pinned"
+        what = "floating base and stance contact in the first step"
+        why = "contact.stance is pinned"
         saved = f"4 of {2 * angles + 4} equations and both force laws in that step"
         omissions.append(omission(what, f"{why}: {angles} angles suffice", saved))
     if config.walker.foot_radius_m == 0.0:
@@ -85,7 +87,8 @@ def leg_omissions(config: RigidConfig) -> Iterator[Entry]:
 def output_omissions(outputs: tuple[Output, ...], model: str, numbers: Mapping[Output, int]) -> Iterator[Entry]:
     for output, count in numbers.items():
         if output not in outputs:
-            what, why = f"{output} of the {model} walk in time", f"{output} are not in `outputs`"
+            what = f"{output} of the {model} walk in time"
+            why = f"{output} are not in `outputs`"
             yield omission(what, why, f"{count} of {sum(numbers.values())} values per sample")
     if not outputs:
         yield omission(f"samples of the {model} walk", "`outputs` is empty", "all states during steps")

@@ -18,7 +18,8 @@ from walkerlab.errors import ConfigError
 R = TypeVar("R")
 Key = tuple[int | str, ...]
 SECOND_LEG = "leg_2"
-SLOPE_DEG, SLOPE_RAD = "slope_deg", "slope_rad"
+SLOPE_DEG = "slope_deg"
+SLOPE_RAD = "slope_rad"
 # Top-level config keys that models depend on.
 MODEL_KEYS = tuple(keys_of(ContactConfig))
 
@@ -155,7 +156,8 @@ def why_no_parameter(
     if "number" not in type_words(own[key].annotation):
         return "is not a number"
     for depth in range(1, len(path) + 1):
-        value, block = value_of(config, tuple(path[:depth])), ".".join(path[:depth])
+        value = value_of(config, tuple(path[:depth]))
+        block = ".".join(path[:depth])
         if value is None:
             return f"cannot be used: the config has no block {block}; add it first"
         if isinstance(value, tuple):

@@ -25,7 +25,8 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
     Raises ConfigError for inconsistent parts.
     """
-    parts, other = legs_of(walker, rigid), second_of(walker)
+    parts = legs_of(walker, rigid)
+    other = second_of(walker)
     parts = parts if other is walker else with_second_leg(parts, legs_of(other, rigid))
     torso = walker.torso
     return parts if torso is None else add_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
@@ -41,7 +42,8 @@ def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, *centre, walker.leg_inertia_kg_m2)
         return straight_legs(leg, hip_mass(walker, rigid), Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
     if isinstance(walker, Kneed):
-        upper, lower = walker.thigh, walker.shank
+        upper = walker.thigh
+        lower = walker.shank
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
         shank = Limb(lower.length_m, lower.mass_kg, lower.mass_below_knee_m, lower.mass_ahead_m, lower.inertia_kg_m2)
         return kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))

@@ -53,7 +53,8 @@ class RigidScene:
         step_length: float | None = None,
     ) -> RigidWalkResult:
         """Simulate up to `steps` steps from a state (2 n). `sampled` records the requested outputs, see `take_walk`."""
-        heights, sampled = foothold_heights(self.ground, steps), sampled and bool(self.outputs)
+        heights = foothold_heights(self.ground, steps)
+        sampled = sampled and bool(self.outputs)
         return take_walk(self.walker, tolerances, start, steps, sampled, advance, heights, step_length)
 
 

@@ -11,7 +11,8 @@ from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import ContactScene, start_state
 
 # away from boundaries between outcomes, these tolerances give the same map as the config's (docs/adjustment.md)
-MAP_RTOL, MAP_ATOL = 1e-4, 1e-6
+MAP_RTOL = 1e-4
+MAP_ATOL = 1e-6
 LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
 
 

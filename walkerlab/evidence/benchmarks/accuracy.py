@@ -32,7 +32,9 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.rigid import rigid_walker
 
 ERROR_LEVELS = (1e-3, 1e-6, 1e-9)
-RIGID_TRIAL_STEPS, CONTACT_STEPS, NEAR_RIGID_STEPS = 10, 10, 4
+RIGID_TRIAL_STEPS = 10
+CONTACT_STEPS = 10
+NEAR_RIGID_STEPS = 4
 SLOW_CONTACT_STEPS = 4  # steps of walkers other than the compass; their right-hand sides take several times as long
 OMISSION_OFF_COMPASS = {
     "what": "accuracy of the scene contact-near-rigid",

@@ -8,7 +8,8 @@ from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import contact_scene, start_state
 
 # near-rigid contact: factors on stiffness and damping, and on creep velocities
-STIFFNESS_FACTOR, CREEP_FACTOR = 100.0, 0.01
+STIFFNESS_FACTOR = 100.0
+CREEP_FACTOR = 0.01
 
 
 def contact_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
@@ -20,6 +21,7 @@ def contact_trial(config: ContactConfig, state: State, length_m: float, steps: i
 def stiff_ground_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
     """Set up a walk that is harder to integrate: on much stiffer ground with less creep."""
     trial = contact_trial(config, state, length_m, steps)
-    law, friction = trial.walker.normal, trial.walker.friction.with_creep(CREEP_FACTOR)
+    law = trial.walker.normal
+    friction = trial.walker.friction.with_creep(CREEP_FACTOR)
     normal = law._replace(stiffness=STIFFNESS_FACTOR * law.stiffness, damping=STIFFNESS_FACTOR * law.damping)
     return replace(trial, walker=trial.walker._replace(normal=normal, friction=friction), name="contact-near-rigid")

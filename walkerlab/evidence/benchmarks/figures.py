@@ -21,7 +21,8 @@ from walkerlab.views.figures.walks import Array
 if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
 
-DASHED, DOTTED = (0.0, (3.2, 1.4)), (0.0, (1.0, 1.2))
+DASHED = (0.0, (3.2, 1.4))
+DOTTED = (0.0, (1.0, 1.2))
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ def method_series(scene: str, results: Results) -> Iterator[Series]:
 
 def draw_methods(scene: str, results: Results) -> Drawn:
     """Plot error over run time (left) and over right-hand sides (right), with crosses for failed runs."""
-    all_series, summary = list(method_series(scene, results)), results["accuracy"].summary
+    all_series = list(method_series(scene, results))
+    summary = results["accuracy"].summary
     reference = summary["reference"][scene]
     # difference between the reference and a second one: smaller errors mean nothing
     floor = max(float(reference["agreement"]), MIN_FLOOR)
@@ -95,7 +97,9 @@ def draw_methods(scene: str, results: Results) -> Drawn:
         axes.set_xlabel(label)
         axes.axhspan(MIN_FLOOR, floor, color=PALE, zorder=0)
         for series in all_series:
-            reached, cost, order = series.runs["reached"] != 0, series.runs[name].astype(float), series.look.order
+            reached = series.runs["reached"] != 0
+            cost = series.runs[name].astype(float)
+            order = series.look.order
             axes.plot(cost[reached], np.maximum(series.runs["error"][reached], floor), **series.line, zorder=order)
             cross: dict[str, Any] = {"color": series.look.colour, "linestyle": "none", "marker": "x", "markersize": 5.0}
             axes.plot(cost[~reached], np.full(np.count_nonzero(~reached), failed), **cross, zorder=order)
@@ -122,7 +126,8 @@ def legend_entries(all_series: Sequence[Series], floor: float) -> list[Line2D]:
     return [*legend, entry(f"reference uncertainty {floor:.0e}", color=PALE, linewidth=6.0)]
 
 
-ENGINES_STAGE, ENGINE_RUNS = "engines", "rows"
+ENGINES_STAGE = "engines"
+ENGINE_RUNS = "rows"
 SERIES_VARIABLES = ("step_s", "error", "wall_s", "period_s", "outcome")
 ENGINE_VARIABLES = ("scene", "engine", "experiment", "integrator", "start", *SERIES_VARIABLES)
 COLOURS = {OURS: BLACK, "mujoco": VERMILLION, "drake": BLUE, "exudyn": GREEN}
@@ -133,13 +138,15 @@ SERIES_DASHES: tuple[LineStyleType, ...] = ("-", DASHED, DOTTED, (0.0, (5.0, 1.2
 def engine_series(scene: str, experiment: str, results: Results) -> Iterator[Series]:
     """Yield an experiment's series of runs from the gait. Each engine's first series has filled markers."""
     rows = results[ENGINES_STAGE].groups[ENGINE_RUNS]
-    engines, names = rows["engine"].astype(str), rows["integrator"].astype(str)
+    engines = rows["engine"].astype(str)
+    names = rows["integrator"].astype(str)
     selected = (rows["scene"] == scene) & (rows["experiment"] == experiment)
     places: dict[str, int] = {}
     for engine, name in dict.fromkeys(zip(engines[selected].tolist(), names[selected].tolist(), strict=True)):
         rows_of_series = selected & (engines == engine) & (names == name) & (rows["start"] == 1.0)
         place = places[engine] = places.get(engine, -1) + 1
-        style, marker = SERIES_DASHES[place % len(SERIES_DASHES)], MARKERS[place % len(MARKERS)]
+        style = SERIES_DASHES[place % len(SERIES_DASHES)]
+        marker = MARKERS[place % len(MARKERS)]
         look = Look(f"{engine} {name}", COLOURS.get(engine, GREY), style, 1.8 if engine == OURS else 1.1, marker)
         runs = {variable: rows[variable][rows_of_series] for variable in SERIES_VARIABLES}
         yield Series(look, runs, place == 0, engine)
@@ -175,8 +182,10 @@ def draw_engine(axes: Axes, series: Series, cost: str, values: Array) -> None:
 def draw_periods(scene: str, results: Results) -> Drawn:
     """Plot the last period over step size on engines' own contact, with lines for ADAMS's law and the rigid gait."""
     figure, axes = panels(4.2)
-    all_series, summary = list(engine_series(scene, OWN_LAW, results)), results[ENGINES_STAGE].summary
-    engines, reference = [series for series in all_series if series.engine != OURS], summary["reference"][scene]
+    all_series = list(engine_series(scene, OWN_LAW, results))
+    summary = results[ENGINES_STAGE].summary
+    engines = [series for series in all_series if series.engine != OURS]
+    reference = summary["reference"][scene]
     for series in engines:
         draw_engine(axes, series, "step_s", np.where(series.completed, series.runs["period_s"], np.nan))
     levels = [axes.axhline(reference["period_s"], color=CONTACT.colour, linewidth=1.6, label="ADAMS's law")]

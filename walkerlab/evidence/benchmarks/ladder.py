@@ -24,7 +24,8 @@ RUN_BUDGET = 200_000  # limit of a compiled run, which ends hopeless runs
 LIBRARY_RUN_BUDGET = 20_000  # limit of a library's run
 LAST_RUN_SIZE = 12_000  # size of a library's run after which its ladder ends
 WARM_UP_BUDGET = 2_000  # enough to compile and load everything
-MAX_REPEATS, REPEAT_TIME_S = 7, 0.2
+MAX_REPEATS = 7
+REPEAT_TIME_S = 0.2
 OWN_LADDER = tuple(10.0**-digits for digits in range(3, 13))
 LIBRARY_LADDER = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 OUTCOMES = tuple(outcome.label for outcome in Outcome)
@@ -92,9 +93,13 @@ def unit_name(*parts: object) -> str:
 
 def ascend(trial: Trial, method: str, checkpoint: Checkpoint) -> Ascent:
     """Run a method at tighter and tighter tolerances until a run is too expensive. Resume runs of the checkpoint."""
-    ladder, budget, last = OWN_LADDER, RUN_BUDGET, RUN_BUDGET
+    ladder = OWN_LADDER
+    budget = RUN_BUDGET
+    last = RUN_BUDGET
     if method not in METHODS or not METHODS[method].compiled:
-        ladder, budget, last = LIBRARY_LADDER, LIBRARY_RUN_BUDGET, LAST_RUN_SIZE
+        ladder = LIBRARY_LADDER
+        budget = LIBRARY_RUN_BUDGET
+        last = LAST_RUN_SIZE
     trial.prepare(method, ladder[0], WARM_UP_BUDGET)()
     runs: list[MethodRun] = []
     for tolerance in ladder:
@@ -125,7 +130,8 @@ def time_walk(walk: Callable[[], TrialRun]) -> tuple[float, TrialRun]:
 
 
 def make_row(ascent: Ascent, run: MethodRun, reference: Reference) -> MethodRow:
-    end, result = reference.reference_for(ascent.method), run.result
+    end = reference.reference_for(ascent.method)
+    result = run.result
     error = float(np.max(np.abs(result.state - end.state))) if result.state.size else None
     below_agreement = error is not None and error <= reference.agreement
     return MethodRow(

@@ -43,8 +43,11 @@ def integrators(walker: RigidWalker) -> tuple[Any, Any]:
 
     th1, th2, w1, w2 = hy.make_vars("th1", "th2", "w1", "w2")
     L, a, m, M = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
-    b, g, inertia = L - a, walker.gravity, walker.leg_inertia
-    d11, d22 = m * b * b + inertia, M * L * L + m * (L * L + a * a) + inertia
+    b = L - a
+    g = walker.gravity
+    inertia = walker.leg_inertia
+    d11 = m * b * b + inertia
+    d22 = M * L * L + m * (L * L + a * a) + inertia
     d12 = -m * L * b * hy.cos(th2 - th1)
     r1 = -m * L * b * w2 * w2 * hy.sin(th2 - th1) - m * g * b * hy.sin(th1)
     r2 = -walker.c21_sign * m * L * b * w1 * w1 * hy.sin(th2 - th1) + (M * L + m * (a + L)) * g * hy.sin(th2)
@@ -55,7 +58,8 @@ def integrators(walker: RigidWalker) -> tuple[Any, Any]:
         (w1, (d22 * r1 - d12 * r2) / determinant),
         (w2, (d11 * r2 - d12 * r1) / determinant),
     ]
-    upward, downward = hy.event_direction.positive, hy.event_direction.negative
+    upward = hy.event_direction.positive
+    downward = hy.event_direction.negative
     passing = hy.t_event(th1 - th2, direction=upward)
     striking = hy.t_event(th1 + th2 + 2.0 * walker.slope, direction=downward)
     return tuple(hy.taylor_adaptive(equations, [0.0] * 4, t_events=[event]) for event in (passing, striking))

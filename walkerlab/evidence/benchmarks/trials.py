@@ -65,10 +65,12 @@ class RigidTrial:
                 return TrialRun(ended.label, np.zeros(0) if state is None else state, evaluations, 0, 0)
 
             return as_a_script
-        n, entry = len(self.walker.zero_state), METHODS[method]
+        n = len(self.walker.zero_state)
+        entry = METHODS[method]
         solver = entry.new(n, rtol, atol, budget)
         finder = finder_for(solver, RIGID_EVENTS, n)
-        walker, observer = models_in_turn(self.walker), unwatched()
+        walker = models_in_turn(self.walker)
+        observer = unwatched()
         strikes = new_heel_strikes(self.steps, n, self.walker.kneed)
         stride = walk if entry.compiled else uncompiled(walk)
 

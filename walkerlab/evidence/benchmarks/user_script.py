@@ -31,7 +31,9 @@ def walk_as_a_script(
     from scipy.integrate import solve_ivp
 
     L, a, m, M = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
-    b, g, slope = L - a, walker.gravity, walker.slope
+    b = L - a
+    g = walker.gravity
+    slope = walker.slope
     used = 0
 
     def right_hand_side(_t: float, x: Floats) -> Floats:
@@ -40,7 +42,8 @@ def walk_as_a_script(
         if used > budget:
             raise ScriptBudgetError
         th1, th2, w1, w2 = x
-        sine, cosine = np.sin(th2 - th1), np.cos(th2 - th1)
+        sine = np.sin(th2 - th1)
+        cosine = np.cos(th2 - th1)
         D = np.array([[m * b**2, -m * L * b * cosine], [-m * L * b * cosine, M * L**2 + m * (L**2 + a**2)]])
         D += walker.leg_inertia * np.eye(2)
         C = np.array([[0.0, m * L * b * w2 * sine], [walker.c21_sign * m * L * b * w1 * sine, 0.0]])
@@ -51,7 +54,8 @@ def walk_as_a_script(
         return float(x[0] + x[1] + 2.0 * slope) if x[0] > x[1] else 1.0
 
     event: Any = heel_strike
-    event.terminal, event.direction = True, -1.0
+    event.terminal = True
+    event.direction = -1.0
     state = np.array(start)
     limit = 10.0 * np.sqrt(L / g)
     try:

@@ -45,7 +45,8 @@ SAME_GAIT: Final = 1e-6
 CHOSEN: Final = "chosen"
 PREFERENCE: Final = 0.5  # factor on the distance of the gait that `fixedpoint` chooses
 SMALL_VALUE: Final = 1e-3  # of a printed value, below which differences count absolutely
-EXPLAINED, UNEXPLAINED = "explained", "different, unexplained"
+EXPLAINED = "explained"
+UNEXPLAINED = "different, unexplained"
 OF_GAITS: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
     "energy_J", "energy_drift_J", "cost_of_transport", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m",
@@ -61,7 +62,8 @@ OF_WALKS: Final = {
     "step_lengths_m": "step_length_m",
 }
 """Values of `simulate` that may be printed, with those of the gait that they repeat."""
-RATES, ANGLES = "rate", "angle"
+RATES = "rate"
+ANGLES = "angle"
 
 
 def refuse_unknown(config: CheckConfig) -> None:
@@ -145,9 +147,11 @@ class Checked:
 
     def rounding(self, name: str, known: Floats) -> Floats:
         """Return how much the numbers of a state change if each printed one changes by a unit of its last digit."""
-        convention, items = self.conventions[name], [item for item in self.items if item.quantity == name]
+        convention = self.conventions[name]
+        items = [item for item in self.items if item.quantity == name]
         numbers = np.array([item.printed.value.real for item in items])
-        state, total = convention.read(self.walker, numbers.tolist(), known), np.zeros(len(known))
+        state = convention.read(self.walker, numbers.tolist(), known)
+        total = np.zeros(len(known))
         for place, item in enumerate(items):
             moved = numbers.copy()
             moved[place] += item.unit
@@ -321,7 +325,8 @@ def finding_of(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explana
 
 def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
     """Return how far the printed state is from periodic, or None if no state is printed or it does not step."""
-    walker, right = checked.walker, question.right
+    walker = checked.walker
+    right = question.right
     state = question.state if checked.has_both_legs else None
     if state is None or right.derivative is None:
         return None
@@ -329,12 +334,14 @@ def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
     step = None if start is None else walker.step(start)
     if start is None or step is None:
         return {"residual": None, "digits": 0, "is_periodic": False}
-    unit, known = scales(walker, len(start)), full_state(right.start, walker.kneed)
+    unit = scales(walker, len(start))
+    known = full_state(right.start, walker.kneed)
     residual = np.abs(step.after - start)
     # what rounding of the printed state alone leaves, of a state just after a strike
     rounding = coordinates_of(walker, checked.rounding("state", known))
     left = np.abs(right.derivative - np.eye(len(start))) @ rounding + EXACT_ERROR * unit
-    largest, before = float((residual / unit).max()), float((np.abs(start - right.start) / unit).max())
+    largest = float((residual / unit).max())
+    before = float((np.abs(start - right.start) / unit).max())
     answer = {
         "residual": largest,
         "unit": "rad, rad/s times sqrt(L/g)",
@@ -355,12 +362,14 @@ def momenta(checked: Checked) -> list[dict[str, Any]]:
     """Return the balances of angular momentum over the heel strike before the printed state."""
     if checked.right is None or checked.convention.instant != "after-strike" or not checked.has_both_legs:
         return []
-    walker, right = checked.walker, checked.right
+    walker = checked.walker
+    right = checked.right
     known = full_state(right.start, walker.kneed)
     state = checked.printed_state("state", known)
     if state is None:
         return []
-    start, rounding = coordinates_of(walker, state), coordinates_of(walker, checked.rounding("state", known))
+    start = coordinates_of(walker, state)
+    rounding = coordinates_of(walker, checked.rounding("state", known))
     known = full_state(right.step.before, walker.kneed)
     printed = checked.printed_state("state_before", known)
     if printed is None:
@@ -393,7 +402,8 @@ def energy_drift(checked: Checked) -> dict[str, Any]:
     """Return the change of energy (J) from the printed state just after a strike to the one before the next."""
     if checked.right is None or checked.convention.instant != "after-strike" or checked.walker.kneed:
         return {}
-    right, walker = checked.right, checked.walker
+    right = checked.right
+    walker = checked.walker
     start = checked.printed_state("state", right.start)
     end = checked.printed_state("state_before", right.step.before)
     if start is None or end is None:

@@ -42,7 +42,8 @@ def check(
         numbers = ", ".join(f"'{number}'" for number in SEPARATORS.split(state) if number)
         settings = (*settings, f"check.printed.state=[{numbers}]")
     single = len(paths) == 1 and bool(paths[0].suffix or request.config)
-    answers, errors = [], []
+    answers = []
+    errors = []
     for path in configs_in(paths):
         try:
             answers.append(answer_to(path, settings, request))

@@ -72,9 +72,11 @@ class Convention:
 
     def read(self, walker: PlainWalker, numbers: Sequence[float], known: Floats) -> Floats:
         """Return the state that printed numbers describe. Bodies that are not printed are as in the state `known`."""
-        n, count = len(known) // 2, len(self.order)
+        n = len(known) // 2
+        count = len(self.order)
         table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))
-        K, tilt = self.rows(n), walker.slope if self.origin == "vertical" else 0.0
+        K = self.rows(n)
+        tilt = walker.slope if self.origin == "vertical" else 0.0
         free = [body for body in range(n) if not K[:, body].any()]
         square = np.vstack((K, np.eye(n)[free]))
         state = known.copy()

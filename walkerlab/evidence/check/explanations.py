@@ -84,7 +84,8 @@ class Question:
         reproduced = self.reproduced(attempt.gait)
         others = [item for item in self.items if item not in reproduced]
         states = len(reproduced) >= FEW and not any(item.quantity.startswith("state") for item in others)
-        kind, what = attempt.candidate.kind, attempt.candidate.what
+        kind = attempt.candidate.kind
+        what = attempt.candidate.what
         return self.explanation(kind, what, reproduced) if not others or states else None
 
     @cached_property
@@ -173,7 +174,8 @@ def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] |
     miss, attempt = min(((question.miss(each.gait), each) for each in attempts), default=(math.inf, None), key=first)
     if attempt is None or miss * MUCH_CLOSER > without:
         return None
-    kind, what = attempt.candidate.kind, attempt.candidate.what
+    kind = attempt.candidate.kind
+    what = attempt.candidate.what
     return {"kind": kind, "what": what, "miss_in_units": miss, "without_in_units": without}
 
 
@@ -223,7 +225,9 @@ def fitted_size(question: Question, family: MistakeFamily) -> float | None:
     """Return the size of a mistake that brings its gait closest to the printed values, or None if none does."""
     low, high = LIMITS[family.unit]
     without = misses(question, question.guess(family.of_size(0.0), EXACT))
-    size, best, left = family.first, 0.0, without
+    size = family.first
+    best = 0.0
+    left = without
     for _ in range(FITTING_ROUNDS):
         there = misses(question, question.guess(family.of_size(size), EXACT))
         if without is None or there is None:
@@ -319,7 +323,8 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     right = values[wrong[0].name] if len(wrong) == 1 < len(items) else None
     if right is None:
         return
-    item, name = wrong[0], wrong[0].name.replace("_", " ").replace(".", ", ")
+    item = wrong[0]
+    name = wrong[0].name.replace("_", " ").replace(".", ", ")
     printed = item.printed.real.value
     reproduced = [each for each in question.items if each in question.right_items or each is item]
     if item.fits(-right):

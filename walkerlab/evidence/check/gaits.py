@@ -20,7 +20,8 @@ from walkerlab.evidence.check.plain_walker import (
 )
 
 DIFFERENCE = 1e-6  # rad, and rad/s times sqrt(L/g)
-MAX_MOVES, SMALLEST_MOVE = 16, 1e-13
+MAX_MOVES = 16
+SMALLEST_MOVE = 1e-13
 ROUNDED = 1e-11  # residual that rounding may leave
 SLOW = 0.1  # ratio of two errors above which the derivative is computed anew
 
@@ -38,19 +39,26 @@ def plain_walker(config: RigidConfig) -> PlainWalker:
     """Build the plain model of a config's walker."""
     walker = config.walker
     assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
-    radius, ahead, knee, free = walker.foot_radius_m, getattr(walker, "foot_centre_ahead_m", 0.0), 0j, False
+    radius = walker.foot_radius_m
+    ahead = getattr(walker, "foot_centre_ahead_m", 0.0)
+    knee = 0j
+    free = False
     if isinstance(walker, CompassWalker):
         # the compass rolls on its ball feet in the contact model only
-        radius, centre = 0.0, -1j * walker.mass_to_hip_m
+        radius = 0.0
+        centre = -1j * walker.mass_to_hip_m
         parts: tuple[LegPart, ...] = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
     elif isinstance(walker, StraightLegs):
         centre = walker.leg_mass_ahead_m - 1j * walker.leg_mass_below_hip_m
         parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
     else:
-        thigh, shank, knee = walker.thigh, walker.shank, -1j * walker.thigh.length_m
+        thigh = walker.thigh
+        shank = walker.shank
+        knee = -1j * walker.thigh.length_m
         upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
         lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
-        parts, free = (upper, lower), walker.knee.at_heel_strike == "free"
+        parts = (upper, lower)
+        free = walker.knee.at_heel_strike == "free"
     torso = walker.torso
     return PlainWalker(
         parts=parts,
@@ -75,7 +83,8 @@ def scales(walker: PlainWalker, size: int) -> Floats:
 
 def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
     """Return the derivative of the step map at a start by central differences, or None where a step fails."""
-    columns, moves = [], DIFFERENCE * scales(walker, len(start))
+    columns = []
+    moves = DIFFERENCE * scales(walker, len(start))
     for k, move in enumerate(moves):
         ends = []
         for sign in (1.0, -1.0):
@@ -93,7 +102,8 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tu
 
     A  derivative of a similar walker's step map, to begin with
     """
-    unit, identity = scales(walker, len(start)), np.eye(len(start))
+    unit = scales(walker, len(start))
+    identity = np.eye(len(start))
     x, last, is_own = np.array(start, float), math.inf, False  # whether A is this walker's own derivative
     old = error = x
     move = np.zeros(len(x))
@@ -104,7 +114,9 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tu
             break
         if step is not None and size < last:
             slow = size > SLOW * last
-            last, old, error = size, x, step.after - x
+            last = size
+            old = x
+            error = step.after - x
         elif last == math.inf:
             return None
         elif last < ROUNDED:
@@ -117,7 +129,8 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tu
             if not slow:
                 continue
         if A is None or slow:
-            A, is_own = derivative(walker, old, 1e-10), True
+            A = derivative(walker, old, 1e-10)
+            is_own = True
             if A is None:
                 return None
         move = np.linalg.solve(A - identity, error)

@@ -14,7 +14,8 @@ from walkerlab.evidence.check.conventions import GRAVITIES
 from walkerlab.evidence.check.gaits import plain_walker
 from walkerlab.evidence.check.plain_walker import PlainWalker
 
-SLOPE, GRAVITY = "slope_rad", "gravity_m_s2"
+SLOPE = "slope_rad"
+GRAVITY = "gravity_m_s2"
 UNIT = re.compile(r"_(m|kg|kg_m2|rad|m_s2)$")
 
 
@@ -103,6 +104,7 @@ def transposed(value: float) -> Iterator[float]:
     """Yield the values that two neighbouring digits exchanged make of a number."""
     text = short_number(value)
     for place in range(len(text) - 1):
-        first, second = text[place], text[place + 1]
+        first = text[place]
+        second = text[place + 1]
         if first.isdigit() and second.isdigit() and first != second:
             yield float(text[:place] + second + first + text[place + 2 :])

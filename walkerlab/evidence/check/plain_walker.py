@@ -26,13 +26,16 @@ from scipy.optimize import brentq
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Event = Callable[[Floats], float]
-SWING, STANCE, SHANK = 0, 1, 2
+SWING = 0
+STANCE = 1
+SHANK = 2
 EXACT, QUICK = 1e-12, 1e-9  # relative tolerances of gaits and of first looks
 LONGEST_SWING = 12.0  # sqrt(L/g)
 MAX_EULER_STEPS = 400_000
 LARGEST_STEP = 0.1  # sqrt(L/g)
 LOCATING_ROUNDS, TINY = 2, 1e-7  # s
-STRAIGHT, BENT = "straight", "bent"
+STRAIGHT = "straight"
+BENT = "bent"
 """Phases of a swing: with a straight leg, and with a free knee."""
 
 
@@ -147,7 +150,8 @@ class PlainWalker:
         return {phase: self.sums(phase) for phase in (STRAIGHT, BENT)}
 
     def sums(self, phase: str) -> Phase:
-        levers, inertias = self._levers, self.inertias
+        levers = self._levers
+        inertias = self.inertias
         moments = (levers.conj().T * self.masses) @ levers
         signs = [[self.signs.get((phase, k, l), 1.0) for l in range(self.bodies)] for k in range(self.bodies)]
         first = self.masses @ levers
@@ -163,11 +167,14 @@ class PlainWalker:
         """Return the derivative of a state by Lagrange's equations."""
         sums = self.phases[phase]
         Z, R = sums.reduction, self.radius
-        n, bodies = Z.shape[1], range(self.bodies)
-        angles, omega = (Z @ state[:n]).tolist(), (Z @ state[n:]).tolist()
+        n = Z.shape[1]
+        bodies = range(self.bodies)
+        angles = (Z @ state[:n]).tolist()
+        omega = (Z @ state[n:]).tolist()
         turns = [cmath.exp(1j * angle) for angle in angles]
         # velocity of all masses per unit rate: i lever turn, and -R for the stance leg, on which the foot rolls
-        M, forces = [[0.0] * self.bodies for _ in bodies], [0.0] * self.bodies
+        M = [[0.0] * self.bodies for _ in bodies]
+        forces = [0.0] * self.bodies
         for k in bodies:
             back = turns[k].conjugate()
             for l in bodies:
@@ -188,7 +195,8 @@ class PlainWalker:
         forces[SWING] += twist
         forces[STANCE] -= twist
         if n < self.bodies:
-            M, forces = (Z.T @ M @ Z).tolist(), (Z.T @ forces).tolist()
+            M = (Z.T @ M @ Z).tolist()
+            forces = (Z.T @ forces).tolist()
         return np.array([*state[n:].tolist(), *eliminate(M, forces)])
 
     @cached_property
@@ -216,7 +224,8 @@ class PlainWalker:
         """Return kinetic plus potential energy (J). Heights are from where an upright stance leg touches the slope."""
         Z = self.reduction(phase)
         n = Z.shape[1]
-        angles, omega = Z @ state[:n], Z @ state[n:]
+        angles = Z @ state[:n]
+        omega = Z @ state[n:]
         velocities = self.motions(angles, self._levers, self.radius) @ omega
         rolled = 1j * self.radius - self.radius * angles[STANCE]
         places = self._levers @ np.exp(1j * angles) + rolled
@@ -234,15 +243,18 @@ class PlainWalker:
         before  state just before it, swing leg straight
         """
         phase = BENT if self.free_at_strike else STRAIGHT
-        Z, legs = self.reduction(phase), len(self.parts)
+        Z = self.reduction(phase)
+        legs = len(self.parts)
         Z_before = self.reduction(STRAIGHT)
-        old_angles, old = Z_before @ before[:2], Z_before @ before[2:4]
+        old_angles = Z_before @ before[:2]
+        old = Z_before @ before[2:4]
         foot, radius = (self.foot, self.radius) if self.strike_foot is None else (self.strike_foot, 0.0)
         pivot = (foot, radius) if self.turned_on_it else (self.foot, self.radius)
         velocities = self.motions(old_angles, self.levers(pivot[0]), pivot[1]) @ old
         order = [*range(legs, 2 * legs), *range(legs), *range(2 * legs, len(velocities))]
         bodies = [STANCE, SWING, *([STANCE] if self.kneed else []), *([len(old) - 1] if self.torso else [])]
-        angles, omega = old_angles[bodies], old[bodies]
+        angles = old_angles[bodies]
+        omega = old[bodies]
         J = self.motions(angles, self.levers(foot), radius) @ Z
         weighted = J.conj().T * self.masses
         inertias = self.inertias.copy()
@@ -260,7 +272,8 @@ class PlainWalker:
         T[1, [SWING, *range(2, Z.shape[1])]] = 1.0
         if Z.shape[1] > 2:
             T[2, SHANK] = 1.0
-        M, momentum = T @ M, T @ momentum
+        M = T @ M
+        momentum = T @ momentum
         momentum[1] -= self.leg_inertia * float(np.dot(self.extra_inertia, omega[:2]))
         if self.keeps_trailing_rate:
             M[1], momentum[1] = 0.0, omega[SWING]
@@ -300,7 +313,8 @@ class PlainWalker:
             locked = self.swing(BENT, state, self.knee_bend, lambda _: True, tolerance)
             if locked is None:
                 return None
-            pieces, state = (locked,), self.after_knee_strike(locked.end)
+            pieces = (locked,)
+            state = self.after_knee_strike(locked.end)
         elif self.kneed:
             state = state[[SWING, STANCE, 3 + SWING, 3 + STANCE]]
         landed = self.swing(STRAIGHT, state, self.feet_apart, lambda end: self.swing_foot(end).real > 0.0, tolerance)
@@ -322,9 +336,11 @@ class PlainWalker:
             largest = LARGEST_STEP * self.pendulum_time
             return DOP853(rates, begin, state, end, max_step=largest, rtol=tolerance, atol=0.1 * tolerance * scale)
 
-        walk, before = solver(0.0, start, latest), event(start)
+        walk = solver(0.0, start, latest)
+        before = event(start)
         while walk.status == "running":
-            old_time, old = walk.t, walk.y
+            old_time = walk.t
+            old = walk.y
             walk.step()
             after = event(walk.y)
             if before > 0.0 >= after:
@@ -334,7 +350,8 @@ class PlainWalker:
                     while landing.status == "running":
                         landing.step()
                     # the interpolant has fewer digits than the integration
-                    state, slope = landing.y, event(landing.y + TINY * self.rates(phase, landing.y))
+                    state = landing.y
+                    slope = event(landing.y + TINY * self.rates(phase, landing.y))
                     time -= event(state) * TINY / (slope - event(state))
                 if counts(state):
                     return Piece(phase, start, time, state)
@@ -345,9 +362,12 @@ class PlainWalker:
         self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], latest: float
     ) -> Piece | None:
         """Integrate as `swing` does, by Euler's method with a fixed step."""
-        step, state, before = self.euler_step, start, event(start)
+        step = self.euler_step
+        state = start
+        before = event(start)
         for count in range(1, min(int(latest / step), MAX_EULER_STEPS)):
-            old, state = state, state + step * self.rates(phase, state)
+            old = state
+            state = state + step * self.rates(phase, state)
             after = event(state)
             if before > 0.0 >= after and counts(state):
                 share = before / (before - after) if self.interpolates else 1.0
@@ -357,7 +377,8 @@ class PlainWalker:
 
     def after_knee_strike(self, state: Floats) -> Floats:
         """Return the state with a straight leg just after the knee has locked."""
-        Z, Z_bent = self.reduction(STRAIGHT), self.reduction(BENT)
+        Z = self.reduction(STRAIGHT)
+        Z_bent = self.reduction(BENT)
         D = self.motions(Z_bent @ state[:3], self._levers, self.radius)
         M = (D.conj().T * self.masses @ D).real + np.diag(self.inertias)
         rates = np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ Z_bent @ state[3:])

@@ -9,7 +9,9 @@ from typing import Any, Final, NamedTuple
 
 from walkerlab.config.check import Digits, PrintedValue, parse_printed
 
-REPRODUCED, DIFFERENT, NOT_COMPARABLE = "reproduced", "different", "not-comparable"
+REPRODUCED = "reproduced"
+DIFFERENT = "different"
+NOT_COMPARABLE = "not-comparable"
 FEWEST_DIGITS = 3  # that must agree if not all do; also at least half of them
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
 """Numerical error of right values (relative to 1 or to the value) by quantity; of all others `EXACT_ERROR`."""
@@ -96,7 +98,9 @@ def judge(item: Item, right: complex | None, reason: str = "") -> Judgement:
     """Compare a printed value with the right one. `reason` says why there is none."""
     if right is None:
         return Judgement(NOT_COMPARABLE, 0, reason)
-    agreeing, total, units = item.agreement(right), item.digits, short(item.miss(right))
+    agreeing = item.agreement(right)
+    total = item.digits
+    units = short(item.miss(right))
     if item.printed.bounds is not None:
         if agreeing == total:
             return Judgement(REPRODUCED, agreeing, "within what is printed")
@@ -129,7 +133,8 @@ def items_of(printed: Mapping[str, Any], names: Mapping[str, Sequence[str]]) -> 
 
 def match_multipliers(items: Sequence[Item], right: Sequence[complex]) -> dict[str, complex | None]:
     """Return the right multiplier nearest to each printed one. Each serves once."""
-    left, matches = list(right), dict[str, complex | None]()
+    left = list(right)
+    matches = dict[str, complex | None]()
     for item in items:
         if not left:
             matches[item.name] = None

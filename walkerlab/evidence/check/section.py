@@ -59,7 +59,8 @@ def headline(summary: Row) -> str:
     """State in a sentence whether the printed gait is right and, if known, why not."""
     rows: Sequence[Row] = summary["values"]
     wrong = [row for row in rows if row["verdict"] == DIFFERENT]
-    explanations, finding = summary["explanations"], summary["finding"]
+    explanations = summary["explanations"]
+    finding = summary["finding"]
     if finding == NOT_COMPARABLE:
         return f"Nothing can be compared: {summary.get('reason') or 'the file prints no values'}."
     if finding == REPRODUCED:
@@ -91,7 +92,8 @@ def follow(explanation: Row, rows: Sequence[Row]) -> str:
 
 def remarks(summary: Row) -> Iterator[str]:
     """Yield sentences about explanations, periodicity, momenta, the nearest gait and the two routes."""
-    rows, explanations = summary["values"], summary["explanations"]
+    rows = summary["values"]
+    explanations = summary["explanations"]
     if explanations and not (summary["finding"] == EXPLAINED and len(explanations) == 1):
         for place, each in enumerate(explanations, 1):
             yield f"{place}. {each['kind'].capitalize()}: {follow(each, rows)} if {each['what']}."

@@ -56,7 +56,8 @@ class CheckedStep:
             return self.multipliers
         if name == "spectral_radius":
             return abs(self.multipliers[0]) if self.multipliers else None
-        step, speed = self.step, self.step.length / self.step.period
+        step = self.step
+        speed = self.step.length / self.step.period
         return {
             "period_s": step.period,
             "step_length_m": step.length,
@@ -68,7 +69,8 @@ class CheckedStep:
     def values(self, items: Sequence[Item], convention: Convention) -> dict[str, complex | None]:
         """Return the value of each printed number, in the printed conventions, or None where there is none."""
         values: dict[str, complex | None] = {}
-        factor, written = convention.rate_factor(self.walker), self.written(items, convention)
+        factor = convention.rate_factor(self.walker)
+        written = self.written(items, convention)
         for item in items:
             value = written[item.quantity] if item.quantity in written else self.quantity(item.quantity)
             if isinstance(value, list | tuple):
@@ -90,7 +92,8 @@ class CheckedStep:
 
     def written(self, items: Sequence[Item], convention: Convention) -> dict[str, list[float]]:
         """Return the numbers of the states that are printed, by quantity. Empty lists where there is no such state."""
-        written, instants = {}, {"state": convention.instant, "state_before": BEFORE}
+        written = {}
+        instants = {"state": convention.instant, "state_before": BEFORE}
         for name in instants.keys() & {item.quantity for item in items}:
             state = self.state(instants[name], convention.origin == "vertical")
             written[name] = [] if state is None else convention.write(self.walker, state)

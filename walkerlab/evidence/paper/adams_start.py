@@ -59,7 +59,9 @@ def adams_start(walker: RigidModel, state: State) -> AdamsStart:
     """Walk one step of the rigid model from `state`, the ADAMS start of Table 2."""
     walk = take_walk(walker, TIGHT, state, 1, sampled=True)
     assert walk.samples is not None
-    time, states, start = walk.samples.time_s, walk.samples.state, np.array([state])
+    time = walk.samples.time_s
+    states = walk.samples.state
+    start = np.array([state])
     end = float(time[-1])
     if walk.outcome is Outcome.FELL:  # the fall comes after the last sample, so extrapolate
         hip = np.cos(states[-FALLING:, 1] + walker.slope) - FALLEN_HIP
@@ -89,7 +91,8 @@ def adams_walk(
     rigid = adams_start(walker, (-2.0 * walker.slope - theta_2, theta_2, omega_1, omega_2))
     result = walk(rigid.state)
     assert result.samples is not None
-    time, normal = result.samples.time_s, sample_feet(contact, result.samples)[:, :, 2]
+    time = result.samples.time_s
+    normal = sample_feet(contact, result.samples)[:, :, 2]
     total = normal.sum(axis=1)
     airborne = time[(total <= 0.0) & (time > 0.0)]
     later = np.zeros(0) if rigid.pull_from is None else total[time >= rigid.pull_from]

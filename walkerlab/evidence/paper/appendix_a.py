@@ -46,7 +46,11 @@ class Swing(NamedTuple):
 
 
 def swing_constants(walker: RigidWalker) -> Swing:
-    L, a, m, M_H, J = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass, walker.leg_inertia
+    L = walker.leg_length
+    a = walker.foot_to_mass
+    m = walker.leg_mass
+    M_H = walker.hip_mass
+    J = walker.leg_inertia
     b = L - a
     return Swing(
         m * b * b + J, M_H * L * L + m * (L * L + a * a) + J, m * L * b, m * b, (L + a) * m + L * M_H, M_H + 2.0 * m

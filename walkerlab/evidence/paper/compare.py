@@ -86,7 +86,8 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
     if papers:
         groups, summary = compare_with_paper(config, inputs, motion, progress)
     else:
-        groups, summary = {}, models_compared(config, inputs)
+        groups = {}
+        summary = models_compared(config, inputs)
     progress.advance()
     recorded_groups, recorded = compare_recorded(inputs)
     for symbol, row in summary.get("table3", {}).items() if recorded else ():
@@ -104,7 +105,8 @@ def compare_with_paper(
     study = study_the_paper()
     progress.advance()
     measured = measure(config, inputs, motion)
-    judged_rows, paper_errata = tuple(paper_rows(measured, study)), errata(study)
+    judged_rows = tuple(paper_rows(measured, study))
+    paper_errata = errata(study)
     rows = [vars(row) for row in judged_rows]
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
@@ -149,7 +151,8 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
     models: dict[str, RigidMeasurements] = {
         name: measure_rigid_model(compass(config, name), as_state(gait["state"])) for name, gait in gaits.items()
     }
-    contact, model = measure_contact_model(config, inputs["contact-sim"]), models.get(config.equations)
+    contact = measure_contact_model(config, inputs["contact-sim"])
+    model = models.get(config.equations)
     start_moved = contact.start is not None and (
         model is None or bool(np.abs(np.subtract(contact.start, model.state)).max() > START_TOLERANCE)
     )
@@ -166,7 +169,8 @@ def measure(config: CompareConfig, inputs: Mapping[str, Content], motion: Compar
 
 def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasurements:
     """Measure the contact model's counterparts of the paper's ADAMS numbers."""
-    summary, pitch = walk.summary, float(walk.summary["pitch_m"])
+    summary = walk.summary
+    pitch = float(walk.summary["pitch_m"])
     lengths = np.array(summary["step_lengths_m"])
     stride = STEPS_PER_STRIDE * (lengths.size // STEPS_PER_STRIDE)
     angle = stored_variable(walk, "trajectory", "angle")
@@ -218,12 +222,14 @@ def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapp
     if names:
         variables["name"] = texts(list(names), "symbol of the row")
     for name in rows[0]:
-        values, meaning = [row[name] for row in rows], COLUMN_NAMES[name]
+        values = [row[name] for row in rows]
+        meaning = COLUMN_NAMES[name]
         if name in MODEL_NAMES:
             variables[f"{name}_text"] = texts(["" if x is None else f"{x:.10g}" for x in values], f"{meaning}, as text")
             rows_with_value = [row for row, value in enumerate(values) if value is not None]
             if rows_with_value:
-                dim, text = f"{name}_{ROW}", f"indices of the rows that have a value: {meaning}"
+                dim = f"{name}_{ROW}"
+                text = f"indices of the rows that have a value: {meaning}"
                 variables[dim] = Variable(np.array(rows_with_value), (dim,), "1", text)
                 numbers = np.array([values[row] for row in rows_with_value], float)
                 variables[name] = Variable(numbers, (dim,), unit, meaning)

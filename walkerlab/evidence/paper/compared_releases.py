@@ -57,7 +57,8 @@ def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dic
 
 def walk_report(scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     """Summarise a walk: outcome, last step, knee strike, and dissipation per step by channel."""
-    steps, lost = walk.steps, losses_by_channel(scene.walker, walk.dissipated_J)
+    steps = walk.steps
+    lost = losses_by_channel(scene.walker, walk.dissipated_J)
     return {
         "outcome": walk.outcome.label,
         "steps": steps,

@@ -80,11 +80,13 @@ def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:
         feet = f"the feet are 2 L sin((theta_2 - theta_1)/2) = {length:.4f} m apart ({source})"
         if column == "matlab" and are_disjoint(steps, STEP_LENGTH.rounding):
             yield STEP_LENGTH, f"{feet}, {length / STEP_LENGTH.value:.1f} times {STEP_LENGTH.text} m"
-        speed, cycle = getattr(V_COM, column), getattr(T_CYCLE, column)
+        speed = getattr(V_COM, column)
+        cycle = getattr(T_CYCLE, column)
         # one step per cycle, as in section 5, or both steps of the cycle
         low, high = steps[0] / cycle.rounding[1], 2.0 * steps[1] / cycle.rounding[0]
         if are_disjoint((low, high), speed.rounding):
-            one_step, two_steps = length / cycle.value, 2.0 * length / cycle.value
+            one_step = length / cycle.value
+            two_steps = 2.0 * length / cycle.value
             speeds = f"one step is {one_step:.3f} m/s and two are {two_steps:.3f} m/s"
             yield speed, f"{feet}: in {cycle.text} s {speeds}, not {speed.text} m/s"
 

@@ -23,7 +23,9 @@ UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not i
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
     """Describe the differences from the paper's scene. Slopes that agree within the rounding of x_p count as equal."""
-    walker, contact, paper = config.walker, config.contact, CompassWalker()
+    walker = config.walker
+    contact = config.contact
+    paper = CompassWalker()
     rigid: list[str] = []
     of_contact: list[str] = []
     if acting := acting_on(config):

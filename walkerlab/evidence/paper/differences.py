@@ -38,7 +38,8 @@ def motion_of(walk: Content) -> comparison.Motion | None:
     angle = stored_variable(walk, "trajectory", "angle")
     if angle is None or len(angle) < 2:
         return None
-    trajectory, strikes = walk["trajectory"], times_of_steps(walk, "knee_strike_time_s")
+    trajectory = walk["trajectory"]
+    strikes = times_of_steps(walk, "knee_strike_time_s")
     touches = times_of_steps(walk, "touch_time_s")
     motion = comparison.Motion(trajectory["time"], angle, trajectory["velocity"], touches, strikes[strikes > 0.0])
     return comparison.add_strike_samples(motion)
@@ -71,7 +72,8 @@ def compare_motion(
     if rigid is None or contact is None:
         why = "states of both walks are not available: outputs omits them, or a walk ended immediately"
         return Comparison({}, left_out=({"what": "differences of the walks", "why": why},))
-    steps, orbit = min(rigid.steps, contact.steps), None
+    steps = min(rigid.steps, contact.steps)
+    orbit = None
     time, raw = comparison.difference_in_time(contact, rigid)
     errors = {"raw": raw}
     groups = {

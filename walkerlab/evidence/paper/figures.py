@@ -51,8 +51,10 @@ def draw_differences(results: Results) -> Drawn:
     """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales."""
     (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
-    claimed, early = bool(claims_in(results)), raw["time"] <= rigid.time[-1]
-    recorded, summary = results[COMPARE_STAGE].groups.get("recorded/rigid/aligned"), {}
+    claimed = bool(claims_in(results))
+    early = raw["time"] <= rigid.time[-1]
+    recorded = results[COMPARE_STAGE].groups.get("recorded/rigid/aligned")
+    summary = {}
     recorded_look = RECORDED
     if recorded is not None:
         summary = results[COMPARE_STAGE].summary["recorded"]
@@ -71,10 +73,12 @@ def draw_differences(results: Results) -> Drawn:
             for begin, end, error in zip((0.0, *rigid.strikes), rigid.strikes, errors[-1], strict=False):
                 line(panel, begin + (end - begin) * recorded["phase"], error, recorded_look)
         largest = max(float(error.max()) for error in errors)
-        bottom, top = ZERO_CROSSING * largest, AXIS_MARGIN * largest
+        bottom = ZERO_CROSSING * largest
+        top = AXIS_MARGIN * largest
         if claimed:
             panel.axhline(LARGEST_ERROR.value, **PAPER_ERROR.line)
-            bottom, top = min(LARGEST_ERROR.value / AXIS_MARGIN, bottom), max(AXIS_MARGIN * LARGEST_ERROR.value, top)
+            bottom = min(LARGEST_ERROR.value / AXIS_MARGIN, bottom)
+            top = max(AXIS_MARGIN * LARGEST_ERROR.value, top)
         panel.set_yscale("log", subs=[])
         panel.yaxis.set_major_formatter(power_of_ten)
         panel.set(ylim=(bottom, top), ylabel=label_of("error", raw.variables[f"raw_{name}"].units))
@@ -83,7 +87,8 @@ def draw_differences(results: Results) -> Drawn:
     add_legend(figure, [*(entry(look.label, **look.line) for look in looks), strike_entry(rigid.look)])
     caption_values = []
     for _, words, name in LEG_QUANTITIES:
-        at_once, in_phase = np.abs(raw[f"raw_{name}"]).max(), np.abs(aligned[f"aligned_{name}"]).max()
+        at_once = np.abs(raw[f"raw_{name}"]).max()
+        in_phase = np.abs(aligned[f"aligned_{name}"]).max()
         caption_values.append((words, at_once, in_phase, raw.variables[f"raw_{name}"].units))
     return figure, (caption_values, LARGEST_ERROR.text if claimed else "", largest_of_recorded(summary))
 
@@ -101,7 +106,9 @@ def largest_of_recorded(summary: Mapping[str, Any]) -> tuple[str, list[tuple[str
     ]
 
 
-ALIGNED_ANGLE, NUMERICAL_ERROR, RUN_TIME = "angle_error_rad", "numerical_time_s", "wall_s"
+ALIGNED_ANGLE = "angle_error_rad"
+NUMERICAL_ERROR = "numerical_time_s"
+RUN_TIME = "wall_s"
 LIMITS: Final = (("limit/all", "(a) the config's feet"), ("limit/all-point-foot", "(b) point feet"))
 ERROR_LOOKS: Final = {
     "raw_angle_error_rad": Look("angle at the same time (rad)", VERMILLION, ":", 1.2, "v"),
@@ -124,7 +131,8 @@ MIN_ERROR = 1e-14
 
 def draw_limit(results: Results) -> Drawn:
     """Plot errors over run time, one point per setting, from the config's contact to the most rigid one."""
-    figure, claimed = blank(3.6), bool(claims_in(results))
+    figure = blank(3.6)
+    claimed = bool(claims_in(results))
     # the series with point feet is absent for walkers whose feet roll in both models
     stored = results[TUNE_STAGE].groups
     stored_series = [

@@ -12,7 +12,8 @@ from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, RigidModel
 
 def is_own_walker(config: Any) -> bool:
     """Whether a config has the paper's walker, up to rounding of its values."""
-    walker, paper = config.walker, CompassWalker()
+    walker = config.walker
+    paper = CompassWalker()
     return is_passive_compass(config) and all(
         are_equal(getattr(walker, name), getattr(paper, name)) for name in CompassWalker.model_fields
     )

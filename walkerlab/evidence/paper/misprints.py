@@ -17,11 +17,17 @@ ROOT_TOLERANCE = 1e-9
 
 def inertia_at_impact(walker: RigidWalker, theta_1: float, theta_2: float) -> Array:
     """Mass matrix D_e of (A.9) to (A.24), for velocities of (theta_1, theta_2, x, y)."""
-    L, a, m, M_H = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
+    L = walker.leg_length
+    a = walker.foot_to_mass
+    m = walker.leg_mass
+    M_H = walker.hip_mass
     b = L - a
     K = L * m + a * m + L * M_H
     coupling = -m * L * b * math.cos(theta_2 - theta_1)
-    s1, c1, s2, c2 = math.sin(theta_1), math.cos(theta_1), math.sin(theta_2), math.cos(theta_2)
+    s1 = math.sin(theta_1)
+    c1 = math.cos(theta_1)
+    s2 = math.sin(theta_2)
+    c2 = math.cos(theta_2)
     total = M_H + 2.0 * m
     return np.array(
         [

@@ -40,7 +40,8 @@ class Printed:
         """Agreement of a value with the printed digits: 'rounded', 'cut off', or '' if it disagrees."""
         if value is None:
             return ""
-        expected, decimal = number(self.text), Decimal(repr(float(value)))
+        expected = number(self.text)
+        decimal = Decimal(repr(float(value)))
         last = Decimal(1).scaleb(int(expected.as_tuple().exponent))
         if decimal.quantize(last, ROUND_HALF_UP) == expected:
             return "rounded"
@@ -179,7 +180,8 @@ def speed_as_printed(cycle: float) -> float:
 
 def speed_difference(matlab_cycle: float, adams_cycle: float) -> float:
     """Relative difference (%) of the speeds implied by two cycle times (s)."""
-    matlab, adams = speed_as_printed(matlab_cycle), speed_as_printed(adams_cycle)
+    matlab = speed_as_printed(matlab_cycle)
+    adams = speed_as_printed(adams_cycle)
     return 100.0 * abs(adams - matlab) / matlab
 
 
@@ -196,7 +198,8 @@ def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
     metres therefore means a stiffness 1000^(exponent - 1) times lower than 10^5 N/mm^exponent.
     """
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
-    mass, adams = hip + 2.0 * leg, Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
+    mass = hip + 2.0 * leg
+    adams = Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
     weight = mass * gravity
     return (
         resting_foot(weight, mass, adams.stiffness, adams.exponent, adams.damping),

@@ -58,7 +58,9 @@ def count_verdicts(rows: Iterable[JudgedNumber]) -> dict[str, int]:
 
 def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[JudgedNumber]:
     """Yield all rows in the paper's order."""
-    judge, contact, walker = Judge(measured, study), measured.contact, measured.walker
+    judge = Judge(measured, study)
+    contact = measured.contact
+    walker = measured.walker
     for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
         yield judge.input(entry, float(getattr(walker, parameter)), "rigid")
     for coordinate, entry in enumerate(printed.X_P):
@@ -105,11 +107,14 @@ class Judge:
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
         if (contradiction := contradictions().get(entry)) is not None:
-            verdict, scene, evidence = CONTRADICTED, "any", f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
+            verdict = CONTRADICTED
+            scene = "any"
+            evidence = f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
         if differs and scene == "any":
             evidence += f" The verdict is about the paper's own numbers, not this scene ({differs})."
         elif differs and verdict not in (INPUT, REPRODUCED):
-            verdict, evidence = EXPLAINED, f"Not the paper's scene ({differs}): {evidence}"
+            verdict = EXPLAINED
+            evidence = f"Not the paper's scene ({differs}): {evidence}"
         about = entry.where, entry.quantity, entry.unit, entry.text
         as_printed, corrected = map(rigid.get, EQUATION_SETS)
         return JudgedNumber(*about, as_printed, corrected, contact, verdict.value, evidence)
@@ -117,7 +122,8 @@ class Judge:
     @property
     def raised(self) -> list[float | None]:
         """Increase in magnitude (%) of each coordinate of the contact model's start over the rigid gait's."""
-        gait, start = self.measured.models.get(self.measured.equations), self.measured.contact.start
+        gait = self.measured.models.get(self.measured.equations)
+        start = self.measured.contact.start
         if gait is None or start is None:
             return [None] * len(printed.STATE_NAMES)
         pairs = zip(start, gait.state, strict=True)
@@ -136,7 +142,8 @@ class Judge:
         return self.row(entry, values, None, verdict_if(any(agreements.values())), "rigid", text)
 
     def eigenvalue(self) -> JudgedNumber:
-        entry, radii = printed.EIGENVALUES, self.measured.spectral_radii
+        entry = printed.EIGENVALUES
+        radii = self.measured.spectral_radii
         stable = bool(radii) and max(radii.values()) < entry.value
         return self.row(entry, radii, None, verdict_if(stable), "rigid", prose("evidence.eigenvalue", radii))
 
@@ -167,7 +174,8 @@ class Judge:
 
     def strides(self) -> JudgedNumber:
         """Judge the five gait cycles, which the rigid model walks as well."""
-        entry, contact = printed.CYCLES_WALKED, self.measured.contact
+        entry = printed.CYCLES_WALKED
+        contact = self.measured.contact
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
         completed = contact.steps // 2
         text = prose("evidence.strides", contact, completed, contact.outcome == "walked" and completed < entry.value)
@@ -175,7 +183,9 @@ class Judge:
 
     def error(self) -> JudgedNumber:
         """Judge the largest error of Fig. 8, for angles and angular velocities together."""
-        entry, study, differences = printed.LARGEST_ERROR, self.study, self.measured.errors
+        entry = printed.LARGEST_ERROR
+        study = self.study
+        differences = self.measured.errors
         late = abs(printed.T_LEFT.matlab.value - printed.T_LEFT.adams.value)
         quantities: tuple[tuple[Quantity, float, str], ...] = (
             ("angle", study.fastest * late, "rad"),
@@ -191,7 +201,8 @@ class Judge:
         return self.row(entry, {}, largest, NOT_REPRODUCED, "any", text)
 
     def step_length(self) -> JudgedNumber:
-        entry, contact = printed.STEP_LENGTH, self.measured.contact.step_length
+        entry = printed.STEP_LENGTH
+        contact = self.measured.contact.step_length
         lengths = {name: model.step_length for name, model in self.measured.models.items()}
         longest = max((*lengths.values(), *(() if contact is None else (contact,))), default=None)
         text = prose("evidence.step_length", lengths, contact, longest)
@@ -200,14 +211,17 @@ class Judge:
 
     def velocity_difference(self) -> JudgedNumber:
         """Judge the difference of the average velocities. The evidence includes the paper's own arithmetic."""
-        entry, contact = printed.VELOCITY_DIFFERENCE, self.measured.contact.table_3.v_com
+        entry = printed.VELOCITY_DIFFERENCE
+        contact = self.measured.contact.table_3.v_com
         speeds = {name: model.table_3.v_com for name, model in self.measured.models.items()}
         percentages = {
             name: 100.0 * abs(contact - rigid) / abs(rigid)
             for name, rigid in speeds.items()
             if rigid and contact is not None
         }
-        left, right, cycle = printed.T_LEFT, printed.T_RIGHT, printed.T_CYCLE
+        left = printed.T_LEFT
+        right = printed.T_RIGHT
+        cycle = printed.T_CYCLE
         by_cycle = speed_difference(cycle.matlab.value, cycle.adams.value)
         sums = speed_difference(left.matlab.value + right.matlab.value, left.adams.value + right.adams.value)
         text = prose("evidence.velocity_difference", percentages, by_cycle, sums)
@@ -216,7 +230,8 @@ class Judge:
 
     def table_3(self, row: printed.PrintedRow) -> Iterator[JudgedNumber]:
         """Judge a row of Table 3: MATLAB's value by the rigid model, ADAMS's value by the contact model."""
-        measured, study = self.measured, self.study
+        measured = self.measured
+        study = self.study
         values = {name: getattr(model.table_3, row.name) for name, model in measured.models.items()}
         rigid = {name: value for name, value in values.items() if value is not None}
         contact: float | None = getattr(measured.contact.table_3, row.name)
@@ -245,7 +260,9 @@ MIDDLE = "section 2: 'in the middle of the legs'"
 
 def table_1(measured: Measured, study: PaperStudy) -> Table:
     """Return the parameters as printed, with their source, and as used here."""
-    walker, inertia, radius = measured.walker, printed.LEG_INERTIA, printed.FOOT_RADIUS
+    walker = measured.walker
+    inertia = printed.LEG_INERTIA
+    radius = printed.FOOT_RADIUS
     length, mass, hip, gravity = printed.TABLE_1
     rows = (
         ("L", "length of the legs", "m", length.value, walker.leg_length, length.where),
@@ -265,7 +282,8 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 def table_2(measured: Measured) -> Table:
     """Return the initial values, with their differences as percentages of either column."""
-    table, start = {}, measured.contact.start
+    table = {}
+    start = measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.STATE_NAMES, printed.TABLE_2, strict=True)):
         states = {name: model.state[place] for name, model in measured.models.items()}
         table[coordinate] = {

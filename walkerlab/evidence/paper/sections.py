@@ -96,7 +96,8 @@ def table_of(key: str, rows: Any) -> Table:
 def paper_table(caption: str, rows: Mapping[str, Row], note: str) -> Table:
     """Build a table in the paper's own digits, with symbols and units as row names and without empty columns."""
     has_quantities = any("quantity" in row for row in rows.values())
-    columns, heads = [Column("symbol" if has_quantities else "quantity", "row")], words.terms("paper.heads")
+    columns = [Column("symbol" if has_quantities else "quantity", "row")]
+    heads = words.terms("paper.heads")
     for key in dict.fromkeys(key for row in rows.values() for key, value in row.items() if value is not None):
         if key == "unit" or key.endswith(TEXT_SUFFIX):
             continue

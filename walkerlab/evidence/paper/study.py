@@ -47,9 +47,11 @@ class PaperStudy:
 
 def study_the_paper() -> PaperStudy:
     """Make all measurements on the paper's own walker and slope, which takes milliseconds once compiled."""
-    wrong, right = printed.walker_of_the_paper(AS_PRINTED), printed.walker_of_the_paper(CORRECTED)
+    wrong = printed.walker_of_the_paper(AS_PRINTED)
+    right = printed.walker_of_the_paper(CORRECTED)
     x_p = printed.fixed_point_as_printed()
-    as_printed, corrected = settle(wrong), settle(right)
+    as_printed = settle(wrong)
+    corrected = settle(right)
     one_step = take_walk(assembled(wrong), measured.TIGHT, as_printed, 1, sampled=True)
     cycles = take_walk(assembled(wrong), measured.TIGHT, x_p, 2 * measured.PAPER_CYCLES, sampled=True)
     five_steps = take_walk(assembled(wrong), measured.TIGHT, x_p, measured.ENERGY_STEPS)

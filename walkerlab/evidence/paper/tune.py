@@ -60,7 +60,9 @@ from walkerlab.scene.walk_outcomes import Pads, describe_endings
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 UNCHANGED_START = (1.0, 1.0)  # factors that leave the velocities of the rigid start unchanged
 # walks with knees or rolling feet take several times longer to compute, so their map and margins are coarser
-COMPASS_CELLS, OTHER_CELLS, COARSE_MARGINS = 61, 21, {"step": 0.05, "largest": 2.0}
+COMPASS_CELLS = 61
+OTHER_CELLS = 21
+COARSE_MARGINS = {"step": 0.05, "largest": 2.0}
 SEARCH_ADVICE = "Widen the search (tune.swing_factors, tune.stance_factors, tune.cells) or choose another contact."
 WALK_SUMMARY_KEYS = ("outcome", "advice", "steps", "step_periods_s", "step_lengths_m", "end_time_s")
 """Quantities reported for each walk of the procedure."""
@@ -77,7 +79,8 @@ def run(config: TuneConfig, inputs: Mapping[str, Content], progress: Progress, j
     scene = replace(scene_on_pads(config, rigid_step, rigid_state, gait), pinned=False)
     tune = TuneRun(config, scene, rigid_state, gait)
     tune.find(progress, jobs)
-    stored, report = groups(tune), summary(tune) | {"left_out": list(adjustment_omissions(config))}
+    stored = groups(tune)
+    report = summary(tune) | {"left_out": list(adjustment_omissions(config))}
     if gait.gait is not None and config.tune.rigid_limit:
         limit = limit_findings(config, scene, gait.gait, rigid_gait, tune.rigid_walk, progress)
         if limit is not None:
@@ -99,8 +102,12 @@ class TuneRun:
     """
 
     def __init__(self, config: TuneConfig, scene: ContactScene, rigid_state: State, gait: GaitAnswer) -> None:
-        self.config, self.scene, self.rigid_state, self.gait = config, scene, rigid_state, gait
-        self.names, self.steps = state_names(config), 2 * config.strides
+        self.config = config
+        self.scene = scene
+        self.rigid_state = rigid_state
+        self.gait = gait
+        self.names = state_names(config)
+        self.steps = 2 * config.strides
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: RigidModel = rigid_walker(config)
         self.pins_foot = is_passive_compass(config)
@@ -158,11 +165,13 @@ class TuneRun:
 
         The factors are velocities of the last step, once the rear foot has lifted, divided by those of the rigid start.
         """
-        walk, n = self.walks.get("adjusted"), len(self.rigid_state) // 2
+        walk = self.walks.get("adjusted")
+        n = len(self.rigid_state) // 2
         first = self.rigid_state[n + SWING], self.rigid_state[n + STANCE]
         if walk is None or walk.steps < 2 or walk.samples is None or 0.0 in first:
             return None
-        time, normal = walk.samples.time_s, sample_feet(self.scene.walker, walk.samples)[:, :, 2]
+        time = walk.samples.time_s
+        normal = sample_feet(self.scene.walker, walk.samples)[:, :, 2]
         landed = walk.steps % 2  # leg 0 lands first
         swing = 1 - landed
         lifted = np.flatnonzero((time > walk.touch_time_s[-2]) & (normal[:, swing] <= 0.0) & (normal[:, landed] > 0.0))
@@ -193,7 +202,9 @@ def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
 
 
 def summary(tune: TuneRun) -> dict[str, Any]:
-    paper, pitch, ends = tune.paper, tune.scene.pitch_m, count_outcomes(tune.contact_map.outcome)
+    paper = tune.paper
+    pitch = tune.scene.pitch_m
+    ends = count_outcomes(tune.contact_map.outcome)
     pads = Pads((pitch, pitch), laid=str(require_contact(tune.config).pad_pitch))
     return {
         "table2": table_2(tune),
@@ -231,7 +242,8 @@ def papers_start(paper: AdamsWalk) -> dict[str, Any]:
 
 def table_2(tune: TuneRun) -> dict[str, dict[str, Any]]:
     """Tabulate the start before and after adjustment, its change and, for the paper's compass, the printed values."""
-    rows, adjusted = {}, tune.adjusted_state
+    rows = {}
+    adjusted = tune.adjusted_state
     for k, (name, value) in enumerate(zip(tune.names, tune.rigid_state, strict=True)):
         row: dict[str, Any] = {"unit": "rad" if k < len(tune.names) // 2 else "rad/s"}
         if tune.paper is not None:
@@ -287,7 +299,8 @@ def gait_summary(tune: TuneRun) -> dict[str, Any]:
 
 def section_coordinates(scene: ContactScene) -> list[tuple[str, str]]:
     """Return descriptions and units of a gait's coordinates on its section."""
-    walker, names = scene.walker, [body.name for body in scene.assembly.bodies]
+    walker = scene.walker
+    names = [body.name for body in scene.assembly.bodies]
 
     def coordinates_of(quantity: str, unit: str, bodies: tuple[int, ...]) -> list[tuple[str, str]]:
         roles = ["stance" if body in walker.legs[STANCE_FOOT] else "swing" for body in bodies]
@@ -332,7 +345,8 @@ def adjustment_summary(tune: TuneRun) -> dict[str, Any]:
 
 
 def groups(tune: TuneRun) -> dict[str, Group]:
-    stored, walker = {"map": map_group(tune)}, tune.scene.walker
+    stored = {"map": map_group(tune)}
+    walker = tune.scene.walker
     if tune.margins:
         labels = {"name": Label("", "what is scaled"), "factor": Label("1", "last factor at which the start walks")}
         stored["margins"] = rows_group(tune.margins, labels, "margin", "number")
@@ -362,7 +376,10 @@ def legs_in_time(walk: ContactWalkResult, walker: ContactWalker) -> dict[str, Va
 
 def map_group(tune: TuneRun) -> Group:
     """Return the outcome and steps of both models over the two velocity factors."""
-    cells, rigid, swing, stance = tune.contact_map, tune.rigid_map, "swing_factor", "stance_factor"
+    cells = tune.contact_map
+    rigid = tune.rigid_map
+    swing = "swing_factor"
+    stance = "stance_factor"
     over = {
         "outcome": (cells.outcome, "outcome of the contact model's walk, see attribute outcomes"),
         "steps": (cells.steps, "steps of the contact model"),

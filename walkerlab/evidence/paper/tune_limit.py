@@ -96,7 +96,8 @@ def limit_findings(
         return None
     compass = isinstance(config.walker, CompassWalker) and config.walker.torso is None
     legs = leg_variables(walk.samples)
-    angle, velocity = legs["angle"].values, legs["velocity"].values
+    angle = legs["angle"].values
+    velocity = legs["velocity"].values
     recorded = Motion(walk.samples.time_s, angle, velocity, walk.touch_time_s, walk.knee_strikes_s)
     motion = add_strike_samples(recorded)
     limit = Limit(
@@ -120,7 +121,8 @@ def limit_findings(
     for name in compared:
         walker = scene.walker
         if name != ALL_SERIES:  # point feet, as in the rigid model
-            points, rules = config.walker.model_copy(update={"foot_radius_m": 0.0}), knee_rules(config.walker)
+            points = config.walker.model_copy(update={"foot_radius_m": 0.0})
+            rules = knee_rules(config.walker)
             laws = walker.normal, walker.friction
             walker = contact_walker(assembly_of(points), *laws, config.gravity_m_s2, config.slope_rad, rules)
             walker = apply_drives(walker, config)

@@ -84,7 +84,8 @@ def scene_cases(config: Config) -> list[tuple[Case, Config]]:
 
     config  the scene, with a numeric start and, on pads, a numeric pad pitch
     """
-    present, cases = features(config), []
+    present = features(config)
+    cases = []
     for entry in read_catalogue(SCENE_CATALOGUE):
         needs = {entry.get("model", "contact"), *entry.pop("needs", ())}
         changes: dict[str, Any] = {name: entry.pop(name) for name in SCENE_CHANGES if name in entry}
@@ -98,7 +99,8 @@ def scene_cases(config: Config) -> list[tuple[Case, Config]]:
 
 def features(config: Config) -> set[str]:
     """Return the features of a scene that cases may require, such as friction or a compliant knee lock."""
-    walker, present = config.walker, {"rigid"}
+    walker = config.walker
+    present = {"rigid"}
     if config.contact is not None:
         present |= {"contact", "friction"} if config.contact.has_friction else {"contact"}
     if has_knees(walker):
@@ -108,12 +110,14 @@ def features(config: Config) -> set[str]:
 
 def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
     """Apply a case's changes to a scene. A new slope also turns the start's angles, so that both feet stand on it."""
-    start, slope = changes.get("start", 1.0), changes.get("slope", 1.0) * config.slope_rad
+    start = changes.get("start", 1.0)
+    slope = changes.get("slope", 1.0) * config.slope_rad
     values = dict(changes.get("set", {}))
     values |= {path: factor * attrgetter(path)(config) for path, factor in changes.get("times", {}).items()}
     values |= {path: attrgetter(path)(config) / factor for path, factor in changes.get("over", {}).items()}
     if "start" in changes or "slope" in changes:
-        state, rotation = state_of(config.start), config.slope_rad - slope
+        state = state_of(config.start)
+        rotation = config.slope_rad - slope
         n = len(state) // 2
         turned = (*(x + rotation for x in state[:n]), *(start * x for x in state[n:]))
         values |= {"slope_rad": slope, "start": replace_state(config.start, turned)}

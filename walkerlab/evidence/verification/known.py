@@ -98,7 +98,8 @@ def run_until(
     if stopped.outcome is not Outcome.NO_HEEL_STRIKE:
         raise ArithmeticError(f"ended as {stopped.outcome.label} at {stopped.time_s:.4g} s of {duration_s:.4g} s")
     recorded = int(observer.tally.recorded)
-    times, states = observer.samples.time_s[:recorded], observer.samples.states[:recorded]
+    times = observer.samples.time_s[:recorded]
+    states = observer.samples.states[:recorded]
     return ParticleRun(times, states, stopped.state, observer.account[LOSS_ENTRIES])
 
 
@@ -146,7 +147,8 @@ def solve_problem(
 SPRING: Final = NormalLaw(1.0e6, 1.0, 0.0, 1.0e-4)
 LIGHT_LAW: Final = PAPER_LAW._replace(damping=9.0e2)
 THICK_LAW: Final = PAPER_LAW._replace(damping=9.0e3)
-DROP, BOUNCES = 0.1, 5
+DROP = 0.1
+BOUNCES = 5
 BLOCK_MASS = 20.0
 
 
@@ -181,7 +183,9 @@ def block_speed(slope: float, start_speed: float) -> float:
     return float(run_until(block, rig_state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
 
-SPOKES, WHEEL_SLOPE, HUB_INERTIA = 8, 0.08, 1e-3
+SPOKES = 8
+WHEEL_SLOPE = 0.08
+HUB_INERTIA = 1e-3
 STIFF: Final = NormalLaw(1.0e9, 1.0, 3.0e5, 1.0e-7)
 STICKY: Final = Coulomb(2.0, 2.0, 1.0e-4, 1.0e-3)
 ROUNDS = 14
@@ -205,7 +209,9 @@ def rimless_wheel_speed() -> float:
     return speed
 
 
-ROD_ANGLE, ROD_FRICTION, ROD_STIFFNESS = 1.0, 4.0, 1.0e8
+ROD_ANGLE = 1.0
+ROD_FRICTION = 4.0
+ROD_STIFFNESS = 1.0e8
 
 
 def painleve_growth_rate() -> float:
@@ -214,7 +220,8 @@ def painleve_growth_rate() -> float:
     For d = a + b cosh(s t), the differences D of d over a time tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
     """
     end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
-    ground, friction = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4), Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
+    ground = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4)
+    friction = Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
     rod = rig(1.0, 1.0 / 3.0, ground, friction, (end, OUT_OF_REACH))
     rate = references.painleve_growth_rate(ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS)
     run = run_until(rod, rig_state((0.0, math.sin(ROD_ANGLE)), (50.0, 0.0)), 6.0 / rate, 1e-11, 1e-16)

@@ -76,9 +76,13 @@ class RigidMasses:
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
         """Measure levers from the centre of the stance foot's arc. The slope is in rad."""
-        foot, trailing, hip = assembly.feet[STANCE], assembly.feet[SWING], find_hip(assembly)
+        foot = assembly.feet[STANCE]
+        trailing = assembly.feet[SWING]
+        hip = find_hip(assembly)
         root = Anchor(foot.body, foot.centre_m)
-        self.assembly, self.slope, self.radius = assembly, slope, foot.radius_m
+        self.assembly = assembly
+        self.slope = slope
+        self.radius = foot.radius_m
         self.members = group_bodies(assembly).members
         self.masses = Masses(assembly, root)
         self.owner = [assembly.index(anchor.body) for _, anchor in masses(assembly)]
@@ -89,11 +93,15 @@ class RigidMasses:
     def pose(self, state: Floats) -> Moving:
         """Return the masses with their positions and velocities in a state of the rigid model (2 n,)."""
         n = self.members.shape[1]
-        psi, rate = self.members @ state[:n] + self.slope, self.members @ state[n:]
-        centre, rolling = np.array([0.0, self.radius]), np.array([-self.radius * state[n + STANCE], 0.0])
+        psi = self.members @ state[:n] + self.slope
+        rate = self.members @ state[n:]
+        centre = np.array([0.0, self.radius])
+        rolling = np.array([-self.radius * state[n + STANCE], 0.0])
         place, velocity = self.masses.moving(psi, rate)
-        hip, contact = centre + rotate(self.to_hip, psi).sum(axis=0), rotate(self.to_foot, psi).sum(axis=0)
-        mass, inertia = self.masses.mass, self.masses.inertia
+        hip = centre + rotate(self.to_hip, psi).sum(axis=0)
+        contact = rotate(self.to_foot, psi).sum(axis=0)
+        mass = self.masses.mass
+        inertia = self.masses.inertia
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def poses(self, states: Floats) -> list[Moving]:
@@ -102,7 +110,8 @@ class RigidMasses:
 
     def share_of(self, leg: int) -> Floats:
         """Return the share (bodies,) of each body that belongs to a leg. Coupled bodies belong to it in part."""
-        names, of_leg = [body.name for body in self.assembly.bodies], self.assembly.legs[leg]
+        names = [body.name for body in self.assembly.bodies]
+        of_leg = self.assembly.legs[leg]
         share = np.array([1.0 if name in of_leg else 0.0 for name in names])
         for coupling in self.assembly.couplings:
             turning = (weight for name, weight in zip(coupling.of, coupling.weights, strict=True) if name in of_leg)
@@ -124,11 +133,14 @@ class RigidMasses:
 
     def momentum_change(self, before: Sequence[Moving], after: Sequence[Moving], push_off: float = 0.0) -> float:
         """Return the largest relative change of the conserved momenta over heel strikes. `push_off` is in N s."""
-        change, size = 0.0, 1e-300
+        change = 0.0
+        size = 1e-300
         for old, new in zip(before, after, strict=True):
-            at_start, at_end = np.array(self.momenta(old, new=False)), np.array(self.momenta(new, new=True))
+            at_start = np.array(self.momenta(old, new=False))
+            at_end = np.array(self.momenta(new, new=True))
             at_start[0] += moment_of(push_off, old)
-            change, size = max(change, *np.abs(at_end - at_start)), max(size, *np.abs(at_start), *np.abs(at_end))
+            change = max(change, *np.abs(at_end - at_start))
+            size = max(size, *np.abs(at_start), *np.abs(at_end))
         return finite(change / size)
 
 

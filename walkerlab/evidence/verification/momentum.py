@@ -65,11 +65,13 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
 
 def momentum_balance(config: WalksConfig, scene: ContactScene, start: State, case: Case) -> Balance:
     """Compare the change of momentum with the impulse over the first steps of a case."""
-    mass, leg = config.walker.total_mass_kg, config.walker.leg_length_m
+    mass = config.walker.total_mass_kg
+    leg = config.walker.leg_length_m
     rates = np.abs(start[len(start) // 2 :])
     speed = max(leg / pendulum_time(config), *rates[:2], leg * float(rates[2:].max()))
     scale = mass * np.array([speed, speed, speed * leg])
-    settings, steps = config.solver.contact, min(case.steps, BALANCE_STEPS)
+    settings = config.solver.contact
+    steps = min(case.steps, BALANCE_STEPS)
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, case.budget)
     walk = scene.walk(start, steps, tolerances)
     grid = np.linspace(0.0, walk.end_time_s, INITIAL_INTERVALS + 1)
@@ -105,7 +107,9 @@ def split(times: Floats, wanting: NDArray[np.bool_]) -> Floats:
     """Return the ends of intervals after splitting those marked in `wanting` into four. `times` holds ends and
     midpoints.
     """
-    first, middle, last = times[:-1:2], times[1::2], times[2::2]
+    first = times[:-1:2]
+    middle = times[1::2]
+    last = times[2::2]
     halves = np.concatenate([middle, 0.5 * (first + middle), 0.5 * (middle + last)])
     return np.sort(np.concatenate([times[::2], halves[np.tile(wanting, 3)]]))
 
@@ -136,12 +140,17 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
     weight = config.walker.total_mass_kg * config.gravity_m_s2 * np.array([np.sin(slope), -np.cos(slope)])
     torque = (along * normal - height * friction).sum(axis=1) + cross(samples.states[:, :2], weight)
     rates = np.column_stack([friction.sum(axis=1) + weight[0], normal.sum(axis=1) + weight[1], torque])
-    form, samples_range = scene.walker.whole, np.arange(samples.time_s.size)
+    form = scene.walker.whole
+    samples_range = np.arange(samples.time_s.size)
     if form.push_off != 0.0:
-        pushing, y = 1 - samples.stance, samples.states
+        pushing = 1 - samples.stance
+        y = samples.states
         foot = np.column_stack([along[samples_range, pushing], height[samples_range, pushing]])
         angles = y[:, 2 : y.shape[1] // 2] + slope
-        s, c, x, up = np.sin(angles), np.cos(angles), form.hip_x[: angles.shape[1]], form.hip_y[: angles.shape[1]]
+        s = np.sin(angles)
+        c = np.cos(angles)
+        x = form.hip_x[: angles.shape[1]]
+        up = form.hip_y[: angles.shape[1]]
         line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
         u = np.clip((samples.time_s[:, None] - touches) / form.push_off_duration, 0.0, 1.0)
         bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_off / form.push_off_duration
@@ -153,7 +162,8 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
 def momentum(samples: ContactSamples, config: RigidConfig) -> Floats:
     """Return (ends, 3): momentum along and normal to the slope (kg m/s), and about a point of the slope (kg m^2/s)."""
     y = samples.states[::2]
-    n, walker_masses = y.shape[1] // 2 - 2, Masses(assembly_of(config.walker))
+    n = y.shape[1] // 2 - 2
+    walker_masses = Masses(assembly_of(config.walker))
     rate = y[:, 4 + n :]
     place, velocity = walker_masses.moving(y[:, 2 : 2 + n] + config.slope_rad, rate)
     r, v = y[:, None, 0:2] + place, y[:, None, 2 + n : 4 + n] + velocity

@@ -134,7 +134,8 @@ def suppress_warnings() -> Iterator[None]:
 def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, method: str) -> Choice:
     """Walk a rigid scene with SciPy's solve_ivp at default settings, with an event function for heel strikes."""
     began = time.perf_counter()
-    y, count = None, MAX_ORDINARY_EVALUATIONS
+    y = None
+    count = MAX_ORDINARY_EVALUATIONS
     with suppress_warnings():
         y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, MAX_ORDINARY_EVALUATIONS, method)
     return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)

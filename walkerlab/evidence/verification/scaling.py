@@ -10,7 +10,9 @@ from walkerlab.physics.orbits.similarity import Units
 
 B = TypeVar("B", bound=Block)
 # leg (m), mass (kg) and gravity (m/s^2) of the twin: uneven values, so that its rounding errors differ
-TWIN_LEG, TWIN_MASS, TWIN_GRAVITY = 1.37, 11.3, 7.43
+TWIN_LEG = 1.37
+TWIN_MASS = 11.3
+TWIN_GRAVITY = 7.43
 
 
 def pendulum_time(config: RigidConfig) -> float:
@@ -20,7 +22,8 @@ def pendulum_time(config: RigidConfig) -> float:
 
 def to_twin(config: RigidConfig) -> Units:
     """Return the scale factors from a config's walker to its twin of ordinary size."""
-    length, mass = TWIN_LEG / config.walker.leg_length_m, TWIN_MASS / config.walker.total_mass_kg
+    length = TWIN_LEG / config.walker.leg_length_m
+    mass = TWIN_MASS / config.walker.total_mass_kg
     return Units(length, mass, math.sqrt(length * config.gravity_m_s2 / TWIN_GRAVITY))
 
 
@@ -49,10 +52,12 @@ def scaled(config: Config, by: Units) -> Config:
         "push_off": scaled_block(config.push_off, by),
     }
     if not isinstance(config.start, str):
-        state, n = state_of(config.start), len(config.start) // 2
+        state = state_of(config.start)
+        n = len(config.start) // 2
         changes["start"] = replace_state(config.start, (*state[:n], *(rate / by.time for rate in state[n:])))
     if config.contact is not None:
-        si, pitch = config.contact.in_si(), config.contact.pad_pitch
+        si = config.contact.in_si()
+        pitch = config.contact.pad_pitch
         ground = {
             "units": "si",
             "stiffness": si.stiffness * by.force / by.length**si.exponent,

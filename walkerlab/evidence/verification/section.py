@@ -22,7 +22,8 @@ Rows = Sequence[Row]
 @stage_section("stability")
 def section(results: Results, summary: Row) -> Section | None:
     """Build the section, or return None if the stage did not run."""
-    cases, problems = summary["cases"], summary["known"]
+    cases = summary["cases"]
+    problems = summary["known"]
     unanswered = [{**row, "why": row["second_tried"]} for row in cases if row["second_tried"]]
     unmeasured = [
         {**row, "why": f"{measure['measure']}: {measure['why']}"} for row in cases for measure in row["not_measured"]

@@ -35,7 +35,8 @@ def run(
     """
     cells = config.stability.map_cells
     complete([*maps.units_of(cells)], checkpoint, "stability maps", progress, jobs)
-    stiction, step = stiction_group(cells, checkpoint.kept), step_group(cells, checkpoint.kept)
+    stiction = stiction_group(cells, checkpoint.kept)
+    step = step_group(cells, checkpoint.kept)
     return Content({"stiction": stiction, "step": step}, summary_of(stiction, step))
 
 

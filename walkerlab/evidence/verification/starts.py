@@ -77,7 +77,8 @@ class RigidStart(CaseStart):
         """Walk a case. Only heel strikes are judged, so nothing is sampled."""
         walk = take_walk(self.walker, tolerances, self.start, case.steps)
         numbers = np.concatenate([walk.touch_time_s, walk.before.ravel(), walk.after.ravel()])
-        touches, work = walk.touch_time_s / pendulum_time(self.config), walk.work
+        touches = walk.touch_time_s / pendulum_time(self.config)
+        work = walk.work
         cost = work.rhs_evaluations, work.accepted
         off = walk.energy_balance_residual if self.walker.sprung else walk.energy_drift
         return JudgedWalk(walk.outcome, touches, None, off, *cost, numbers, walk)
@@ -88,7 +89,9 @@ class RigidStart(CaseStart):
         if not record.steps:
             return []
         strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
-        before, after, push = strikes.poses(record.before), strikes.poses(record.after), float(self.walker.push_off)
+        before = strikes.poses(record.before)
+        after = strikes.poses(record.after)
+        push = float(self.walker.push_off)
         distance = feet_off_the_slope(before) / self.walker.leg_length
         momentum_change = strikes.momentum_change(before, after, push)
         gain = 0.0 if push else energy_won(before, after) / self.energy
@@ -106,11 +109,13 @@ class ContactStart(CaseStart):
     scene: ContactScene
 
     def walk(self, case: Case, tolerances: Tolerances, sampled: bool = False) -> JudgedWalk:
-        scene, unit = self.scene, pendulum_time(self.config)
+        scene = self.scene
+        unit = pendulum_time(self.config)
         interval = scene.ground.frame.pendulum_time / SAMPLE_RATE if sampled else None
         walk = scene.walk(self.start, case.steps, tolerances, interval)
         numbers = np.concatenate([walk.end_state, walk.touch_time_s, walk.touch_along_m, walk.dissipated_J])
-        touches, end = walk.touch_time_s / unit, walk.end_time_s / unit
+        touches = walk.touch_time_s / unit
+        end = walk.end_time_s / unit
         cost = int(walk.work[RHS]), int(walk.work[ACCEPTED])
         return JudgedWalk(walk.outcome, touches, end, walk.energy_balance_residual_J, *cost, numbers, walk)
 
@@ -155,7 +160,8 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
         gait = gait_of(walker, config.seed)
         if gait is None:
             return None
-        state, length = as_state(gait.state), float(gait.step_length)
+        state = as_state(gait.state)
+        length = float(gait.step_length)
     else:
         state = as_state(state_of(config.start))
         length = abs(float(swing_foot(walker, state)[1]))
@@ -174,7 +180,9 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
     scene = contact_scene(config, length, pitch)
     y = start_state(scene, state)
     y = (*y[:CENTRE_HEIGHT], y[CENTRE_HEIGHT] - case.lowered_m, *y[CENTRE_HEIGHT + 1 :])
-    leg, rates, law = config.walker.leg_length_m, y[len(y) // 2 :], scene.walker.normal
+    leg = config.walker.leg_length_m
+    rates = y[len(y) // 2 :]
+    law = scene.walker.normal
     speed = float(np.max(np.abs([*rates[:2], *(leg * rate for rate in rates[2:])])))
     stored = 2.0 * law.stiffness * max(0.0, case.lowered_m) ** (law.exponent + 1.0) / (law.exponent + 1.0)
     energy = scene.walker.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored

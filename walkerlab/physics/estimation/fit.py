@@ -62,7 +62,8 @@ class FitProblem:
     @cached_property
     def floors(self) -> Floats:
         """Smallest noise (quantities,) of each quantity: rounding of its values, or a fraction of its size."""
-        sizes, resolution = typical_sizes(self.forecast), self.forecast.measured.resolution
+        sizes = typical_sizes(self.forecast)
+        resolution = self.forecast.measured.resolution
         rounding = [resolution.get(name, 0.0) / math.sqrt(12.0) for name in self.forecast.quantities]
         return np.maximum(NOISE_FLOOR * sizes, rounding)
 
@@ -128,28 +129,36 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
 
     Each round fits the unknowns by least squares on whitened residuals, then the standard deviations.
     """
-    forecast, u = problem.forecast, start.copy()
+    forecast = problem.forecast
+    u = start.copy()
     even = np.zeros(forecast.heights)
-    noise, heights, why = Noise(FIRST_NOISE * typical_sizes(forecast), 0.0), even, "standard deviations still change"
-    data, disturbances = linearise(problem, u, heights), heights
+    noise = Noise(FIRST_NOISE * typical_sizes(forecast), 0.0)
+    heights = even
+    why = "standard deviations still change"
+    data = linearise(problem, u, heights)
+    disturbances = heights
     if data is None:
         return NO_NEIGHBOURS
     robust = None
     for done in range(MAX_ROUNDS):
         on_round()
-        before, u = u, least_squares_fit(problem, u, start, heights, data, noise)
+        before = u
+        u = least_squares_fit(problem, u, start, heights, data, noise)
         data = None if forecast.predict(u, even) is None else linearise(problem, u, disturbances, robust=robust)
         if data is None:
             # The data pull the walker out of its basin of attraction: judge the last walk that did not end early.
-            u, why = before, NO_NEIGHBOURS
+            u = before
+            why = NO_NEIGHBOURS
             data = linearise(problem, u, disturbances, robust=robust)
         if data is None:
             return NO_NEIGHBOURS
-        rows, earlier = reduce(data), noise
+        rows = reduce(data)
+        earlier = noise
         noise = estimate_noise(rows, problem.floors, problem.leg_length_m, noise)
         if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < MIN_LIKELIHOOD_GAIN:
             noise = halfway(earlier, noise) if done == FREE_ROUNDS else earlier
-        evaluation, robust = evaluate(rows, noise), robust_at(rows, noise)
+        evaluation = evaluate(rows, noise)
+        robust = robust_at(rows, noise)
         disturbances = most_probable_disturbances(rows, noise, evaluation.move)
         likeliest = disturbances[: heights.size]
         heights = passable(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
@@ -175,9 +184,11 @@ def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     """Estimate the standard deviations at u (unknowns,), starting from another fit, or return None if a
     walk ends early.
     """
-    problem, even = like.problem, np.zeros(like.forecast.heights)
+    problem = like.problem
+    even = np.zeros(like.forecast.heights)
     robust = robust_at(like.rows, like.noise)
-    data, predicted = linearise(problem, u, even, robust=robust), problem.forecast.predict(u, even)
+    data = linearise(problem, u, even, robust=robust)
+    predicted = problem.forecast.predict(u, even)
     if data is None or predicted is None:
         return None
     rows = reduce(data)
@@ -204,7 +215,8 @@ def halfway(before: Noise, after: Noise) -> Noise:
 def has_settled(rows: Reduced, before: Noise, after: Noise, leg_length_m: float) -> bool:
     """Whether standard deviations have stopped changing, or change without becoming likelier."""
     same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED_NOISE)
-    change, least = np.abs(after.process - before.process), 1e-7 * np.array((leg_length_m, 1.0))
+    change = np.abs(after.process - before.process)
+    least = 1e-7 * np.array((leg_length_m, 1.0))
     if same and np.all(change < SETTLED_NOISE * np.maximum(after.process, least)):
         return True
     return gain_of(rows, before, after) < SETTLED_LIKELIHOOD
@@ -217,7 +229,8 @@ def gain_of(rows: Reduced, before: Noise, after: Noise) -> float:
 
 def typical_sizes(forecast: Forecast) -> Floats:
     """Return the r.m.s. value (quantities,) of each quantity as its typical size."""
-    values, quantity = forecast.values, forecast.quantity
+    values = forecast.values
+    quantity = forecast.quantity
     return np.array([np.sqrt(np.mean(values[quantity == q] ** 2)) for q in range(len(forecast.quantities))])
 
 
@@ -229,7 +242,8 @@ def linearise(
     disturbances  heights (m), then kicks if they are known; the walk goes over these heights, without kicks
     robust        how a robust loss trims the residuals; None leaves them whole
     """
-    forecast, heights = problem.forecast, disturbances[: problem.forecast.heights]
+    forecast = problem.forecast
+    heights = disturbances[: problem.forecast.heights]
     prediction = forecast.predict(u, heights)
     derivatives = forecast.differentiate(u, heights, exact)
     if prediction is None or derivatives is None:
@@ -240,7 +254,9 @@ def linearise(
     if problem.loss == "soft_l1" and robust is not None:
         residuals = from_even - G[:, : disturbances.size] @ disturbances
         trimmed = residuals - trim(residuals, forecast.quantity, robust)
-    rows, sizes, kicks = problem.prior_rows(u), typical_sizes(forecast), G.shape[1] - heights.size
+    rows = problem.prior_rows(u)
+    sizes = typical_sizes(forecast)
+    kicks = G.shape[1] - heights.size
     return Linearised(from_even - trimmed, J, G, forecast.quantity, rows, sizes, trimmed, kicks)
 
 
@@ -268,7 +284,8 @@ class Robust(NamedTuple):
 
 
 def robust_at(rows: Reduced, noise: Noise) -> Robust:
-    spread, unknowns = noise.spread(rows.G.shape[1], rows.kicks), rows.unknowns
+    spread = noise.spread(rows.G.shape[1], rows.kicks)
+    unknowns = rows.unknowns
     disturbed = spread > 0.0
     columns = np.column_stack((rows.fixed[:, 1:], rows.G[:, disturbed])) / noise.measurement[rows.quantity][:, None]
     informations = np.array([own.T @ own for own in (columns[rows.quantity == q] for q in range(rows.sizes.size))])
@@ -285,9 +302,11 @@ def least_squares_fit(
     """Minimise the whitened residuals over the unknowns, reusing the derivatives in `data` near u."""
     from scipy.optimize import least_squares  # takes a third of a second, only needed here
 
-    forecast, low_high = problem.forecast, problem.limits()
+    forecast = problem.forecast
+    low_high = problem.limits()
     inside = np.clip(u, low_high[0] + BOUND_MARGIN, low_high[1] - BOUND_MARGIN)
-    whiten, known = whitening(data, noise), (inside, data.J)
+    whiten = whitening(data, noise)
+    known = (inside, data.J)
     offset = forecast.values - data.trimmed + data.G[:, : heights.size] @ heights
 
     def residuals(x: Floats) -> Floats:

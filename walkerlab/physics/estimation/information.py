@@ -40,11 +40,13 @@ def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, value
     reduced = free_the_rest(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]
-    singular, directions = np.sqrt(np.maximum(sizes[order], 0.0)), vectors[:, order].T
+    singular = np.sqrt(np.maximum(sizes[order], 0.0))
+    directions = vectors[:, order].T
     basis = directions[~is_open(singular)]
     covariance = basis.T @ np.linalg.pinv(basis @ reduced @ basis.T, hermitian=True) @ basis
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    freedom, scaled = float(max(1, values - len(whole))), covariance * np.outer(scales, scales)
+    freedom = float(max(1, values - len(whole)))
+    scaled = covariance * np.outer(scales, scales)
     return Information(keys, covariance / np.outer(errors, errors), singular, directions, scaled, scales, freedom, {})
 
 
@@ -64,7 +66,8 @@ def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -
 def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     """Average the covariance along directions `basis` (directions, parameters) over plausible standard deviations."""
     # The weights are the restricted likelihood with a flat prior on the logarithm of each standard deviation.
-    noise, count = fitted.noise, basis.shape[1]
+    noise = fitted.noise
+    count = basis.shape[1]
     sources = tuple(np.flatnonzero(noise.process).tolist())
     centre = np.log(np.append(noise.measurement, noise.process[list(sources)]))
 
@@ -85,7 +88,8 @@ def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> 
     """Return the plausible ranges below and above `centre` (deviations,), the logarithms of standard deviations."""
     moves = NOISE_LOG_STEP * np.vstack((np.zeros(centre.size), np.eye(centre.size), -np.eye(centre.size)))
     likelihoods = evaluate_at(centre + moves).restricted
-    above, below = likelihoods[1 : 1 + centre.size], likelihoods[1 + centre.size :]
+    above = likelihoods[1 : 1 + centre.size]
+    below = likelihoods[1 + centre.size :]
     curvatures = (2.0 * likelihoods[0] - above - below) / NOISE_LOG_STEP**2
     spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
     return np.minimum(spread, FARTHEST_NOISE[0]), np.minimum(spread, FARTHEST_NOISE[1])
@@ -93,11 +97,9 @@ def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> 
 
 def free_the_rest(information: Floats, count: int) -> Floats:
     """Return the information (..., count, count) on the first unknowns if the others are free (Schur complement)."""
-    own, cross, rest = (
-        information[..., :count, :count],
-        information[..., :count, count:],
-        information[..., count:, count:],
-    )
+    own = information[..., :count, :count]
+    cross = information[..., :count, count:]
+    rest = information[..., count:, count:]
     return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.swapaxes(-1, -2))
 
 
@@ -107,7 +109,8 @@ def is_open(singular: Floats) -> NDArray[np.bool_]:
 
 def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, ...], set[str]]:
     """Describe the parameter combinations that the walk does not determine, and return the parameters in them."""
-    named, keys = [], set[str]()
+    named = []
+    keys = set[str]()
     largest = information.singular_values.max(initial=0.0)
     errors = np.sqrt(np.diag(information.covariance))
     for value, direction in zip(information.singular_values, information.directions, strict=True):
@@ -139,7 +142,8 @@ def reason_in_words(value: float, largest: float) -> str:
 
 def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
     """Return the fraction of information along `basis` (directions, parameters) that is lost without each quantity."""
-    count, quantities = basis.shape[1], fitted.forecast.quantities
+    count = basis.shape[1]
+    quantities = fitted.forecast.quantities
     if not len(basis):
         return dict.fromkeys(quantities, 0.0)
     whole = np.diag(basis @ free_the_rest(fitted.evaluation.information, count) @ basis.T)

@@ -34,7 +34,8 @@ def judge(fitted: Fitted) -> tuple[Fit, tuple[str, ...]]:
 
 
 def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
-    forecast, sizes = fitted.forecast, fitted.data.sizes
+    forecast = fitted.forecast
+    sizes = fitted.data.sizes
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             (name, unit), share = name_and_unit(quantity), 100.0 * noise / size
@@ -49,7 +50,8 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
     white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
     steps = forecast.measured.count
     for place, quantity in enumerate(forecast.channels):
-        own, name = white[place * steps : (place + 1) * steps], name_and_unit(quantity)[0]
+        own = white[place * steps : (place + 1) * steps]
+        name = name_and_unit(quantity)[0]
         worst = int(np.argmax(np.abs(own)))
         spread = float(np.median(np.abs(own))) * 1.4826 or 1.0
         large = abs(own[worst]) * fitted.noise.measurement[place] > SMALLEST_OUTLIER * sizes[place]
@@ -68,7 +70,8 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
 
 def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
     """Yield what is wrong with a floor that is rougher than floors are, or with large kicks."""
-    roughness, leg = fitted.noise.roughness_m, fitted.problem.leg_length_m
+    roughness = fitted.noise.roughness_m
+    leg = fitted.problem.leg_length_m
     if roughness > UNUSUALLY_ROUGH * leg:
         yield (
             f"the floor would be {1e3 * roughness:.2g} mm rough, {100.0 * roughness / leg:.2g} % of the leg "
@@ -107,7 +110,8 @@ def name_and_unit(quantity: str) -> tuple[str, str]:
 
 def alternation_of(residuals: Floats) -> float:
     """Return how much odd and even steps differ, as a normal deviate with the same tail probability as Student's t."""
-    odd, even = residuals[::2], residuals[1::2]
+    odd = residuals[::2]
+    even = residuals[1::2]
     if min(odd.size, even.size) < 2:
         return 0.0
     scatter = math.sqrt(odd.var(ddof=1) / odd.size + even.var(ddof=1) / even.size)

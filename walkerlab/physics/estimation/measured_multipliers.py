@@ -36,16 +36,20 @@ def measure_radius(fitted: Fitted, own: float) -> MeasuredRadius | None:
 
     own  spectral radius of the fitted walker
     """
-    forecast, rng = fitted.forecast, np.random.default_rng(0)
-    count, channels = forecast.measured.count, len(forecast.channels)
+    forecast = fitted.forecast
+    rng = np.random.default_rng(0)
+    count = forecast.measured.count
+    channels = len(forecast.channels)
     if count < FEWEST_STEPS or not channels:
         return None
 
     def by_step(values: Floats) -> Floats:
         return np.swapaxes(values[..., : count * channels].reshape(*values.shape[:-1], channels, count), -1, -2)
 
-    spread, noise = fitted.data.spread(fitted.noise), fitted.noise.measurement[forecast.quantity]
+    spread = fitted.data.spread(fitted.noise)
+    noise = fitted.noise.measurement[forecast.quantity]
     disturbed = (rng.normal(size=(REPLICATES, spread.size)) * spread) @ fitted.data.G.T
     replicates = fitted.predicted.values + disturbed + rng.normal(size=(REPLICATES, noise.size)) * noise
-    plain, simulated = float(spectral_radius(by_step(forecast.values))), spectral_radius(by_step(replicates))
+    plain = float(spectral_radius(by_step(forecast.values)))
+    simulated = spectral_radius(by_step(replicates))
     return MeasuredRadius(plain, plain + own - float(simulated.mean()), float(simulated.std(ddof=1)))

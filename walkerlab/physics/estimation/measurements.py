@@ -45,7 +45,8 @@ class MeasuredWalk:
 
 def split_into_steps(time_s: Floats, angles_rad: Floats, touches_s: Floats, touch_sum_rad: float = 0.0) -> MeasuredWalk:
     """Assign samples of angles (samples, 2) to steps between heel strikes (steps + 1,), dropping samples outside."""
-    inside, periods = (time_s >= touches_s[0]) & (time_s < touches_s[-1]), np.diff(touches_s)
+    inside = (time_s >= touches_s[0]) & (time_s < touches_s[-1])
+    periods = np.diff(touches_s)
     time = time_s[inside]
     step = np.searchsorted(touches_s, time, "right") - 1
     phase = (time - touches_s[step]) / periods[step]

@@ -114,8 +114,10 @@ def reduce(data: Linearised) -> Reduced:
     columns = np.column_stack((data.G, data.J, data.residuals))
     parts = [columns[data.quantity == q] for q in range(data.sizes.size)]
     rows = [part if len(part) <= part.shape[1] else np.linalg.qr(part, mode="r") for part in parts]
-    whole, disturbances = np.concatenate(rows), data.G.shape[1]
-    G, heights = whole[:, :disturbances], disturbances - data.kicks
+    whole = np.concatenate(rows)
+    disturbances = data.G.shape[1]
+    G = whole[:, :disturbances]
+    heights = disturbances - data.kicks
     return Reduced(
         fixed=np.column_stack((whole[:, -1], whole[:, disturbances:-1])),
         G=G,
@@ -131,8 +133,10 @@ def reduce(data: Linearised) -> Reduced:
 
 def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     """Evaluate the likelihoods for one or more noise levels. `noise.measurement` has shape (..., quantities)."""
-    deviations, process = np.asarray(noise.measurement), noise.process
-    fixed, count = 1 + rows.unknowns, len(rows.fixed)
+    deviations = np.asarray(noise.measurement)
+    process = noise.process
+    fixed = 1 + rows.unknowns
+    count = len(rows.fixed)
     sets = np.broadcast_shapes(deviations.shape[:-1], process.shape[:-1])
     if sets and sets[0] > 1 and sets[0] * (count + fixed) ** 2 > MOST_NUMBERS:
         both = [np.broadcast_to(each, (*sets, each.shape[-1])) for each in (deviations, process)]
@@ -148,7 +152,8 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     large = 1.0 + np.trace(squares, axis1=-2, axis2=-1)
     joint[..., count:, count:] = squares + large[..., None, None] * np.eye(fixed)
     factor = np.linalg.cholesky(joint)
-    white, diagonal = factor[..., count:, :count], np.diagonal(factor, axis1=-2, axis2=-1)[..., :count]
+    white = factor[..., count:, :count]
+    diagonal = np.diagonal(factor, axis1=-2, axis2=-1)[..., :count]
     log_determinant = 2.0 * (np.log(deviations) @ rows.counts + np.log(diagonal).sum(axis=-1))
     by_data = white @ white.swapaxes(-1, -2)
     # Without priors: a prior that contradicts the data says nothing about the noise.
@@ -174,8 +179,10 @@ def restricted_with_slope(rows: Reduced, noise: Noise) -> tuple[float, Floats]:
 
     Source: Lindstrom and Bates, J. Am. Stat. Assoc. 83 (1988), with P = V^-1 - V^-1 J (J^T V^-1 J)^-1 J^T V^-1.
     """
-    scale, quantities = 1.0 / noise.measurement[rows.quantity], np.eye(rows.sizes.size)[rows.quantity]
-    V, fixed = covariance_in_noise(rows, noise), rows.fixed * scale[:, None]
+    scale = 1.0 / noise.measurement[rows.quantity]
+    quantities = np.eye(rows.sizes.size)[rows.quantity]
+    V = covariance_in_noise(rows, noise)
+    fixed = rows.fixed * scale[:, None]
     inverse = np.linalg.inv(V)
     solved = inverse @ fixed
     information, move, squares, log_information = most_likely(fixed.T @ solved)
@@ -209,7 +216,8 @@ def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
 
     The determinant is returned as its logarithm, over those eigenvalues that exceed rounding errors.
     """
-    information, score = reduced[..., 1:, 1:], reduced[..., 1:, 0]
+    information = reduced[..., 1:, 1:]
+    score = reduced[..., 1:, 0]
     values, vectors = np.linalg.eigh(information)
     kept = values > LOST_INFORMATION * values.max(axis=-1, initial=0.0)[..., None]
     sizes = np.where(kept, values, 1.0)
@@ -234,11 +242,13 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
     disturbances are the simpler explanation, which wins unless another raises the likelihood.
     """
     units = np.array((leg_length_m, 1.0))
-    widest, middle = np.maximum(rows.sizes, 2.0 * floors), np.maximum(start.measurement, 2.0 * floors)
+    widest = np.maximum(rows.sizes, 2.0 * floors)
+    middle = np.maximum(start.measurement, 2.0 * floors)
     measured = np.log([np.clip(factor * middle, floors, widest) for factor in NOISE_FACTORS])
     levels = np.log(DISTURBANCES)
     found: dict[tuple[int, ...], Floats] = {}
-    best, most = start, -math.inf
+    best = start
+    most = -math.inf
     for sources in rows.disturbed_by():
         starts = [np.append(own, level) for own in measured for level in levels] if sources else [np.log(middle)]
         if len(sources) == 2:  # one disturbance more than what explains the walk best alone
@@ -251,7 +261,8 @@ def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: No
         bounds = np.log([np.append(own, [bound] * len(sources)) for own, bound in ends]).T
         found[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
         if likelihood > most + LEAST_GAINS[1 in sources]:
-            best, most = noise_at(found[sources], sources, leg_length_m), likelihood
+            best = noise_at(found[sources], sources, leg_length_m)
+            most = likelihood
     return Noise(best.measurement, float(best.roughness_m), float(best.kick))
 
 
@@ -280,7 +291,8 @@ def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) 
 
     leg_length_m  unit of the heights' deviation (m)
     """
-    own, count = np.exp(logs), logs.shape[-1] - len(sources)
+    own = np.exp(logs)
+    count = logs.shape[-1] - len(sources)
     process = np.zeros((*logs.shape[:-1], 2))
     process[..., list(sources)] = own[..., count:]
     return Noise(own[..., :count], leg_length_m * process[..., 0], process[..., 1])

@@ -16,7 +16,10 @@ from walkerlab.physics.orbits.robustness import derivative
 from walkerlab.physics.orbits.step_map import DisturbedWalk, MappedStep, VariedWalk
 from walkerlab.physics.solvers.system import Floats
 
-CLOCK, OFFSET, GAIN, DELAY = "clock_rate", "angle_offset_rad", "angle_gain", "time_offset_s"
+CLOCK = "clock_rate"
+OFFSET = "angle_offset_rad"
+GAIN = "angle_gain"
+DELAY = "time_offset_s"
 NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
     CLOCK: (1.0, 0.1),
     OFFSET: (0.0, 0.1),
@@ -154,7 +157,8 @@ class Forecast:
         p = self.parameters(u)
         if not self.admits(p):
             return None
-        z, sensors = self.start(u), self.sensors(u)
+        z = self.start(u)
+        sensors = self.sensors(u)
         walk = self.walks.disturbed(z, p, heights_m)
         if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
             return None
@@ -172,7 +176,8 @@ class Forecast:
         disturbed  whether derivatives for disturbances are wanted, too
         """
         # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
-        prediction, starts = self.predict(u, heights_m), self.directions.shape[1]
+        prediction = self.predict(u, heights_m)
+        starts = self.directions.shape[1]
         if prediction is None:
             return None
         by_parameter = [self.slope_along(u, unit, heights_m, exact) for unit in np.eye(u.size)[: self.scales.size]]
@@ -192,7 +197,8 @@ class Forecast:
 
         if exact:
             return derivative(values, SAMPLED_STEP if self.measured.sampled else EXACT_STEP)
-        here, ahead = values(0.0), values(QUICK_STEP)
+        here = values(0.0)
+        ahead = values(QUICK_STEP)
         return None if here is None or ahead is None else (ahead - here) / QUICK_STEP
 
     def _by_step(self, walk: DisturbedWalk | VariedWalk, sensors: Mapping[str, float]) -> list[Floats]:
@@ -206,24 +212,29 @@ class Forecast:
 
     def _times(self, walk: DisturbedWalk, sensors: Mapping[str, float]) -> tuple[Floats, NDArray[np.bool_]]:
         """Return the sample times (samples,) from the walk's first heel strike, and whether each is within the walk."""
-        touches, step = np.append(0.0, np.cumsum(walk.durations_s)), self.measured.step
+        touches = np.append(0.0, np.cumsum(walk.durations_s))
+        step = self.measured.step
         times = self._measured_times() / sensors[CLOCK]
         if self.in_phase:
             times = touches[step] + self.measured.phase * walk.durations_s[step]
-        times, last = times + sensors[DELAY], touches[-1] * (1.0 - LAST_INSTANT)
+        times = times + sensors[DELAY]
+        last = touches[-1] * (1.0 - LAST_INSTANT)
         return np.clip(times, 0.0, last), (times >= 0.0) & (times <= last)
 
     def _measured_times(self) -> Floats:
         """Return the sample times (samples,) from the first measured heel strike, on the measurement's clock."""
-        touches, step = np.append(0.0, np.cumsum(self.measured.periods_s)), self.measured.step
+        touches = np.append(0.0, np.cumsum(self.measured.periods_s))
+        step = self.measured.step
         return np.asarray(touches[step] + self.measured.phase * self.measured.periods_s[step])
 
     def _tangents(
         self, u: Floats, heights_m: Floats, lifts: Floats, prediction: Prediction
     ) -> tuple[Floats, Floats] | None:
         """Return derivatives for start and disturbances, (values, columns), and for sensors, (values, nuisances)."""
-        sensors, walk = self.sensors(u), prediction.walk
-        z, starts = self.start(u), self.directions.shape[1]
+        sensors = self.sensors(u)
+        walk = prediction.walk
+        z = self.start(u)
+        starts = self.directions.shape[1]
         along = np.zeros((z.size + heights_m.size, starts + lifts.shape[1]))
         settling = settling_along(self.walks, self._unsettled(u), self.parameters(u), self.directions)
         along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
@@ -231,7 +242,8 @@ class Forecast:
         varied = self.walks.varied(z, self.parameters(u), heights_m, along, prediction.times_s, kicked)
         if varied is None:
             return None
-        angles, count = prediction.angles_rad, self.measured.count
+        angles = prediction.angles_rad
+        count = self.measured.count
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
         moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
         moves = np.concatenate((*self._by_step(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1])))

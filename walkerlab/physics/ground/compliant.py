@@ -93,7 +93,8 @@ def about_foot(assembly: Assembly, foot: int) -> Root:
     ball = assembly.feet[foot]
     tree = tree_about(assembly, Anchor(ball.body, ball.centre_m))
     _, from_centre = tree_about_centre(assembly)
-    feet, hip = [d - from_centre[foot] for d in from_centre], hip_levers(assembly, from_centre[0]) - from_centre[foot]
+    feet = [d - from_centre[foot] for d in from_centre]
+    hip = hip_levers(assembly, from_centre[0]) - from_centre[foot]
     return Root(tree, {"places": 0, "pinned": foot, "root_height": ball.radius_m}, levers_by_axis(feet, hip))
 
 
@@ -108,7 +109,8 @@ def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
     # Without named legs, the first foot takes the place of the hip.
     if not all(assembly.legs):
         return to_foot
-    upper, foot = assembly.legs[STANCE_FOOT][0], assembly.feet[0]
+    upper = assembly.legs[STANCE_FOOT][0]
+    foot = assembly.feet[0]
     hip = Anchor(upper, hinge_point(assembly, upper, assembly.legs[1 - STANCE_FOOT][0]))
     return to_foot + levers(assembly, Anchor(foot.body, foot.centre_m), hip)
 

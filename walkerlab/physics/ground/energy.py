@@ -25,7 +25,8 @@ from walkerlab.physics.mechanics.tree import add_inertia, projections
 def kinetic_energy(form: GroundModel, y: Any) -> float:
     # r is scratch here; only M is used
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
-    half, total = half_size(form), 0.0
+    half = half_size(form)
+    total = 0.0
     omega = y[half + form.places : 2 * half]
     sines_cosines(form, y, s, c)
     add_inertia(form, form.bodies, s, c, omega, M, r)
@@ -67,9 +68,12 @@ def total_energy(system: OnGround, y: Any) -> float:
 def push_power(system: OnGround, t: float, y: Any) -> float:
     if system.form.push_off == 0.0:
         return 0.0
-    s, c, foot = vector(OF_BODIES), vector(OF_BODIES), 1 - system.progress.stance
+    s = vector(OF_BODIES)
+    c = vector(OF_BODIES)
+    foot = 1 - system.progress.stance
     sines_cosines(system.form, y, s, c)
-    push, motion = push_on(system, t, foot, s, c), foot_motion(system.form, foot, s, c, y)
+    push = push_on(system, t, foot, s, c)
+    motion = foot_motion(system.form, foot, s, c, y)
     return push.along * motion.slip + push.upward * motion.vertical_velocity
 
 

@@ -36,7 +36,10 @@ def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet
     forces  (2 + links) generalised forces, N and N m; not computed if the array is empty
     """
     form = system.form
-    y, s, c, torques = vector(OF_STATES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
+    y = vector(OF_STATES)
+    s = vector(OF_BODIES)
+    c = vector(OF_BODIES)
+    torques = vector(OF_BODIES)
     absolute_state(form.slope, chain, q, v, y)
     sines_cosines(form, y, s, c)
     for foot in range(2):

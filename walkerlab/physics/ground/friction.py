@@ -102,7 +102,8 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
     """Evaluate COULOMB_FRICTION = ON of Adams/Solver: a cubic up to v_s, another down to mu_d at v_d, then constant."""
     # The cubic passes through zero, so under a tangential load T and a normal load N a foot creeps, at about
     # v_s (T/N) / (1.5 mu_s).
-    v, v_s = abs(slip), law.stiction_velocity
+    v = abs(slip)
+    v_s = law.stiction_velocity
     if v < v_s:
         mu, slope = smooth_step(slip, -v_s, law.static, v_s, -law.static)
         return mu, slope

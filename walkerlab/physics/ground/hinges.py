@@ -28,7 +28,8 @@ def hip_sign(system: OnGround, row: int) -> float:
 def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
     """Return the angle (rad) by which a hinge's first body is ahead of its second, and its rate (rad/s)."""
     # At the hip the first body is that of the swing leg, so it changes when the legs exchange roles at a touch.
-    form, sign = system.form, hip_sign(system, row)
+    form = system.form
+    sign = hip_sign(system, row)
     return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
 
 
@@ -56,7 +57,8 @@ def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
 @kernel_part
 def bodies_at(system: OnGround, row: int) -> tuple[int, int]:
     """Return the body that a hinge's torque turns back, and the one that it turns forward."""
-    body, other = system.form.hinges[row, 0], system.form.hinges[row, 1]
+    body = system.form.hinges[row, 0]
+    other = system.form.hinges[row, 1]
     return (other, body) if hip_sign(system, row) < 0.0 else (body, other)
 
 
@@ -81,7 +83,8 @@ def add_gradients(system: OnGround, y: Any, by_angle: Any, by_rate: Any) -> None
 @kernel_part
 def hinge_energies(system: OnGround, y: Any) -> tuple[float, float]:
     """Compute the elastic energy (J) of the springs at all hinges, and that in the knees' stops."""
-    springs, stops = 0.0, 0.0
+    springs = 0.0
+    stops = 0.0
     for row in range(len(system.form.hinges)):
         angle, _ = angle_at(system, row, y)
         if is_sprung(system.form, row):
@@ -94,7 +97,8 @@ def hinge_energies(system: OnGround, y: Any) -> tuple[float, float]:
 @kernel_part
 def hinge_powers(system: OnGround, y: Any) -> tuple[float, float]:
     """Compute the power (W) that drives and, negative, dampers supply at all hinges, and that lost in knees' stops."""
-    supplied, lost = 0.0, 0.0
+    supplied = 0.0
+    lost = 0.0
     for row in range(len(system.form.hinges)):
         angle, rate = angle_at(system, row, y)
         if is_sprung(system.form, row):

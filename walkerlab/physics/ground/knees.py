@@ -64,11 +64,14 @@ def lock_knee(whole: GroundModel, form: GroundModel, x: Any, columns: Floats | N
     The state x (size,) and the variational columns (size, columns) are those of `whole`, the form with all bodies.
     """
     x = np.array(x, float)
-    n, p, rates = int(whole.bodies), int(whole.places), x.size - int(whole.bodies)
+    n = int(whole.bodies)
+    p = int(whole.places)
+    rates = x.size - int(whole.bodies)
     after = np.zeros((x.size, 0)) if columns is None else columns.copy()
     E, m = np.zeros((n, n)), int(form.bodies)
     E[:, form.first[:m]] = form.E[0, form.onto[:n], :m]
-    pairs, arms = (whole.A[:n, :n], whole.B[:n, :n]), (whole.arm_x[:n], whole.arm_y[:n])
+    pairs = (whole.A[:n, :n], whole.B[:n, :n])
+    arms = (whole.arm_x[:n], whole.arm_y[:n])
     tree = RootedTree(*pairs, *arms, whole.mass, 0.0, whole.slope)
     x[rates:], lost, after[rates:] = lock(tree, E, x[p : p + n], x[rates:], after[p : p + n], after[rates:])
     return Locked(x, lost, after)

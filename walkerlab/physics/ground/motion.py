@@ -36,8 +36,10 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
     """Compute the force of ground and push-off on a foot, along and normal to the slope (N), and add its
     torques to r.
     """
-    form, push = system.form, push_on(system, t, foot, s, c)
-    along, normal = push.along, push.upward
+    form = system.form
+    push = push_on(system, t, foot, s, c)
+    along = push.along
+    normal = push.upward
     if system.has_ground[foot] != 0:
         motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
         if motion.height < 0.0:
@@ -62,14 +64,16 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
     # r is first the sum of the torques of feet, hinges, stops and centrifugal forces and, in a pinned form, of gravity
     form = system.form
     sines_cosines(form, y, s, c)
-    n, half = form.bodies, half_size(form)
+    n = form.bodies
+    half = half_size(form)
     for k in range(n):
         r[k] = 0.0
     if form.places == 0:
         F, U = vector(OF_BODIES), vector(OF_BODIES)
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
         add_gravity(form, n, F, U, r)
-    along, normal = 0.0, 0.0
+    along = 0.0
+    normal = 0.0
     for foot in range(2):
         force = foot_wrench(system, t, foot, s, c, y, r)
         along += force[0]
@@ -85,7 +89,9 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
 def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     """Evaluate Newton's law for the centre of mass (unless a foot is pinned) and the tree's equations of motion."""
     form = system.form
-    n, half, first = form.bodies, half_size(form), form.places
+    n = form.bodies
+    half = half_size(form)
+    first = form.places
     s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
     along, normal = solve_motion(system, t, y, s, c, M, r)
     for i in range(half):
@@ -100,7 +106,8 @@ def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
 @kernel_part
 def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int) -> tuple[float, float, float]:
     """Differentiate a foot's penetration, its rate and slip with respect to y[j]. F, U (n,) are projected levers."""
-    p, half = form.places, half_size(form)
+    p = form.places
+    half = half_size(form)
     moves = j >= half
     k = (j - half if moves else j) - p
     if k < 0:
@@ -116,14 +123,20 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
 @kernel_part
 def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, J: Any) -> None:
     """Add the derivatives of a foot's force and torques to J. Its rows are divided by mass and inertia later."""
-    form, push = system.form, push_on(system, t, foot, s, c)
+    form = system.form
+    push = push_on(system, t, foot, s, c)
     motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
-    inside, pushed = system.has_ground[foot] != 0 and motion.height < 0.0, push.above != 0.0
+    inside = system.has_ground[foot] != 0 and motion.height < 0.0
+    pushed = push.above != 0.0
     if not inside and not pushed:
         return
-    F, U, p, half = vector(OF_BODIES), vector(OF_BODIES), form.places, half_size(form)
+    F = vector(OF_BODIES)
+    U = vector(OF_BODIES)
+    p = form.places
+    half = half_size(form)
     projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
-    along, normal = push.along, push.upward
+    along = push.along
+    normal = push.upward
     if inside:
         force = foot_force(system, motion)
         along += force.along
@@ -143,7 +156,8 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
 @kernel_part
 def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float, F: Any, U: Any, J: Any) -> None:
     """Add derivatives of a foot's force (`along` and `normal` to the slope) and of its torques to column j of J."""
-    p, half = form.places, half_size(form)
+    p = form.places
+    half = half_size(form)
     if p > 0:
         J[half, j] += along
         J[half + 1, j] += normal
@@ -154,7 +168,9 @@ def add_column(form: GroundModel, foot: int, j: int, along: float, normal: float
 @kernel_part
 def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
     form = system.form
-    n, p, half = form.bodies, form.places, half_size(form)
+    n = form.bodies
+    p = form.places
+    half = half_size(form)
     if p == 0:
         F, U = vector(OF_BODIES), vector(OF_BODIES)
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
@@ -167,9 +183,14 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
 def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     """Compute the Jacobian of the equations of motion, exact except at switching points of the force law."""
     form = system.form
-    n, p, half = form.bodies, form.places, half_size(form)
-    s, c, alpha = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
-    M, by_torque = matrix(OF_BODIES), matrix(OF_BODIES)
+    n = form.bodies
+    p = form.places
+    half = half_size(form)
+    s = vector(OF_BODIES)
+    c = vector(OF_BODIES)
+    alpha = vector(OF_BODIES)
+    M = matrix(OF_BODIES)
+    by_torque = matrix(OF_BODIES)
     for i in range(half):
         for j in range(2 * half):
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0

@@ -39,10 +39,12 @@ class Push(NamedTuple):
 @kernel_part
 def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
     """Compute the push-off on a foot at time t (s). It is zero outside a pulse and on the stance foot."""
-    form, force = system.form, pulse_force(system, t) if foot != system.progress.stance else 0.0
+    form = system.form
+    force = pulse_force(system, t) if foot != system.progress.stance else 0.0
     if force == 0.0:
         return Push(0.0, 0.0, 0.0, 0.0)
-    ahead, above = 0.0, form.radius[foot]
+    ahead = 0.0
+    above = form.radius[foot]
     for k in range(form.bodies):
         forward, upward = lever_to_hip(form, foot, s, c, k)
         ahead += forward

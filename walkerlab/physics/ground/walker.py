@@ -26,7 +26,10 @@ OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
 FIRST_KNEE = HIP_ROW + 1  # row of the first knee in `hinges` and `laws`
 # states of a knee
-RELEASED, BENT, STOPPING, LOCKED = 0, 1, 2, 3
+RELEASED = 0
+BENT = 1
+STOPPING = 2
+LOCKED = 3
 
 
 @tree.fast_fields
@@ -202,10 +205,17 @@ def sines_cosines(form: GroundModel, y: Any, s: Any, c: Any) -> None:
 @kernel_part
 def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMotion:
     """Compute the motion of a ball foot's lowest point, with the slip of the ball's material at that point."""
-    n, half = form.bodies, half_size(form)
-    along, height, slip, vertical_velocity = form.root_along, form.root_height, 0.0, 0.0
+    n = form.bodies
+    half = half_size(form)
+    along = form.root_along
+    height = form.root_height
+    slip = 0.0
+    vertical_velocity = 0.0
     if form.places > 0:
-        along, height, slip, vertical_velocity = y[0], y[1], y[half], y[half + 1]
+        along = y[0]
+        height = y[1]
+        slip = y[half]
+        vertical_velocity = y[half + 1]
     omega = y[half + form.places : 2 * half]
     ahead, above, ahead_rate, above_rate = lever_motion(form.foot_x[foot], form.foot_y[foot], n, s, c, omega)
     for k in range(n):
@@ -251,13 +261,17 @@ def foot_force(laws: Any, motion: FootMotion) -> FootForce:
 def to_form(form: GroundModel, x: Any) -> Floats:
     """Convert a full state (of all bodies), or variational columns, to the state of a form with the same root."""
     # Merged bodies have equal angles and rates up to rounding; those of the first are used.
-    p, half, first = int(form.places), len(x) // 2, form.first[: form.bodies]
+    p = int(form.places)
+    half = len(x) // 2
+    first = form.first[: form.bodies]
     return np.asarray(x)[[*range(p), *(p + first), *range(half, half + p), *(half + p + first)]]
 
 
 def to_full(form: GroundModel, y: Any, size: int) -> Floats:
     """Convert a form's state to the full state (size,) of all bodies with the same root."""
-    p, n, every = int(form.places), int(form.bodies), size // 2 - int(form.places)
+    p = int(form.places)
+    n = int(form.bodies)
+    every = size // 2 - int(form.places)
     onto = form.onto[:every]
     return np.asarray(y)[[*range(p), *(p + onto), *range(p + n, 2 * p + n), *(2 * p + n + onto)]]
 
@@ -265,7 +279,9 @@ def to_full(form: GroundModel, y: Any, size: int) -> Floats:
 @kernel_part
 def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
     """Convert a form's state y to the state of the free walker with all bodies, and write it into `whole`."""
-    n, p, half = form.bodies, form.places, half_size(form)
+    n = form.bodies
+    p = form.places
+    half = half_size(form)
     middle = whole.size // 2
     for i in range(2, middle):
         body = form.onto[i - 2]

@@ -55,13 +55,15 @@ class Motion:
         pieces = []
         for first, end in zip(self._first_samples, ends, strict=True):
             span = slice(first, end) if end - first > 1 else slice(max(first - 1, 0), first + 1)
-            time, velocity = self.time[span], self.velocity[span]
+            time = self.time[span]
+            velocity = self.velocity[span]
             pieces.append((CubicHermiteSpline(time, self.angle[span], velocity), PchipInterpolator(time, velocity)))
         return pieces
 
     def values_at(self, times: Array) -> tuple[Array, Array]:
         """Compute angles and velocities (times, leg) at times (s). At a heel strike, the values just after it."""
-        angle, velocity = np.empty((times.size, LEG_COUNT)), np.empty((times.size, LEG_COUNT))
+        angle = np.empty((times.size, LEG_COUNT))
+        velocity = np.empty((times.size, LEG_COUNT))
         piece_of = np.searchsorted(self.time[self._first_samples], times, side="right") - 1
         for index in np.unique(piece_of):
             inside = piece_of == index
@@ -186,7 +188,8 @@ def smooth_phases(walk: Motion, reference: Motion, phases: Array) -> NDArray[np.
     # Between the two knee strikes the velocities differ by the whole jump, however similar the walks are.
     clear = np.tile(phases >= IMPACT_PHASE, (min(walk.steps, reference.steps), 1))
     for step, row in enumerate(clear):
-        strikes, others = walk.knee_phases(step), reference.knee_phases(step)
+        strikes = walk.knee_phases(step)
+        others = reference.knee_phases(step)
         if strikes.size == others.size:
             for pair in zip(strikes, others, strict=True):
                 row &= (phases < min(pair)) | (phases > max(pair))
@@ -198,10 +201,12 @@ def orbit_distances(walk: Motion, reference: Motion) -> Array:
 
     Each axis is scaled by the reference orbit's range. Raises ValueError if either walk completed no stride.
     """
-    stride, reference_stride = walk.last_stride(), reference.last_stride()
+    stride = walk.last_stride()
+    reference_stride = reference.last_stride()
     distances = np.empty(LEG_COUNT)
     for leg in range(LEG_COUNT):
-        orbit, reference_orbit = phase_plane(stride, leg), phase_plane(reference_stride, leg)
+        orbit = phase_plane(stride, leg)
+        reference_orbit = phase_plane(reference_stride, leg)
         scale = np.ptp(reference_orbit, axis=0)
         distances[leg] = hausdorff(orbit / scale, reference_orbit / scale)
     return distances
@@ -231,7 +236,8 @@ def farthest_distance(points: Array, polyline: Array) -> float:
     largest = 0.0
     for first in range(0, len(points), BLOCK_POINTS):
         x, y = points[first : first + BLOCK_POINTS].T[:, :, None]
-        away_x, away_y = x - start_x, y - start_y
+        away_x = x - start_x
+        away_y = y - start_y
         fraction = np.clip((away_x * edge_x + away_y * edge_y) / length_squared, 0.0, 1.0)
         squared = (away_x - fraction * edge_x) ** 2 + (away_y - fraction * edge_y) ** 2
         largest = max(largest, float(np.sqrt(squared.min(axis=1).max())))

@@ -61,12 +61,15 @@ def hip_height(form: GroundModel, s: Any, c: Any, y: Any) -> float:
 
 @kernel_part
 def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node: int, finder: CrossingFinder) -> None:
-    form, ground, values = system.form, walk_state.ground, finder.values
+    form = system.form
+    ground = walk_state.ground
+    values = finder.values
     s, c = vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(form, y, s, c)
     values[PASSING, node] = 0.0
     for foot in range(2):
-        first, motion = foot * PER_FOOT, relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
+        first = foot * PER_FOOT
+        motion = relative_to_ground(system, foot, foot_motion(form, foot, s, c, y))
         sample_foot(system, motion, cell_edges(ground.terrain, foot, walk_state.cells[foot]), first, node, finder)
         values[first + MATERIAL, node] = material_along(form, foot, motion.along, y)
         values[PASSING, node] += motion.along if foot == 1 else -motion.along
@@ -98,7 +101,8 @@ def earliest_crossing(
     system: OnGround, walk_state: WalkState, watch_order: bool, finder: CrossingFinder
 ) -> tuple[float, int]:
     """Return the fraction of the solver step at which the first event occurs (or NO_CROSSING), and its number."""
-    ground, progress = walk_state.ground, walk_state.progress
+    ground = walk_state.ground
+    progress = walk_state.progress
     first = NO_CROSSING, NO_EVENT
     for foot in range(2):
         if foot == system.form.pinned:

@@ -18,7 +18,8 @@ PER_FOOT = 11
 # event functions of the walker
 PASSING, FALL, SLIDE = range(2 * PER_FOOT, 2 * PER_FOOT + 3)
 # event functions of the knees, two rows each: angle beyond straight, and its rate
-EXTENSION, EXTENSION_RATE = SLIDE + 1, SLIDE + 3
+EXTENSION = SLIDE + 1
+EXTENSION_RATE = SLIDE + 3
 EVENT_FUNCTIONS = SLIDE + 5
 PULSE_END = EVENT_FUNCTIONS  # has no event function: it is due at a fixed time
 NO_EVENT = -1

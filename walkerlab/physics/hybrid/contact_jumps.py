@@ -38,11 +38,15 @@ def change_form(
     # Locks and latches are plastic impacts, a latch also loses the elastic energy of its stop, and a release changes no
     # velocity. The tangent jumps at all of these, and at a step's touch if the hip's torque then acts on the other leg.
     # A push-off starts at that touch, so with a push-off the tangent compares walks at equal times since the touch.
-    y, t, whole = method.y, float(method.clock[T]), walker.forms[int(before.form.places == 0), 0]
+    y = method.y
+    t = float(method.clock[T])
+    whole = walker.forms[int(before.form.places == 0), 0]
     size = int(2 * (whole.places + whole.bodies))
     Phi = observer.tangent.Phi
-    x, columns = to_full(before.form, y, size), to_full(before.form, Phi[: y.size], size)
-    waits, ends_step = np.zeros(Phi.shape[1]), event < PASSING and event % PER_FOOT == HEIGHT
+    x = to_full(before.form, y, size)
+    columns = to_full(before.form, Phi[: y.size], size)
+    waits = np.zeros(Phi.shape[1])
+    ends_step = event < PASSING and event % PER_FOOT == HEIGHT
     if ends_step:  # before the touch the other leg stood
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     if EXTENSION_RATE <= event < PULSE_END:
@@ -77,13 +81,16 @@ def state_rate(system: OnGround, y: Floats, size: int, t: float) -> Floats:
 
 
 def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
-    gradient, p, half = np.zeros(x.size), int(whole.places), x.size // 2
+    gradient = np.zeros(x.size)
+    p = int(whole.places)
+    half = x.size // 2
     if event >= EXTENSION:
         first = half + p if event >= EXTENSION_RATE else p
         knee = (event - EXTENSION) % 2
         gradient[first + whole.knees[knee]] = 1.0, -1.0
         return gradient
-    foot, row = event // PER_FOOT, 0 if event % PER_FOOT == HEIGHT else 1
+    foot = event // PER_FOOT
+    row = 0 if event % PER_FOOT == HEIGHT else 1
     s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
     sines_cosines(whole, x, s, c)
     projections(whole.foot_x[foot], whole.foot_y[foot], whole.bodies, s, c, F, U)

@@ -194,7 +194,9 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     """Accept the event that a solver step just missed, extend that step by `wait` (s), or drop the event."""
     occurs = abs(wait) <= EVENT_TIME
     doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
-    target, refinements, rewinds = search.target + wait, search.refinements + 1, search.rewinds + 1
+    target = search.target + wait
+    refinements = search.refinements + 1
+    rewinds = search.rewinds + 1
     if not occurs and doubtful and start < target <= search.latest:
         return EventSearch(
             target,
@@ -231,7 +233,8 @@ def react(
     system: OnGround, observer: ContactObserver, walk_state: WalkState, method: Any, event: int, until: int
 ) -> int:
     """Apply the event at the end of the last solver step, and return the outcome, GOES_ON or CHANGES_FORM."""
-    steps, locked = walk_state.progress.steps, locked_knees(walk_state.knee)
+    steps = walk_state.progress.steps
+    locked = locked_knees(walk_state.knee)
     outcome = apply_event(system, observer, walk_state, event, method.clock[T], method.y)
     if outcome != endings.GOES_ON:
         return outcome
@@ -270,7 +273,8 @@ def deadline(system: OnGround, walk_state: WalkState, t: float) -> float:
 @kernel_part
 def time_limits(walk_state: WalkState) -> tuple[float, float]:
     """Return the times (s) at which the step and the flight get too long."""
-    progress, pendulum_time = walk_state.progress, walk_state.ground.frame.pendulum_time
+    progress = walk_state.progress
+    pendulum_time = walk_state.ground.frame.pendulum_time
     return progress.last_touch + LONGEST_STEP * pendulum_time, progress.airborne_since + LONGEST_FLIGHT * pendulum_time
 
 

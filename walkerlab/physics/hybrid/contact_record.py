@@ -117,7 +117,8 @@ def observe(
 @kernel_part
 def record_samples(observer: ContactObserver, method: Any, system: OnGround, walk_state: WalkState) -> None:
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    samples, index = observer.samples, observer.tally.recorded
+    samples = observer.samples
+    index = observer.tally.recorded
     y = vector(OF_STATES)[: method.y.size]
     while index < samples.time_s.size and samples.time_s[index] <= method.clock[T]:
         fraction = (samples.time_s[index] - t) / h
@@ -167,7 +168,8 @@ def note_work(observer: ContactObserver, system: OnGround, y: Any) -> None:
 @kernel_part
 def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder: CrossingFinder, foot: int) -> None:
     """Record a foot's largest penetration in the last solver step: at its end, or where the foot stopped sinking in."""
-    end, first = finder.nodes.size - 1, foot * PER_FOOT
+    end = finder.nodes.size - 1
+    first = foot * PER_FOOT
     deepest = -finder.values[first + HEIGHT, end]
     if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
         at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
@@ -204,7 +206,8 @@ def add_work_until(method: Any, system: OnGround, fraction: float, account: Any)
     """Add the work and losses (J) in the first `fraction` of the last solver step to an account (entries,)."""
     rule = quadrature(method)
     nodes, _ = rule
-    fractions, states = vector(nodes), matrix(OF_STATES)
+    fractions = vector(nodes)
+    states = matrix(OF_STATES)
     for i in range(len(nodes)):
         fractions[i] = fraction * nodes[i]
     sample(method, system, fractions, states)
@@ -235,7 +238,10 @@ def foot_work(system: OnGround, states: Any, weights: tuple[float, ...], foot: i
     # If the force law has released the foot, the damping loss is the energy that the ground's spring loses: quadrature
     # would be inaccurate for powers of the penetration. Solver steps end at a release, so the foot stays released
     # within one.
-    damping, friction, let_go, last = 0.0, 0.0, True, len(weights) - 1
+    damping = 0.0
+    friction = 0.0
+    let_go = True
+    last = len(weights) - 1
     for i in range(1, len(weights)):
         power = dissipated_power(system, foot, states[i])
         damping += span * weights[i] * power[0]

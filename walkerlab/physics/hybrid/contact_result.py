@@ -145,7 +145,8 @@ def new_observer(
     tally = new_record(CONTACT_TALLY)
     if track_energy or walker.whole.sprung:
         system = place_on_ground(walker, walk_state.has_ground, level=walk_state.level, progress=walk_state.progress)
-        tally.start_energy, tally.start_spring = total_energy(system, y), hinge_energies(system, y)[0]
+        tally.start_energy = total_energy(system, y)
+        tally.start_spring = hinge_energies(system, y)[0]
         tally.energy_below = tally.start_energy + walker.mass * walker.gravity_along * y[0]
     room = ContactSamples(
         times,
@@ -184,13 +185,15 @@ def walk_on(
     walk = walk_in_form if tolerances.compiled else uncompiled(walk_in_form)
     system = present_walker(walker, walk_state, pinned)
     tangent = observer.tangent.Phi
-    half, root = len(start) // 2, 2 if pinned else 0
+    half = len(start) // 2
+    root = 2 if pinned else 0
     y = to_form(system.form, (*start[root:half], *start[half + root :]))
     if tangent.shape[1] > 0:
         tangent[: y.size] = to_form(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.progress.stopped_at
-    by_size, finder = {y.size: lead}, finder_for(lead, EVENT_ROWS, walker.size)
+    by_size = {y.size: lead}
+    finder = finder_for(lead, EVENT_ROWS, walker.size)
     while True:
         if y.size not in by_size:
             by_size[y.size] = share_counts(tolerances.new(y.size), lead.clock, lead.counts)
@@ -199,7 +202,8 @@ def walk_on(
         ended, event = walk(system, method, finder, observer, walk_state, until)
         if ended != CHANGES_FORM:
             break
-        before, system = system, present_walker(walker, walk_state, pinned)
+        before = system
+        system = present_walker(walker, walk_state, pinned)
         y = change_form(walker, before, system, event, observer, method)
     if tangent.shape[1] > 0:
         tangent[:] = to_full(system.form, tangent[: method.y.size], walker.size)
@@ -225,7 +229,9 @@ def walk_contact(
 
     A start whose hip is already too low is rejected.
     """
-    frame, s, c = ground.frame, vector(OF_BODIES), vector(OF_BODIES)
+    frame = ground.frame
+    s = vector(OF_BODIES)
+    c = vector(OF_BODIES)
     sines_cosines(walker.whole, start, s, c)
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground, stance, steps, start)
@@ -252,10 +258,12 @@ def run_parts(
 ) -> Stopped:
     """Walk the pinned step, if there is one, and then the free steps."""
     # A walk that completed all steps continues, unobserved, until the last stance foot lifts: its slip is then known.
-    y, spent = start, np.zeros(4, np.int64)
+    y = start
+    spent = np.zeros(4, np.int64)
     if pinned:
         first = walk_on(walker, tolerances, walk_state, observer, start, pinned=True)
-        y, spent = first.state, first.work
+        y = first.state
+        spent = first.work
         release_pin(walker, walk_state, y)
         if first.outcome is not Outcome.WALKED:
             return first
@@ -276,7 +284,8 @@ def losses_by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, fl
 
 def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
     """Update the walk state for the release of a pinned foot: it has not slipped or rolled, and is at the surface."""
-    foot, steps = int(walker.forms[1, 0]["pinned"]), walk_state.progress.steps
+    foot = int(walker.forms[1, 0]["pinned"])
+    steps = walk_state.progress.steps
     walk_state.slip[:steps], walk_state.rolling[:steps] = 0.0, 0.0
     walk_state.touched[foot] = material_along(walker.whole, foot, feet_motion(walker.whole, y)[foot].along, y)
     walk_state.slipped[foot], walk_state.rolled[foot] = 0.0, 0.0
@@ -309,7 +318,9 @@ def driven_work(walker: ContactWalker, along: float, up: float, account: Floats)
 def gather(
     stopped: Stopped, walk_state: WalkState, observer: ContactObserver, walker: ContactWalker, tolerances: Tolerances
 ) -> ContactWalkResult:
-    done, lifted, seen = int(walk_state.progress.steps), steps_with_lift(walk_state), int(observer.tally.recorded)
+    done = int(walk_state.progress.steps)
+    lifted = steps_with_lift(walk_state)
+    seen = int(observer.tally.recorded)
     samples = ContactSamples(*(each[:seen] for each in observer.samples)) if observer.samples.time_s.size else None
     strikes = walk_state.knee_strike[:done]
     along, up = (

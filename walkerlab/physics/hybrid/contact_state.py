@@ -70,7 +70,8 @@ class WalkState(NamedTuple):
 
 
 def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, steps: int, y: State) -> WalkState:
-    feet, terrain = feet_motion(walker.whole, y), ground.terrain
+    feet = feet_motion(walker.whole, y)
+    terrain = ground.terrain
     cells = np.array([cell_at(terrain, foot, feet[foot].along) for foot in range(2)], np.int64)
     has_ground = np.zeros(2, np.int8)
     sides, at_zero = initial_sides(walker, feet, stance, y)
@@ -107,7 +108,9 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
 
     A straight swing leg whose foot is not on the ground is in the part of its swing after its knee has locked.
     """
-    knee, swing, whole = np.full(2, RELEASED, np.int8), 1 - stance, walker.whole
+    knee = np.full(2, RELEASED, np.int8)
+    swing = 1 - stance
+    whole = walker.whole
     if walker.kneed:
         knee[stance] = LOCKED
         if extension(whole, swing, y) < -FLEXED:
@@ -125,10 +128,12 @@ def initial_sides(
     """Return the side of zero of every event function at the start, and whether each is zero to rounding."""
     # A function that is zero takes the side towards which its rate points. If the rate is also zero, a foot on the
     # ground counts as below it, and the stance foot counts as ahead of a foot beside it.
-    sides, at_zero = np.zeros(EVENT_FUNCTIONS, np.int8), np.zeros(EVENT_FUNCTIONS, np.int8)
+    sides = np.zeros(EVENT_FUNCTIONS, np.int8)
+    at_zero = np.zeros(EVENT_FUNCTIONS, np.int8)
     sides[[FALL, SLIDE, EXTENSION_RATE, EXTENSION_RATE + 1]] = 1
     sides[[EXTENSION, EXTENSION + 1]] = -1
-    n, whole = int(walker.whole.bodies), walker.whole
+    n = int(walker.whole.bodies)
+    whole = walker.whole
     size = float(max(np.abs(whole.foot_x[0]).max(), np.abs(whole.foot_y[0]).max()))
     speed = max(abs(float(x)) for x in y[2 + n :])
     for foot in range(2):

@@ -155,7 +155,8 @@ def set_foothold(
 def find_ground(walk_state: WalkState, foot: int, above: bool) -> None:
     """Update whether there is ground below a foot in the air, after the feet have changed places or roles."""
     if above:
-        terrain, stands = walk_state.ground.terrain, foot == walk_state.progress.stance
+        terrain = walk_state.ground.terrain
+        stands = foot == walk_state.progress.stance
         has_ground = has_ground_in_air(terrain, walk_state.has_ground[foot] != 0, stands, is_ahead(walk_state, foot))
         walk_state.has_ground[foot] = 1 if has_ground else 0
 
@@ -187,7 +188,8 @@ def touch(
     """Decide whether a touch ends the step, and return an outcome if the walk ends, otherwise GOES_ON."""
     # The step ends if the swing foot comes down far enough ahead, on a pad other than the one it left. A swing foot
     # that comes down on the pad it left, but far from where it stood, scuffs: it has tripped over the pad.
-    stance, terrain = walk_state.progress.stance, walk_state.ground.terrain
+    stance = walk_state.progress.stance
+    terrain = walk_state.ground.terrain
     if walk_state.has_ground[foot] == 0:
         return GOES_ON
     material = material_along(form, foot, feet[foot].along, y)

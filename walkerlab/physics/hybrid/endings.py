@@ -2,10 +2,17 @@
 
 from walkerlab.outcome import Outcome
 
-WALKED, FELL, OFF_PAD = int(Outcome.WALKED), int(Outcome.FELL), int(Outcome.OFF_PAD)
-LIFTED_OFF, SLID, NO_HEEL_STRIKE = int(Outcome.LIFTED_OFF), int(Outcome.SLID), int(Outcome.NO_HEEL_STRIKE)
-BUDGET_EXHAUSTED, SOLVER_FAILED = int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)
-REJECTED, BENT_KNEE, STUBBED = int(Outcome.REJECTED), int(Outcome.BENT_KNEE), int(Outcome.STUBBED)
+WALKED = int(Outcome.WALKED)
+FELL = int(Outcome.FELL)
+OFF_PAD = int(Outcome.OFF_PAD)
+LIFTED_OFF = int(Outcome.LIFTED_OFF)
+SLID = int(Outcome.SLID)
+NO_HEEL_STRIKE = int(Outcome.NO_HEEL_STRIKE)
+BUDGET_EXHAUSTED = int(Outcome.BUDGET_EXHAUSTED)
+SOLVER_FAILED = int(Outcome.SOLVER_FAILED)
+REJECTED = int(Outcome.REJECTED)
+BENT_KNEE = int(Outcome.BENT_KNEE)
+STUBBED = int(Outcome.STUBBED)
 GOES_ON = -1  # the walk has not ended
 CHANGES_FORM = -2  # a contact walk continues in another form: a knee locks or is freed, or the legs change roles
 KNEE_STRUCK = -3  # a rigid swing continues with a straight knee

@@ -27,7 +27,9 @@ def torque_work(torque: float, method: Any, system: Any, finder: CrossingFinder,
     sample_rates(system, finder, row)
     y = finder.states[0, : method.y.size]
     first, _ = legs_apart(system, y)
-    angle, positive, fraction = first, 0.0, 0.0
+    angle = first
+    positive = 0.0
+    fraction = 0.0
     while fraction < until:
         fraction = min(until, first_crossing(finder, row, 0, fraction + ROUNDING if fraction > 0.0 else 0.0, False))
         interpolate(method, system, fraction, y)

@@ -163,30 +163,39 @@ class Recorder:
     """Recorder of a walk, which simulates blocks of steps and accumulates their records."""
 
     def __init__(self, walker: RigidModel, tolerances: Tolerances, start: State, sampled: bool) -> None:
-        self.walker, self.sampled, self.budget = walker, sampled, tolerances.budget
+        self.walker = walker
+        self.sampled = sampled
+        self.budget = tolerances.budget
         self.method = method = tolerances.new(len(walker.zero_state))
         self.start = self.state = start
         self.heights: Array | None = None
         self.nearest = 0.0
         self.locked = False  # whether the swing leg's knee is locked from the start
-        self.time, self.steps, self.grid_index = 0.0, 0, 0
+        self.time = 0.0
+        self.steps = 0
+        self.grid_index = 0
         self.interval = math.sqrt(walker.leg_length / walker.gravity) / SAMPLES_PER_UNIT_TIME
         self.finder = finder_for(method, EVENTS, len(walker.zero_state))
         # walks with a library's method run in Python
         self.walk: Callable[..., tuple[int, int]] = walk if tolerances.compiled else uncompiled(walk)
-        self.numbers, self.kneed = len(walker.zero_state), walker.kneed or walker.exchanged.kneed
+        self.numbers = len(walker.zero_state)
+        self.kneed = walker.kneed or walker.exchanged.kneed
         self.models = models_in_turn(walker)
         self.seen = new_observer(np.zeros(0), self.numbers)
         self.tally: RigidTally = self.seen.tally[()]
         self.counts = np.zeros_like(method.counts)
         no_states = np.zeros((0, self.numbers))
-        self.strikes, self.before, self.after, self.knees = [np.zeros(0)], [no_states], [no_states], [np.zeros(0)]
+        self.strikes = [np.zeros(0)]
+        self.before = [no_states]
+        self.after = [no_states]
+        self.knees = [np.zeros(0)]
         self.pieces: list[Samples] = []
 
     def walk_on(self, rises: Array) -> Outcome:
         """Take up to `rises.size - 1` more steps. `rises` (m) begins with the rise to the present foothold."""
         steps = rises.size - 1
-        seen, times = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest), np.zeros(0)
+        seen = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
+        times = np.zeros(0)
         if self.sampled:  # enough samples for the longest steps
             most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
@@ -197,14 +206,17 @@ class Recorder:
         self.method.counts[BUDGET] = min(steps * BUDGET_OF_A_STEP, self.budget - int(self.counts[RHS]))
         status, taken = self.walk(self.models, self.method, self.finder, observer, np.array(self.state), seen)
         self.counts += self.method.counts
-        total, part = self.tally, observer.tally[()]
+        total = self.tally
+        part = observer.tally[()]
         for name in ("min_normal_force", "min_impulse"):
             total[name] = min(total[name], part[name])
         for name in ("max_friction_ratio", "max_scuff_depth", "energy_drift", "max_impulse_ratio"):
             total[name] = max(total[name], part[name])
         for name in ("strike_loss", "forward_work", "energy_integral", "duration"):
             total[name] += part[name]
-        strikes, before, after = seen.time[:taken] + self.time, seen.before[:taken], seen.after[:taken]
+        strikes = seen.time[:taken] + self.time
+        before = seen.before[:taken]
+        after = seen.after[:taken]
         knees = np.where(seen.knee_time < 0.0, np.nan, seen.knee_time + self.time)
         for k, shank in enumerate(self.models["shank"]):
             knees[k :: self.models.size] = knees[k :: self.models.size] if shank != NO_SHANK else np.nan
@@ -216,7 +228,8 @@ class Recorder:
             self.knees.append(knees[:taken])
         self.steps += taken
         if taken:
-            self.state, self.time = as_state(after[-1]), float(strikes[-1])
+            self.state = as_state(after[-1])
+            self.time = float(strikes[-1])
         return Outcome(status)
 
     def _mean_energy(self, strikes: Array, after: Array) -> float:
@@ -232,7 +245,8 @@ class Recorder:
         """Compute the work done in the completed steps and the energy residual (J). `gravity` is gravity's work (J)."""
         # A push-off does its work before the strike, which loses part of it. The work of a damper does not follow from
         # the states before and after strikes: it is determined by the energy balance, which leaves no residual.
-        walker, rows = self.walker, range(len(self.walker.hinges))
+        walker = self.walker
+        rows = range(len(self.walker.hinges))
         laws = [hinge_law(walker, row) for row in rows]
         starts = np.vstack((self.start, after[:-1])) if self.steps else before
         apart = [[each[:, body] - each[:, other] for body, other in walker.hinges] for each in (starts, before)]
@@ -252,7 +266,8 @@ class Recorder:
         residual = 0.0 if knees is not None or laws[HIP_ROW].damping else residual
         pushed = walker.push_off or walker.exchanged.push_off
         push = float(by_turns(walker, np.arange(len(before)), push_off_work, before).sum()) if pushed else 0.0
-        weight, forward = float(walker.mass * walker.gravity), float(self.tally.forward_work)
+        weight = float(walker.mass * walker.gravity)
+        forward = float(self.tally.forward_work)
         return DrivenWork(weight, gravity, push, hip, torque, forward, knees), abs(residual)
 
     def _samples(self, observer: Observer, strikes: Array, before: Array, after: Array, knees: Array) -> Samples:

@@ -94,24 +94,34 @@ def two_legs(model: RigidModel) -> TwoLegs | None:
 @derivative.case(TwoLegs, forced_inline=True)
 def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     """Evaluate the equations of motion of rigid_model.py, written out for two bodies, for floats or lanes."""
-    R, along, down = system.radius, system.gravity_along, system.gravity_down
+    R = system.radius
+    along = system.gravity_along
+    down = system.gravity_down
     s_1, c_1 = sine_cosine(y[0] + system.slope)
     s_2, c_2 = sine_cosine(y[1] + system.slope)
-    F_1, U_1 = c_1 * system.arm_x[0] - s_1 * system.arm_y[0], s_1 * system.arm_x[0] + c_1 * system.arm_y[0]
-    F_2, U_2 = c_2 * system.arm_x[1] - s_2 * system.arm_y[1], s_2 * system.arm_x[1] + c_2 * system.arm_y[1]
-    cos_d, sin_d = c_1 * c_2 + s_1 * s_2, s_1 * c_2 - c_1 * s_2
-    squared_1, squared_2 = y[2] * y[2], y[3] * y[3]
-    r_1, r_2 = -along * U_1 - down * F_1, -along * U_2 - down * F_2
-    M_12, M_22 = system.A[2] * cos_d + system.B[2] * sin_d, system.A[3] + 0.0 * cos_d
+    F_1 = c_1 * system.arm_x[0] - s_1 * system.arm_y[0]
+    U_1 = s_1 * system.arm_x[0] + c_1 * system.arm_y[0]
+    F_2 = c_2 * system.arm_x[1] - s_2 * system.arm_y[1]
+    U_2 = s_2 * system.arm_x[1] + c_2 * system.arm_y[1]
+    cos_d = c_1 * c_2 + s_1 * s_2
+    sin_d = s_1 * c_2 - c_1 * s_2
+    squared_1 = y[2] * y[2]
+    squared_2 = y[3] * y[3]
+    r_1 = -along * U_1 - down * F_1
+    r_2 = -along * U_2 - down * F_2
+    M_12 = system.A[2] * cos_d + system.B[2] * sin_d
+    M_22 = system.A[3] + 0.0 * cos_d
     if R != 0.0:
         pulled = system.mass * along + squared_1 * F_1 + squared_2 * F_2
         r_2 = r_2 - R * pulled
-        M_12, M_22 = M_12 + R * U_1, M_22 + 2.0 * R * U_2 + system.mass * R * R
+        M_12 = M_12 + R * U_1
+        M_22 = M_22 + 2.0 * R * U_2 + system.mass * R * R
     turning = system.A[2] * sin_d - system.B[2] * cos_d
     r_2 = r_2 + squared_1 * (turning + system.unpaired * sin_d)
     r_1 = r_1 - squared_2 * turning
     hip = hinge_torque(system.hip, y[0] - y[1], y[2] - y[3]).resistance
-    r_1, r_2 = r_1 - hip, r_2 + hip
+    r_1 = r_1 - hip
+    r_2 = r_2 + hip
     inverse = 1.0 / system.A[0]
     factor = M_12 * inverse
     alpha_2 = (r_2 - factor * r_1) / (M_22 - factor * M_12)
@@ -212,8 +222,10 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     or too small.
     """
     rows = memory.rows
-    y, k1 = load_state(rows, START_STATE), load_state(rows, START_RATE)
-    left, tries = load_lanes(rows, TIME_LEFT), load_lanes(rows, TRIES) + 1.0
+    y = load_state(rows, START_STATE)
+    k1 = load_state(rows, START_RATE)
+    left = load_lanes(rows, TIME_LEFT)
+    tries = load_lanes(rows, TRIES) + 1.0
     h = min(load_lanes(rows, NEXT_STEP), left)
     stages, end, end_rate = run_stages(walker, 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(LANE_ERROR_5, stages), combine(LANE_ERROR_3, stages))
@@ -247,7 +259,8 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
 def may_end(walker: TwoLegs, y: Any, end: Any, h: Lanes) -> Lanes:
     """Compute a value, positive where a solver step of h (s) from y to `end` may contain a heel strike or a fall."""
     ahead = hull(y[0] - y[1], h * (y[2] - y[3]), end[0] - end[1], h * (end[2] - end[3]))
-    start, stop = feet_on_slope(walker, y[0], y[1]), feet_on_slope(walker, end[0], end[1])
+    start = feet_on_slope(walker, y[0], y[1])
+    stop = feet_on_slope(walker, end[0], end[1])
     guard = hull(start, h * (y[2] + y[3]), stop, h * (end[2] + end[3]))
     return max(min(ahead[1], -guard[0]), abs(end[1] + walker.slope - walker.upright) - walker.fallen)
 
@@ -265,7 +278,8 @@ def handle_step(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -
         return endings.SOLVER_FAILED
     if rows[ARRIVALS, lane] > 0.0:
         return arrive(walker, memory, observer, lane)
-    strike_at, fall_at = strike_in_step(walker, memory, lane), fall_in_step(walker, memory, lane)
+    strike_at = strike_in_step(walker, memory, lane)
+    fall_at = fall_in_step(walker, memory, lane)
     if fall_at < strike_at:
         return endings.FELL
     if strike_at <= 1.0:
@@ -291,7 +305,8 @@ def move_on(memory: LaneMemory, lane: int) -> None:
 @kernel_part
 def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int:
     """Apply the heel strike if the solver step has reached it, otherwise set the next one to the remaining time."""
-    rows, slots = memory.rows, memory.slots
+    rows = memory.rows
+    slots = memory.slots
     move_on(memory, lane)
     pendulum_time = walker.pendulum_time
     rate = rows[START_STATE + 2, lane] + rows[START_STATE + 3, lane]
@@ -302,10 +317,12 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
         step_before = abs(rows[STEP_BEFORE, lane])
         rows[NEXT_STEP, lane] = max(-step_before, min(step_before, wait))
         return endings.GOES_ON
-    y, new = vector(walker.model.zero_state), vector(walker.model.zero_state)
+    y = vector(walker.model.zero_state)
+    new = vector(walker.model.zero_state)
     bridge(rows, lane, wait, y)
     strike(walker.model, walker.model, AT_STRIKE, y, new)
-    step, t = slots[STEPS_TAKEN, lane], rows[LANE_TIME, lane] + wait
+    step = slots[STEPS_TAKEN, lane]
+    t = rows[LANE_TIME, lane] + wait
     slots[STEPS_TAKEN, lane] += 1
     outcome = record_strike(observer, slots[SLOT_OF_START, lane], step, t, new)
     if outcome == endings.GOES_ON:
@@ -317,7 +334,8 @@ def arrive(walker: TwoLegs, memory: LaneMemory, observer: Any, lane: int) -> int
 def bridge(rows: Any, lane: int, wait: float, y: Any) -> None:
     """Write the state after a short `wait` (s) into y, by a Taylor expansion of second order in the angles."""
     for i in range(2):
-        omega, alpha = rows[START_STATE + 2 + i, lane], rows[START_RATE + 2 + i, lane]
+        omega = rows[START_STATE + 2 + i, lane]
+        alpha = rows[START_RATE + 2 + i, lane]
         y[i] = rows[START_STATE + i, lane] + wait * (omega + 0.5 * wait * alpha)
         y[2 + i] = omega + wait * alpha
 

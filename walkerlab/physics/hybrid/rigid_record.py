@@ -99,12 +99,14 @@ def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: 
         along, normal = momentum(mode.model, before)
         model = following if heel else mode.model
         along_after, normal_after = momentum(model, after)
-        along, impulse = along_after - along, normal_after - normal
+        along = along_after - along
+        impulse = normal_after - normal
         tally.step_strike_loss += energies(mode.model, before)[0] - energies(model, after)[0]
         if heel:
             if model.push_off != 0.0:
                 push = push_off(model, after)
-                along, impulse = along - push.along, impulse - push.upward
+                along = along - push.along
+                impulse = impulse - push.upward
                 tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(push.along) / push.upward)
             tally.strike_loss += tally.step_strike_loss
             tally.forward_work += tally.step_forward_work
@@ -189,7 +191,8 @@ def observe(
         sample(method, mode, finder.nodes, finder.states)
         tally.step_forward_work += torque_work(torque, method, mode, finder, row, fraction).positive
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
-    t_end, spacing = t + fraction * h, 0.125 * fraction
+    t_end = t + fraction * h
+    spacing = 0.125 * fraction
     mean_energy = SIMPSON[0] * tally.energy
     y = vector(mode.model.zero_state)
     before = middle = assumptions_at(method, mode, 0.0)
@@ -200,7 +203,8 @@ def observe(
         for measure in range(3):
             if eighth > 1 and abs(vertex(before[measure], middle[measure], after[measure])) <= 1.0:
                 ascend_to_worst(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
-        before, middle = middle, after
+        before = middle
+        middle = after
     tally.energy_integral += mean_energy * fraction * h
     tally.duration += fraction * h
     index = tally.recorded

@@ -86,16 +86,21 @@ def may_end(system: Mode, method: Any, at_start: bool) -> bool:
     """Whether the last solver step may contain an event, judged by values and rates at its ends. It usually contains
     none.
     """
-    model, old, y, h = system.model, method.y_old, method.y, method.clock[T] - method.clock[T_OLD]
+    model = system.model
+    old = method.y_old
+    y = method.y
+    h = method.clock[T] - method.clock[T_OLD]
     if hip_above_fall(model, y) < 0.0:
         return True
     n = len(model.arm_x)
     if is_bent(system):
         start, end = knee_angle(model, old, 0), knee_angle(model, y, 0)
-        start_rate, end_rate = h * knee_angle(model, old, n), h * knee_angle(model, y, n)
+        start_rate = h * knee_angle(model, old, n)
+        end_rate = h * knee_angle(model, y, n)
         if hull(start, start_rate, end, end_rate, at_start)[1] >= 0.0:
             return True
-    before, now = foot_function(system, old, old[n : 2 * n]), foot_function(system, y, y[n : 2 * n])
+    before = foot_function(system, old, old[n : 2 * n])
+    now = foot_function(system, y, y[n : 2 * n])
     ahead = hull(before[1], h * before[3], now[1], h * now[3])
     return ahead[1] > 0.0 and hull(before[0], h * before[2], now[0], h * now[2])[0] <= 0.0
 
@@ -108,7 +113,9 @@ def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float,
     mid-swing is not a zero. Otherwise they are the foot's height above its next foothold and its distance ahead.
     `turn` (n,) holds rates or a column.
     """
-    model, swing, stance = system.model, turn[SWING], turn[STANCE]
+    model = system.model
+    swing = turn[SWING]
+    stance = turn[STANCE]
     if is_bent(system) or system.rise != 0.0 or not model.alike:
         height, ahead, upward, apart = swing_foot_motion(model, y, turn)
         return height - system.rise, ahead, upward, apart
@@ -122,9 +129,11 @@ def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_s
     These are the bounds of the Bernstein coefficients of Hermite's cubic, widened by an eighth of their spread, far
     more than the cubic's error. With `zero_at_start`, the first coefficient is left out, which divides out this zero.
     """
-    second, third = start + start_rate / 3.0, end - end_rate / 3.0
+    second = start + start_rate / 3.0
+    third = end - end_rate / 3.0
     first = second if zero_at_start else start
-    least, most = min(first, second, third, end), max(first, second, third, end)
+    least = min(first, second, third, end)
+    most = max(first, second, third, end)
     room = HULL_ROOM * (most - least)
     return least - room, most + room
 
@@ -147,7 +156,8 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
-    fall, knee_strike = first_crossing(finder, HIP_FALL, FALLING, 0.0, False), NO_CROSSING
+    fall = first_crossing(finder, HIP_FALL, FALLING, 0.0, False)
+    knee_strike = NO_CROSSING
     if is_bent(system):
         straight = at_start and abs(finder.values[KNEE, 0]) < endings.STRAIGHT_KNEE
         knee_strike = first_crossing(finder, KNEE, RISING, SEARCH_START if straight else 0.0, straight)
@@ -165,10 +175,12 @@ def take_step(
     Returns WALKED and the time of the heel strike, with the state before the strike in `method`; if the step fails,
     returns its outcome and the time at which it ended. The time of a knee strike is written into `strikes`.
     """
-    model, following = walker[step % walker.size], walker[(step + 1) % walker.size]
+    model = walker[step % walker.size]
+    following = walker[(step + 1) % walker.size]
     latest = t + LONGEST_SWING * math.sqrt(model.leg_length / model.gravity)
     phase = BENT if model.shank != NO_SHANK and strikes.knee_time[step] >= 0.0 else STRAIGHT
-    behind, rise = -strikes.rise[step], strikes.rise[step + 1]
+    behind = -strikes.rise[step]
+    rise = strikes.rise[step + 1]
     while True:
         system = Mode(model, phase, behind, rise)
         status = swing_phase(method, system, finder, observer, t, y, latest, step)
@@ -190,7 +202,8 @@ def swing_phase(
 ) -> int:
     """Integrate up to the knee or heel strike that ends a phase, or to the time `latest` (s)."""
     # A phase starts on the strike that ended the previous one; that zero is ignored.
-    limit, coming = latest, False
+    limit = latest
+    coming = False
     at_start = is_bent(system) or system.model.shank == NO_SHANK
     begin(method, system, t, y, method.clock[H_NEXT])
     observe_start(observer, system, y)
@@ -203,7 +216,9 @@ def swing_phase(
         near = may_end(system, method, at_start)
         if near or observer.watching:
             prepare_dense(method, system)
-        strike, fall, knee_strike = NO_CROSSING, NO_CROSSING, NO_CROSSING
+        strike = NO_CROSSING
+        fall = NO_CROSSING
+        knee_strike = NO_CROSSING
         if near:
             sample(method, system, finder.nodes, finder.states)
             strike, fall, knee_strike = events_in_step(system, finder, at_start)
@@ -240,9 +255,13 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
     tangent column strikes (its wait). A heel strike turns a column Phi into J (Phi + f wait), to stay on the section; a
     knee strike turns it into J (Phi + f wait) - f+ wait. f, f+: rates before and after; J: derivative of the jump.
     """
-    model, y, waits = system.model, method.y, strikes.waits
-    n, knee = len(model.arm_x), is_bent(system)
-    before, f = vector(model.zero_state), vector(model.zero_state)
+    model = system.model
+    y = method.y
+    waits = strikes.waits
+    n = len(model.arm_x)
+    knee = is_bent(system)
+    before = vector(model.zero_state)
+    f = vector(model.zero_state)
     for i in range(2 * n):
         before[i] = y[i]
     derivative(system, method.clock[T], before, f)
@@ -258,7 +277,8 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
         for column in range(1, len(y) // (2 * n)):
             at = 2 * n * column
             _, change = event_value(system, y, y[at : at + n])
-            wait, lift = -change / rate, strikes.lift[step + 1, column - 1]
+            wait = -change / rate
+            lift = strikes.lift[step + 1, column - 1]
             if lift != 0.0 and not knee:
                 _, _, upward, _ = swing_foot_motion(model, y, y[n : 2 * n])
                 wait += lift / upward
@@ -295,8 +315,10 @@ def new_heel_strikes(
     `HeelStrikes`.
     """
     before, after = np.zeros((2, steps, m))
-    even, knee_time = np.zeros(steps + 1) if rise is None else rise, np.zeros(steps if kneed else 0)
-    lift, waits = np.zeros((steps + 1, columns)), np.zeros((steps, columns))
+    even = np.zeros(steps + 1) if rise is None else rise
+    knee_time = np.zeros(steps if kneed else 0)
+    lift = np.zeros((steps + 1, columns))
+    waits = np.zeros((steps, columns))
     return HeelStrikes(np.zeros(steps), before, after, knee_time, even, nearest, lift, waits)
 
 

@@ -40,14 +40,28 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     state; they are also mapped and written into `new`.
     """
     # E[phase] makes bodies follow others, such as a locked shank its thigh (see links.py).
-    like, other_foot = model.arm_x, phase == AT_STRIKE
-    n, R, R_before, E = len(like), model.radius, before.radius, model.E[phase]
-    s, c, F, U, foot_F, foot_U = vector(like), vector(like), vector(like), vector(like), vector(like), vector(like)
-    p, jump, turned, M, factors = vector(like), vector(like), vector(like), matrix(like), matrix(like)
+    like = model.arm_x
+    other_foot = phase == AT_STRIKE
+    n = len(like)
+    R = model.radius
+    R_before = before.radius
+    E = model.E[phase]
+    s = vector(like)
+    c = vector(like)
+    F = vector(like)
+    U = vector(like)
+    foot_F = vector(like)
+    foot_U = vector(like)
+    p = vector(like)
+    jump = vector(like)
+    turned = vector(like)
+    M = matrix(like)
+    factors = matrix(like)
     sines_cosines(before, n, y, s, c)
     projections(before.foot_x, before.foot_y, n, s, c, foot_F, foot_U)
     # velocity of the new stance foot's centre, along the slope and normal to it
-    along, upward = -R_before * y[n + STANCE], 0.0
+    along = -R_before * y[n + STANCE]
+    upward = 0.0
     if other_foot:
         for l in range(n):
             along -= foot_U[l] * y[n + l]
@@ -68,9 +82,11 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
     for k in range(n):
         jump[k] = p[k] - new[n + k]
         new[n + k] = p[k]
-    jump_along, jump_upward = -R * p[STANCE] - along, -upward
+    jump_along = -R * p[STANCE] - along
+    jump_upward = -upward
     for at in range(2 * n, len(y), 2 * n):
-        along, upward = -R_before * y[at + n + STANCE], 0.0
+        along = -R_before * y[at + n + STANCE]
+        upward = 0.0
         if other_foot:
             for l in range(n):
                 along -= foot_F[l] * y[at + l] * y[n + l] + foot_U[l] * y[at + n + l]
@@ -82,7 +98,8 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
         if pushed:
             push = push_off(model, new)
             twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
-        turn, rate = new[at : at + n], new[at + n : at + 2 * n]
+        turn = new[at : at + n]
+        rate = new[at + n : at + 2 * n]
         mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
         project(model, constraints, rate, along, upward, twist, turned, p)
         for k in range(n):
@@ -112,7 +129,9 @@ def lock(
     """
     n = len(omega)
     s, c, F, U, p = np.zeros((5, n))
-    M, changes, turned = np.zeros((n, n)), np.zeros(rates.shape), np.zeros(rates.shape)
+    M = np.zeros((n, n))
+    changes = np.zeros(rates.shape)
+    turned = np.zeros(rates.shape)
     sines_cosines(tree, n, angles, s, c)
     add_inertia(tree, n, s, c, omega, M, p)
     factors = M.copy()
@@ -140,10 +159,15 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     """Compute the push-off at a heel strike from the state `new` just after it."""
     s_t, c_t = sine_cosine(new[SWING] + model.slope)
     s_l, c_l = sine_cosine(new[STANCE] + model.slope)
-    R_t, R_l, hip_x, hip_y = model.swing_radius, model.radius, model.swing_hip_x, model.swing_hip_y
+    R_t = model.swing_radius
+    R_l = model.radius
+    hip_x = model.swing_hip_x
+    hip_y = model.swing_hip_y
     # vector from each foot's contact point to the hip, along the slope and normal to it
-    x_t, y_t = c_t * hip_x - s_t * hip_y, s_t * hip_x + c_t * hip_y + R_t
-    x_l, y_l = c_l * model.hip_x - s_l * model.hip_y, s_l * model.hip_x + c_l * model.hip_y + R_l
+    x_t = c_t * hip_x - s_t * hip_y
+    y_t = s_t * hip_x + c_t * hip_y + R_t
+    x_l = c_l * model.hip_x - s_l * model.hip_y
+    y_l = s_l * model.hip_x + c_l * model.hip_y + R_l
     length = math.hypot(x_t, y_t)
     share = model.push_off / length
     angular = share * (x_l * y_t - y_l * x_t)
@@ -166,20 +190,21 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     # the trailing leg carries no other body; its constants about the hip are those with which it swings next
     following = model.exchanged
     leg = [SWING] if following.shank == NO_SHANK else [SWING, int(following.shank)]
-    own, moment_x, moment_y = (
-        following.A[np.ix_(leg, leg)].sum(),
-        following.arm_x[leg].sum(),
-        following.arm_y[leg].sum(),
-    )
+    own = following.A[np.ix_(leg, leg)].sum()
+    moment_x = following.arm_x[leg].sum()
+    moment_y = following.arm_y[leg].sum()
     for pairs in (A, B):
         pairs[STANCE, :], pairs[:, STANCE] = 0.0, 0.0
     A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = own, moment_x, moment_y
     psi = before[:, :n] + model.slope
-    s, c, turned = np.sin(psi), np.cos(psi), psi[:, None, :] - psi[:, :, None]
+    s = np.sin(psi)
+    c = np.cos(psi)
+    turned = psi[:, None, :] - psi[:, :, None]
     inertia = Z.T @ (A * np.cos(turned) + B * np.sin(turned)) @ Z
     moments = Z.T @ np.stack((-s * arm_x - c * arm_y, c * arm_x - s * arm_y), axis=2)
     apparent = model.mass * np.eye(2) - moments.transpose(0, 2, 1) @ np.linalg.solve(inertia, moments)
-    s_t, c_t = s[:, STANCE], c[:, STANCE]
+    s_t = s[:, STANCE]
+    c_t = c[:, STANCE]
     to_hip = np.stack((c_t * model.hip_x - s_t * model.hip_y, s_t * model.hip_x + c_t * model.hip_y + model.radius), 1)
     impulse = following.push_off * to_hip / np.linalg.norm(to_hip, axis=1, keepdims=True)
     return np.asarray(0.5 * (impulse[:, None, :] @ np.linalg.solve(apparent, impulse[:, :, None]))[:, 0, 0])
@@ -188,7 +213,9 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
 def pushed_at_hip(model: RigidModel, y: Any, impulse: float) -> NDArray[np.float64]:
     """Return the state y (2 n,) after an impulse (N s) at the hip along the slope, applied just after a heel strike."""
     # The new stance foot stays at rest. The trailing knee is already released and moves freely.
-    n, new, E = len(model.arm_x), np.array(y, float), model.E[BENT if model.kneed else STRAIGHT]
+    n = len(model.arm_x)
+    new = np.array(y, float)
+    E = model.E[BENT if model.kneed else STRAIGHT]
     s, c, F, U, p = np.zeros((5, n))
     M = np.zeros((n, n))
     equations(model, new, s, c, F, U, M, p)
@@ -247,7 +274,8 @@ def mass_change(model: Any, s: Any, c: Any, turn: Any, jump: Any, along: float, 
         turn_k = turn[k]
         total = -F[k] * turn_k * along - U[k] * turn_k * upward
         for l in range(n):
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            cos_d = c[l] * c[k] + s[l] * s[k]
+            sin_d = s[l] * c[k] - c[l] * s[k]
             total += (model.B[k, l] * cos_d - model.A[k, l] * sin_d) * (turn[l] - turn_k) * jump[l]
         p[k] = total
         pulled += F[k] * turn_k * jump[k]

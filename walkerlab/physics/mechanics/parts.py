@@ -95,7 +95,8 @@ class Assembly:
             self.index(body)
         group = list(range(len(names)))
         for joint in self.joints:
-            one, other = group[self.index(joint.parent)], group[self.index(joint.child)]
+            one = group[self.index(joint.parent)]
+            other = group[self.index(joint.child)]
             if one == other:
                 raise ValueError(f"hinge {joint.name!r} makes a closed loop; only trees can be assembled")
             group = [one if of == other else of for of in group]

@@ -70,7 +70,8 @@ def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bo
     to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m)).sum(axis=0)
     swing_to_hip = levers(assembly, swing_root, Anchor(hip.child, hip.child_point_m)).sum(axis=0)
     soles = np.array([[foot.radius_m, *to_hip], [swing_foot.radius_m, *swing_to_hip]])
-    n, members = len(places.names), places.members
+    n = len(places.names)
+    members = places.members
     coupled = {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
     knees = {shank: np.eye(n)[thigh] for shank, thigh in places.knees}
     # the place of a shank in a straight leg beside a kneed one stays in line with the leg
@@ -185,7 +186,9 @@ def are_equal(one: Floats, other: Floats) -> bool:
 
 def leg_measures(assembly: Assembly, k: int) -> tuple[Floats, ...]:
     """Return the sole of a leg, and the constants of its bodies about the hip, which do not depend on the hip mass."""
-    leg, foot, hip = assembly.legs[k], assembly.feet[k], find_hip(assembly)
+    leg = assembly.legs[k]
+    foot = assembly.feet[k]
+    hip = find_hip(assembly)
     at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)
     own = [assembly.index(name) for name in leg]
     sole = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[own].ravel()]

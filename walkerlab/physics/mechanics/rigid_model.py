@@ -42,9 +42,12 @@ from walkerlab.physics.mechanics.tree import (
 from walkerlab.physics.mechanics.trigonometry import sine_cosine
 from walkerlab.physics.solvers.system import Floats, Integers, block, derivative, jacobian
 
-SWING, STANCE = 0, 1
+SWING = 0
+STANCE = 1
 # indices into E: swing knee bent, swing leg straight, heel strike
-BENT, STRAIGHT, AT_STRIKE = 0, 1, 2
+BENT = 0
+STRAIGHT = 1
+AT_STRIKE = 2
 NO_SHANK = -1
 
 
@@ -135,7 +138,8 @@ def with_fields(model: Any, fields: Any) -> RigidModel:
 
 def pair(first: RigidModel, second: RigidModel) -> RigidModel:
     """Return `first`, in which leg 1 swings, with the model `second`, in which leg 2 swings."""
-    model, other = with_fields(first, {}), with_fields(second, {})
+    model = with_fields(first, {})
+    other = with_fields(second, {})
     object.__setattr__(model, "paired_with", other)
     return model
 
@@ -179,7 +183,8 @@ def new_rigid_model(n: int, **fields: Any) -> RigidModel:
 
 
 def change_slope(model: RigidModel, slope: float) -> RigidModel:
-    along, down = model.gravity * math.sin(slope), model.gravity * math.cos(slope)
+    along = model.gravity * math.sin(slope)
+    down = model.gravity * math.cos(slope)
     return model.changed(slope=slope, gravity_along=along, gravity_down=down)
 
 
@@ -227,7 +232,9 @@ def equations(model: RigidModel, y: Any, s: Any, c: Any, F: Any, U: Any, M: Any,
 @forced_inline
 def torque_at(model: RigidModel, row: int, y: Any) -> HingeTorque:
     """Compute the torque of the spring, damper and drive at a hinge."""
-    n, body, other = len(model.arm_x), model.hinges[row, 0], model.hinges[row, 1]
+    n = len(model.arm_x)
+    body = model.hinges[row, 0]
+    other = model.hinges[row, 1]
     return hinge_torque(hinge_law(model, row), y[body] - y[other], y[n + body] - y[n + other])
 
 
@@ -250,7 +257,8 @@ def add_unpaired_torque(model: RigidModel, s: Any, c: Any, omega: Any, r: Any) -
 def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_angle: Any, by_rate: Any) -> None:
     """Add the derivatives of the unpaired torque with respect to angles and rates to by_angle and by_rate (n, n)."""
     if model.unpaired != 0.0:
-        cos_d, sin_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE], s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
+        cos_d = c[SWING] * c[STANCE] + s[SWING] * s[STANCE]
+        sin_d = s[SWING] * c[STANCE] - c[SWING] * s[STANCE]
         turning = model.unpaired * omega[SWING] * omega[SWING] * cos_d
         by_angle[STANCE, SWING] += turning
         by_angle[STANCE, STANCE] -= turning
@@ -261,16 +269,23 @@ def add_unpaired_gradients(model: RigidModel, s: Any, c: Any, omega: Any, by_ang
 def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
     """Evaluate the equations of motion as a first-order system, and the variational equations for the columns."""
     model = system.model
-    like, E = model.arm_x, model.E[system.phase]
+    like = model.arm_x
+    E = model.E[system.phase]
     n = len(like)
-    s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
+    s = vector(like)
+    c = vector(like)
+    F = vector(like)
+    U = vector(like)
+    alpha = vector(like)
+    M = matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
     factor_linked(E, n, M)
     solve_linked(E, n, M, alpha)
     for k in range(n):
         f[k], f[n + k] = y[n + k], alpha[k]
     if len(y) > 2 * n:
-        by_angle, by_rate = matrix(like), matrix(like)
+        by_angle = matrix(like)
+        by_rate = matrix(like)
         torque_gradients(model, y, s, c, alpha, by_angle, by_rate)
         for at in range(2 * n, len(y), 2 * n):
             # from here on alpha holds d alpha, the solution of E^T M' E d alpha = E^T (dr' - dM' alpha)
@@ -288,7 +303,9 @@ def mode_derivative(system: Mode, t: float, y: Any, f: Any) -> None:
 def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_angle: Any, by_rate: Any) -> None:
     """Write the derivatives of r' - M' alpha at fixed alpha into by_angle and by_rate (n, n)."""
     n, R = len(model.arm_x), model.radius
-    omega, F, U = y[n : 2 * n], vector(model.arm_x), vector(model.arm_x)
+    omega = y[n : 2 * n]
+    F = vector(model.arm_x)
+    U = vector(model.arm_x)
     projections(model.arm_x, model.arm_y, n, s, c, F, U)
     for k in range(n):
         for l in range(n):
@@ -311,10 +328,17 @@ def torque_gradients(model: RigidModel, y: Any, s: Any, c: Any, alpha: Any, by_a
 def mode_jacobian(system: Mode, t: float, y: Any, J: Any) -> None:
     """Compute the Jacobian (2 n, 2 n) of the equations of motion, column by column."""
     model = system.model
-    like, E = model.arm_x, model.E[system.phase]
+    like = model.arm_x
+    E = model.E[system.phase]
     n = len(like)
-    s, c, F, U, alpha, M = vector(like), vector(like), vector(like), vector(like), vector(like), matrix(like)
-    by_angle, by_rate = matrix(like), matrix(like)
+    s = vector(like)
+    c = vector(like)
+    F = vector(like)
+    U = vector(like)
+    alpha = vector(like)
+    M = matrix(like)
+    by_angle = matrix(like)
+    by_rate = matrix(like)
     equations(model, y, s, c, F, U, M, alpha)
     factor_linked(E, n, M)
     solve_linked(E, n, M, alpha)

@@ -90,7 +90,8 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
 
 def mechanism_shapes(n: int, phases: int, rows: int) -> dict[str, tuple[int, ...]]:
     """Return the shapes of a Mechanism's arrays for given numbers of bodies, phases and hinges (`rows`)."""
-    pairs, arms = dict.fromkeys(("A", "B"), (n, n)), dict.fromkeys(("arm_x", "arm_y"), (n,))
+    pairs = dict.fromkeys(("A", "B"), (n, n))
+    arms = dict.fromkeys(("arm_x", "arm_y"), (n,))
     return {**pairs, **arms, "E": (phases, n, n), "hinges": (rows, 2), "laws": (rows, LAW_NUMBERS)}
 
 
@@ -123,9 +124,13 @@ def projections(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, F: Any, U: A
 @forced_inline
 def lever_motion(lever_x: Any, lever_y: Any, n: int, s: Any, c: Any, omega: Any) -> tuple[float, float, float, float]:
     """Compute position (m) and velocity (m/s) of a point relative to the root, along and normal to the slope."""
-    along, height, along_rate, height_rate = 0.0, 0.0, 0.0, 0.0
+    along = 0.0
+    height = 0.0
+    along_rate = 0.0
+    height_rate = 0.0
     for k in range(n):
-        forward, upward = c[k] * lever_x[k] - s[k] * lever_y[k], s[k] * lever_x[k] + c[k] * lever_y[k]
+        forward = c[k] * lever_x[k] - s[k] * lever_y[k]
+        upward = s[k] * lever_x[k] + c[k] * lever_y[k]
         along += forward
         height += upward
         along_rate -= upward * omega[k]
@@ -147,7 +152,8 @@ def add_inertia(tree: Any, n: int, s: Any, c: Any, omega: Any, M: Any, r: Any) -
         M[k, k] = tree.A[k, k]
         for l in range(k):
             A, B = tree.A[k, l], tree.B[k, l]
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            cos_d = c[l] * c[k] + s[l] * s[k]
+            sin_d = s[l] * c[k] - c[l] * s[k]
             M[k, l] = A * cos_d + B * sin_d
             M[l, k] = M[k, l]
             turning = A * sin_d - B * cos_d
@@ -171,7 +177,8 @@ def add_inertia_gradients(
         own = 0.0
         for l in range(n):
             A, B = tree.A[k, l], tree.B[k, l]
-            cos_d, sin_d = c[l] * c[k] + s[l] * s[k], s[l] * c[k] - c[l] * s[k]
+            cos_d = c[l] * c[k] + s[l] * s[k]
+            sin_d = s[l] * c[k] - c[l] * s[k]
             turning = A * sin_d - B * cos_d
             between = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
             own -= between

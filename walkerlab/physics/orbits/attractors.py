@@ -23,7 +23,8 @@ MAX_PERIOD = 48  # steps; longer cycles count as aperiodic
 REPEAT_DISTANCE = 1e-5  # points closer than this count as equal
 # a walk converges to a cycle if points a period apart are closer than NEAR_REPEAT, and if the largest such distance in
 # the last third of the walk is below MAX_APPROACH_RATIO times that in the first third
-NEAR_REPEAT, MAX_APPROACH_RATIO = 1e-3, 0.8
+NEAR_REPEAT = 1e-3
+MAX_APPROACH_RATIO = 0.8
 GAIT_OFFSET = 1e-2  # offset from an unstable gait, as a fraction of the largest coordinate
 MAX_BLOCKS, MIN_BLOCKS, BLOCK_LENGTH = 64, 10, 5.0  # blocks per walk; length of a block in correlation times
 MAX_WALKS = 8  # walks per exponent
@@ -113,7 +114,8 @@ def sweep_attractor(
                 middle = 0.5 * (attractors[-1].value + lost)
                 halfway = settle(step_map, attractors[-1].last, middle, transient, steps)
                 if isinstance(halfway, Outcome):
-                    lost, settled = middle, halfway
+                    lost = middle
+                    settled = halfway
                 else:
                     attractors.append(halfway)
             return AttractorBranch(tuple(attractors), lost, settled.label)
@@ -139,7 +141,8 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
         growth = np.log(np.maximum(walk.lengths[transient:], np.finfo(float).tiny))
         repeats = find_period(walk.points[transient:]) > 0
         blocks = MIN_BLOCKS if repeats else min(MAX_BLOCKS, independent_blocks(growth))
-        exponent, error = float(growth.mean()), standard_error(growth, max(MIN_BLOCKS, blocks))
+        exponent = float(growth.mean())
+        error = standard_error(growth, max(MIN_BLOCKS, blocks))
         drift = abs(float(growth[: steps // 2].mean() - growth[steps // 2 :].mean()))
         if repeats and exponent <= 0.0 and drift < 1.0 / steps:
             break
@@ -176,7 +179,8 @@ def feigenbaum_ratios(flips: list[float]) -> list[float]:
 def close_returns(step_map: StepMap, attractor: Attractor, periods: Iterable[int], steps: int) -> list[Seed]:
     """Walk on an attractor and return points that nearly repeat after one of `periods`, as seeds of unstable gaits."""
     walk = step_map.iterate(attractor.last, attractor.value, steps, None)
-    points, seeds = walk.points, []
+    points = walk.points
+    seeds = []
     for period in periods:
         if points.shape[0] <= period:
             continue

@@ -32,10 +32,12 @@ RESETTLING_STEPS = 400  # further steps of settled walks, at tight tolerances
 RETURN_STEPS = 1_000  # steps within which a walk near an attractor must come ten times closer to it
 MAX_SETTLED_WALKS = 32  # maximum number of settled walks that are continued
 CAPTURE = 1e-3  # largest distance at which an attractor counts as reached
-NARROWING, NARROWINGS = 0.25, 6
+NARROWING = 0.25
+NARROWINGS = 6
 STARTS_PER_POINT = 24  # test walks started around each point of an attractor; all must return to it
 # steps between checks for capture; maximum number of right-hand-side evaluations per step
-STEPS_PER_LOOK, BATCH_BUDGET = 16, 4_000_000
+STEPS_PER_LOOK = 16
+BATCH_BUDGET = 4_000_000
 
 # Unit walker. Walkers with two straight legs walk from many starts simultaneously, in lanes; others from one at a time.
 Walker = TwoLegs | RigidModel
@@ -125,13 +127,17 @@ def walk_one_by_one(
     walker: RigidModel, capture: Capture, starts: Floats, fates: Fates, tolerances: tuple[float, float]
 ) -> None:
     """Walk from one start after another with any walker, and check for capture after each batch of steps."""
-    shooting, section = RigidStepper(walker, Tolerances("dop853", *tolerances, BATCH_BUDGET)), strike_section(walker)
+    shooting = RigidStepper(walker, Tolerances("dop853", *tolerances, BATCH_BUDGET))
+    section = strike_section(walker)
     for number, start in enumerate(starts):
-        z, steps = start, 0
+        z = start
+        steps = 0
         outcome = REJECTED if hip_above_fall(walker, state_on_section(walker, start)) < 0.0 else WALKED
         while outcome == WALKED and steps < capture.most:
             part = shooting.walk(section, z, min(STEPS_PER_LOOK, capture.most - steps), derived=False)
-            outcome, points, steps_taken = int(part.outcome), part.z, part.time.size
+            outcome = int(part.outcome)
+            points = part.z
+            steps_taken = part.time.size
             near = ((points[:, None] - capture.points) ** 2).sum(axis=2) < capture.reach
             if near.any():
                 steps_taken = int(np.argmax(near.any(axis=1))) + 1

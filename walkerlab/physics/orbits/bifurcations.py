@@ -31,7 +31,9 @@ class GaitEquations:
     """Gait equations P^n(z) - z = 0 in the unknowns x = (z, p / scale)."""
 
     def __init__(self, step_map: StepMap, period: int, scale: float) -> None:
-        self.step_map, self.period, self.scale = step_map, period, scale
+        self.step_map = step_map
+        self.period = period
+        self.scale = scale
 
     def __call__(self, x: Floats) -> Evaluated[Cycle]:
         cycle = walk_steps(self.step_map, x[:-1], self.value(x), self.period)
@@ -118,14 +120,16 @@ def flip_form(equations: GaitEquations, flip: Bifurcation) -> FlipForm | None:
     v, w = eigenvector(A, -1.0), eigenvector(A.T, -1.0)
     w = w / (w @ v)
     segment = flip.segment
-    s, gap = float(segment.first.tangent @ (flip.point.x - segment.first.x)), 1e-3 * segment.length
+    s = float(segment.first.tangent @ (flip.point.x - segment.first.x))
+    gap = 1e-3 * segment.length
     neighbours = [segment.point_at(s + h) for h in (-gap, gap)]
     passing = [float(w @ point.evaluated.data.DP @ v) for point in neighbours if isinstance(point, CurvePoint)]
     if len(passing) < 2:
         return None
     # negative derivative with respect to s of the multiplier that crosses -1
     rate = (passing[0] - passing[1]) / (2.0 * gap)
-    form, probe = None, NORMAL_FORM_STEP
+    form = None
+    probe = NORMAL_FORM_STEP
     for _ in range(FORM_REFINEMENTS):
         terms = _cubic(equations, flip, v, w, probe)
         if terms is None:

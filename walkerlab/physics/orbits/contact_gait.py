@@ -27,9 +27,11 @@ WARM_UP_STEPS = (4, 2, 0)  # numbers of steps to walk before Newton's method, tr
 SEARCH_STEP_BUDGET = 40_000  # right-hand-side evaluations per step
 CONTACT_EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
 # factors from actual to nearly rigid ground, by which the stiffness rises and the friction velocities fall
-MAX_STIFFENING, MAX_CREEP_FACTOR = 100.0, 30.0
+MAX_STIFFENING = 100.0
+MAX_CREEP_FACTOR = 30.0
 # strides from nearly rigid ground (0) to the actual ground (1)
-FIRST_STRIDE, RIGIDITY_STRIDES = 0.25, Strides(1.0, 0.02, 2)
+FIRST_STRIDE = 0.25
+RIGIDITY_STRIDES = Strides(1.0, 0.02, 2)
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ def why_no_gait(walker: ContactWalker) -> tuple[str, str] | None:
     """Return reason and advice if conservation of momentum or energy excludes a gait on this ground, otherwise None."""
     if walker.slope <= 0.0 and not walker.driven:
         return "a walker that does not descend loses energy with every step", "Let the slope descend: slope_deg > 0."
-    friction, required = walker.friction.largest, abs(math.tan(walker.slope))
+    friction = walker.friction.largest
+    required = abs(math.tan(walker.slope))
     if friction == 0.0 and not walker.driven:
         return (
             "without friction nothing holds the walker back: it gathers speed along the slope",

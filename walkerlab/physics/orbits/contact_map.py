@@ -57,7 +57,9 @@ from walkerlab.physics.solvers.system import Floats, State
 
 # indices of the position along the slope, the height and the first body's angle in the state; velocities follow in the
 # same order
-ALONG, HEIGHT, ANGLES = 0, 1, 2
+ALONG = 0
+HEIGHT = 1
+ANGLES = 2
 NEWTON_STEPS = 20
 
 
@@ -90,7 +92,8 @@ def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
 
 def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
     """Set the angles (n,), or changes of angles, of coupled bodies that are not `fixed`, and return `angles`."""
-    form, n = walker.whole, angles.size
+    form = walker.whole
+    n = angles.size
     shank, thigh = form.knees[stance]
     if walker.kneed and shank not in fixed:
         angles[shank] = angles[thigh]
@@ -110,13 +113,15 @@ def feet_apart(walker: ContactWalker, angles: Floats) -> tuple[float, Floats]:
 def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
     """Return the walker's state at section coordinates z, standing on leg `stance`, at position 0 along the slope."""
     n = int(walker.whole.bodies)
-    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    turning = turning_bodies(walker, stance)
+    angled = angled_bodies(walker, stance)
     state = np.zeros(4 + 2 * n)
     state[HEIGHT], (state[2 + n], state[3 + n]) = z[0], z[1 + len(angled) : 3 + len(angled)]
     rates = np.zeros(n)
     rates[list(turning)] = z[3 + len(angled) :]
     state[4 + n :] = fill_followers(walker, stance, rates, turning)
-    angles, upper = np.zeros(n), turning[0]
+    angles = np.zeros(n)
+    upper = turning[0]
     angles[list(angled)] = z[1 : 1 + len(angled)]
     angles[upper] = angles[walker.legs[stance][0]]
     turned = fill_followers(walker, stance, np.eye(n)[upper], (upper, *angled))
@@ -134,7 +139,8 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
 def stand(walker: ContactWalker, z: Floats, stance: int) -> Floats:
     """Return section coordinates moved so that the stance foot rests on the ground at its static penetration."""
     foot = feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
-    law, weight = walker.normal, walker.mass * walker.gravity_down
+    law = walker.normal
+    weight = walker.mass * walker.gravity_down
     depth = resting_foot(weight, walker.mass, law.stiffness, law.exponent, law.damping).depth
     along_rate = 1 + len(angled_bodies(walker, stance))
     moved = z.copy()
@@ -153,7 +159,8 @@ def coordinates_of(walker: ContactWalker, state: Floats, stance: int) -> Floats:
 def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats:
     """Differentiate `state_on_section` with respect to z at one of its states. The result is (4 + 2 n, coordinates)."""
     n = int(walker.whole.bodies)
-    turning, angled = turning_bodies(walker, stance), angled_bodies(walker, stance)
+    turning = turning_bodies(walker, stance)
+    angled = angled_bodies(walker, stance)
     along = np.zeros((4 + 2 * n, 3 + len(angled) + len(turning)))
     _, gradient = feet_apart(walker, np.array(state[ANGLES : ANGLES + n]))
     fixed = (turning[0], *angled)
@@ -197,7 +204,8 @@ def step_from_section(
     if derived:
         observer.tangent.Phi[:, :] = section_tangents(walker, start, stance)
     stopped = walk_on(walker, tolerances, walk_state, observer, start, 1)
-    end, landed = np.array(stopped.state), 1 - stance
+    end = np.array(stopped.state)
+    landed = 1 - stance
     along = feet_motion(walker.whole, stopped.state)[landed].along
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
     rolled = along - float(walk_state.foothold[landed]) - slipped
@@ -205,7 +213,8 @@ def step_from_section(
     if derived:  # project the flow's derivative onto the section, along the flow
         system = present_walker(walker, walk_state)
         rate = state_rate(system, to_form(system.form, end), end.size, stopped.time_s)
-        gradient, n = np.zeros(end.size), int(walker.whole.bodies)
+        gradient = np.zeros(end.size)
+        n = int(walker.whole.bodies)
         gradient[ANGLES : ANGLES + n] = feet_apart(walker, end[ANGLES : ANGLES + n])[1]
         Phi = observer.tangent.Phi
         on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
@@ -237,7 +246,8 @@ def walk_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
-    start, steps = state_on_section(walker, z, STANCE_FOOT), heights.size - 1
+    start = state_on_section(walker, z, STANCE_FOOT)
+    steps = heights.size - 1
     walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
@@ -258,7 +268,8 @@ def walk_from_section(
         z[0] -= walk_state.level[stance]
         stopped = go_on(walk_state, stopped.state)
     touched = int(walk_state.progress.steps)
-    times, places = walk_state.touch_time[:touched], walk_state.touch_along[:touched]
+    times = walk_state.touch_time[:touched]
+    places = walk_state.touch_along[:touched]
     angles = touch_angles(walker, ground.frame.leg_length, np.diff(places), np.diff(walk_state.touch_height[:touched]))
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), angles, z)
 
@@ -293,9 +304,11 @@ def shorten(walk_state: WalkState, steps: int) -> WalkState:
 
 def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse: float) -> State:
     """Return a state of the free walker just after an impulse (N s) at the hip along the slope."""
-    form, new = system.form, np.array(state)
+    form = system.form
+    new = np.array(state)
     y = to_form(form, new)
-    n, half = int(form.bodies), int(form.places + form.bodies)
+    n = int(form.bodies)
+    half = int(form.places + form.bodies)
     s, c, r = np.zeros((3, n))
     M = np.zeros((n, n))
     sines_cosines(form, y, s, c)
@@ -367,18 +380,23 @@ class ContactMap(StepMap):
             return replace_terrain(site, after_mid_swing(step_length_m))
 
         self._at = site_at
-        self.scale, self.tolerances, self._on_pads = scale, tolerances, like.ground.terrain.has_pads
-        angled, turning = angled_bodies(like.walker, STANCE_FOOT), turning_bodies(like.walker, STANCE_FOOT)
+        self.scale = scale
+        self.tolerances = tolerances
+        self._on_pads = like.ground.terrain.has_pads
+        angled = angled_bodies(like.walker, STANCE_FOOT)
+        turning = turning_bodies(like.walker, STANCE_FOOT)
         rates = (f"rate_{body}" for body in turning)
         self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
-        L, tau = like.ground.frame.leg_length, like.ground.frame.pendulum_time
+        L = like.ground.frame.leg_length
+        tau = like.ground.frame.pendulum_time
         self._units = np.array([L, *[1.0] * len(angled), L / tau, L / tau, *[1.0 / tau] * len(turning)])
 
     def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units)
 
     def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, swing: int = 0) -> SectionStep:
-        pitch_m, stance = site.ground.terrain.pitch, stance_of(swing)
+        pitch_m = site.ground.terrain.pitch
+        stance = stance_of(swing)
         return step_from_section(site.walker, site.ground, self.tolerances, z * self._units, pitch_m, derived, stance)
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
@@ -393,10 +411,13 @@ class ContactMap(StepMap):
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         site = valid(self._at(p))
-        slip, tripped, start = 0.0, 0.0, z
+        slip = 0.0
+        tripped = 0.0
+        start = z
         for swing in range(steps):
             step = self._walk(site, start, False, swing)
-            slip, start = max(slip, abs(step.slip_m)), step.z / self._units
+            slip = max(slip, abs(step.slip_m))
+            start = step.z / self._units
             if self._on_pads and steps == 1:
                 on_pads = replace_terrain(site, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(self._walk(on_pads, z, False).outcome is not Outcome.WALKED)
@@ -414,7 +435,8 @@ class ContactMap(StepMap):
         return z if site is None else stand(site.walker, z * self._units, STANCE_FOOT) / self._units
 
     def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        site, touch = valid(self._at(p)), self.step(z, p, derived=False)
+        site = valid(self._at(p))
+        touch = self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
         return legs_sampled_from_section(site.walker, site.ground, endless, z * self._units, heights_m, times)
@@ -446,11 +468,15 @@ class OwnPads(Stepper):
         tolerances: Tolerances,
         *pitches_m: float,
     ) -> None:
-        self.walker_at, self.ground, self.tolerances, self.pitches_m = walker_at, ground, tolerances, [*pitches_m]
+        self.walker_at = walker_at
+        self.ground = ground
+        self.tolerances = tolerances
+        self.pitches_m = [*pitches_m]
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         place = swing % len(self.pitches_m)
-        walker, pitch_m = self.walker_at(p), self.pitches_m[place]
+        walker = self.walker_at(p)
+        pitch_m = self.pitches_m[place]
         step = step_from_section(walker, self.ground, self.tolerances, z, pitch_m, derived, stance_of(swing))
         if step.outcome is Outcome.WALKED:
             self.pitches_m[place] = step.length_m if len(self.pitches_m) == 1 else step.spacing_m

@@ -60,7 +60,10 @@ class Follower:
         abscissa: Callable[[float], float] = float,
     ) -> None:
         """Start from `first`. `solve` returns a solution (m,), smooth in `abscissa(value)`, near a guess, or None."""
-        self._solve, self._strides, self._abscissa, self._states = solve, strides, abscissa, [first]
+        self._solve = solve
+        self._strides = strides
+        self._abscissa = abscissa
+        self._states = [first]
 
     def to(self, target: float) -> FollowerState:
         """Follow the solution to the parameter value `target`, or until it is lost."""

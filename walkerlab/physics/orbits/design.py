@@ -51,7 +51,8 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
     from scipy.optimize import NonlinearConstraint, minimize  # takes a tenth of a second, only needed here
 
     span = problem.upper - problem.lower
-    search, seen = DesignSearch(start, None), dict[bytes, Point | None]()
+    search = DesignSearch(start, None)
+    seen = dict[bytes, Point | None]()
 
     def point_at(u: Floats) -> Point | None:
         x = problem.lower + np.clip(u, 0.0, 1.0) * span
@@ -59,7 +60,8 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
             seen[x.tobytes()] = problem.evaluate(x)
         point = seen[x.tobytes()]
         if point is not None:
-            search.x, search.point = x, point
+            search.x = x
+            search.point = point
         return point
 
     first = point_at((start - problem.lower) / span)
@@ -124,7 +126,8 @@ def search_from_starts(
 
 
 def count_optima(problem: DesignProblem, searches: list[DesignSearch]) -> int:
-    span, ends = problem.upper - problem.lower, list[Floats]()
+    span = problem.upper - problem.lower
+    ends = list[Floats]()
     for search in searches:
         if search.point is not None and is_feasible(problem, search.point):
             u = (search.x - problem.lower) / span

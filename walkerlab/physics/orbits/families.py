@@ -38,7 +38,8 @@ NO_WALKER = "the parameter's next value gives no valid walker"
 END_OF_SPAN = "end of the span"
 EDGE_TOLERANCE = 1e-12  # relative to the size of the span
 # maximum number of points per branch; growth of a disturbance over a cycle beyond which gaits cannot be resolved
-MAX_BRANCH_POINTS, MAX_CYCLE_GROWTH = 400, 1e4
+MAX_BRANCH_POINTS = 400
+MAX_CYCLE_GROWTH = 1e4
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,8 @@ class GaitBranch:
                 edge = next(on_it, 0.5 * (gait.value + following.value))
                 if stable:
                     stretches.append([*values, edge])
-                values, stable = [edge], following.stable
+                values = [edge]
+                stable = following.stable
         if stable:
             stretches.append([*values, self.points[-1].value, self.ends[1].value])
         return tuple((min(stretch), max(stretch)) for stretch in stretches)
@@ -184,12 +186,14 @@ class BranchFollower:
         return GaitEquations(self.step_map, period, self.span.size)
 
     def solve_at(self, z: Floats, value: float, period: int) -> CurvePoint[Cycle] | None:
-        x, tolerance = np.append(z, value / self.span.size), self.control.tolerance
+        x = np.append(z, value / self.span.size)
+        tolerance = self.control.tolerance
         solution = correct(self.equations(period), x, np.eye(x.size)[-1], tolerance, SEED_EVALUATIONS)
         return None if isinstance(solution, NotConverged) else solution
 
     def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
-        starts, effort = [gait.z, *(step.z for step in gait.steps)], Effort(self.control.tolerance, SEED_EVALUATIONS)
+        starts = [gait.z, *(step.z for step in gait.steps)]
+        effort = Effort(self.control.tolerance, SEED_EVALUATIONS)
         for _, guess in branch.passing(gait.value):
             neighbour = gait_near(self.step_map, guess, gait.value, effort, branch.period)
             if isinstance(neighbour, Cycle) and min(np.abs(neighbour.z - z).max() for z in starts) < SAME_STATE:
@@ -233,8 +237,12 @@ class BranchFollower:
 
     def trace(self, start: CurvePoint[Cycle], period: int) -> GaitBranch:
         equations = self.equations(period)
-        points, before, last, end = [self.point(start)], None, start, None
-        bifurcations, crossings = list[Bifurcation](), list[Crossing]()
+        points = [self.point(start)]
+        before = None
+        last = start
+        end = None
+        bifurcations = list[Bifurcation]()
+        crossings = list[Crossing]()
         step = self.control.first
         if period > self.step_map.stride:
             step = min(step, 0.5 * float(np.linalg.norm(half_cycle_difference(start.evaluated.data))))
@@ -248,7 +256,8 @@ class BranchFollower:
                 break
             solved, step, end = following
             if passes_through(Segment(equations, last, solved, self.control.tolerance), start, self.control.turn):
-                end, solved = BranchEnd(points[0].value, CLOSED_LOOP), start
+                end = BranchEnd(points[0].value, CLOSED_LOOP)
+                solved = start
             if period % (2 * self.step_map.stride) == 0 and halves_meet(last.evaluated.data, solved.evaluated.data):
                 half = period // 2
                 end = BranchEnd(points[-1].value, f"closes on the gait of {half} {steps_word(half)}", closes=True)
@@ -264,7 +273,8 @@ class BranchFollower:
                     crossings.append(Crossing(monitor, left.value + share * (right.value - left.value)))
             if end is None and abs(points[-1].multipliers[0]) > MAX_CYCLE_GROWTH:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold per cycle")
-            before, last = last, solved
+            before = last
+            last = solved
         if end.reason == CLOSED_LOOP:  # begin at an unstable gait, so that no stable stretch is split
             begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))
             points = [*points[begin:-1], *points[: begin + 1]]
@@ -302,7 +312,8 @@ class BranchFollower:
         the end.
         """
         # A step out of the span is cut at its edge, because there may be no walker beyond.
-        ahead, acceptable = last.x + step * last.tangent, self.check_after(last)
+        ahead = last.x + step * last.tangent
+        acceptable = self.check_after(last)
         edge = self.span.nearest(equations.value(ahead))
         if edge != equations.value(ahead):
             if abs(edge - equations.value(last.x)) <= EDGE_TOLERANCE * self.span.size:
@@ -326,7 +337,8 @@ class BranchFollower:
         """Solve for the gait at the span's edge, between `last` and a point `beyond` (d + 1,), or return None if that
         fails.
         """
-        start, value = equations.value(last.x), equations.value(beyond)
+        start = equations.value(last.x)
+        value = equations.value(beyond)
         edge = self.span.nearest(value)
         guess = last.x + (edge - start) / (value - start) * (beyond - last.x)
         guess[-1] = edge / self.span.size

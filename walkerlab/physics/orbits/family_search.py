@@ -32,11 +32,16 @@ from walkerlab.physics.solvers.system import Floats
 
 BEFORE_FLIP = 0.02  # the attractor is followed from this far before the first flip, as a fraction of the span
 # search for other gaits: number of parameter values, periods to search for, steps per walk
-OTHER_GAIT_VALUES, OTHER_PERIODS, CLOSE_RETURN_STEPS = 12, (3, 5, 6), 4000
+OTHER_GAIT_VALUES = 12
+OTHER_PERIODS = (3, 5, 6)
+CLOSE_RETURN_STEPS = 4000
 # scattered starts at each value: number, standard deviation (see `settle_elsewhere`), and steps allowed to settle
-SCATTERED, SCATTER_WIDTH, SCATTER_STEPS = 40, 0.1, 400
+SCATTERED = 40
+SCATTER_WIDTH = 0.1
+SCATTER_STEPS = 400
 CURVE_POINTS = 120
-RIGID, CONTACT = "rigid", "contact"
+RIGID = "rigid"
+CONTACT = "contact"
 
 
 class Listener(Protocol):
@@ -125,16 +130,19 @@ class FamilySearch:
     def add_attractors(self, family: Family) -> Family:
         """Add the attractors beyond the first flip of a stable branch, and their Lyapunov exponents."""
         # Start just before the first flip or, if all flips lie outside the span, at an end of the span.
-        span, how = self.span, self.thoroughness
+        span = self.span
+        how = self.thoroughness
         flipping = first_flip(family.branches)
         if flipping is not None:
             flip, start = flipping
-            begin, end = max(span.least, flip - BEFORE_FLIP * span.size), span.most
+            begin = max(span.least, flip - BEFORE_FLIP * span.size)
+            end = span.most
         else:
             family, first = self.doubled_outside(family)
             if first is None:
                 return family
-            start, begin = first.last, first.value
+            start = first.last
+            begin = first.value
             end = span.most if begin - span.least < span.most - begin else span.least
         values = np.linspace(begin, end, how.values)
         self.announce("attractor of {model}", how.values)
@@ -190,7 +198,9 @@ class FamilySearch:
         return replace(family, branches=self.follower.family(seeds, self.periods, family.branches))
 
     def add_plane(self, family: Family, plane: Plane) -> Family:
-        span, advance, how = self.span, self.listener.advance, self.thoroughness
+        span = self.span
+        advance = self.listener.advance
+        how = self.thoroughness
         self.announce("curves of bifurcations of {model}")
         curves = [
             follow_curve(bifurcation, branch.period, span, plane, CURVE_POINTS, advance, how.curve_control)

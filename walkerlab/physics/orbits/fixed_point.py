@@ -51,18 +51,21 @@ SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same g
 # tolerances of steps during the search; gaits are solved with EXACT_STEPS
 SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
 # target residual, and largest residual of an acceptable gait; rounding errors are larger on steep slopes
-SOLVED_RESIDUAL, MAX_RESIDUAL = 1e-14, 1e-11
+SOLVED_RESIDUAL = 1e-14
+MAX_RESIDUAL = 1e-11
 MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
 # following a gait from a vanishing slope
 SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
 FOLLOWING_TOLERANCE = 1e-6  # relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
 # largest relative distance from the prediction; beyond it the gait belongs to another branch
-MAX_STATE_JUMP, MAX_PERIOD_JUMP = 0.05, 0.02
+MAX_STATE_JUMP = 0.05
+MAX_PERIOD_JUMP = 0.02
 MAX_RETREATS = 5  # halvings of the seed's amplitude; the seed's error shrinks with the square of the amplitude
 # random starts: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank
 # whose knee was free at heel strike
-MIN_START, MAX_START = np.array([0.0, -1.0, -1.0, -1.0]), np.array([1.2, 1.0, 0.0, 1.0])
+MIN_START = np.array([0.0, -1.0, -1.0, -1.0])
+MAX_START = np.array([1.2, 1.0, 0.0, 1.0])
 START_RANGES = f"legs up to {MAX_START[0]:g} rad apart, rates up to {MAX_START[1]:g} sqrt(g/L)"
 
 
@@ -134,7 +137,8 @@ def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     # The step map is discontinuous at such a gait: if the foot came down slightly further ahead, it would strike.
     if not walker.alike:
         return False
-    over, ahead = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE]), swing[:, SWING] - swing[:, STANCE]
+    over = feet_on_slope(walker, swing[:, SWING], swing[:, STANCE])
+    ahead = swing[:, SWING] - swing[:, STANCE]
     down = np.flatnonzero((over[:-1] > 0.0) & (over[1:] <= 0.0))
     where = ahead[down] + np.diff(ahead)[down] * over[down] / (over[down] - over[down + 1])
     return bool(np.any(np.abs(where) < ANGLE_NOISE * abs(ahead[-1])))
@@ -146,7 +150,8 @@ def straight_only(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
 
 def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | None:
     """Walk the steps of a gait of the unit walker and measure them in SI, or None if a step fails."""
-    start, count = state_on_section(walker, gait.z), len(gait.steps)
+    start = state_on_section(walker, gait.z)
+    count = len(gait.steps)
     step = take_walk(walker, EXACT_STEPS, start, count, sampled=True)
     if step.steps < count or step.samples is None:
         return None
@@ -157,7 +162,8 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
     rates = [
         swing_foot_motion(model, y[0], y[0, y.shape[1] // 2 :])[2] for model, y in zip(models, swings, strict=True)
     ]
-    rate, n = 1.0 / units.time, len(start) // 2
+    rate = 1.0 / units.time
+    n = len(start) // 2
     multipliers = gait.multipliers
     sizes = [
         (float(period) * units.time, float(length) * units.length)
@@ -261,7 +267,8 @@ class SlopeBranch:
     # Both gaits of small-slope theory are smooth in s^2, so a polynomial through the last points predicts the next one.
 
     def __init__(self, step_map: Stepper, seed: SmallSlopeSeed) -> None:
-        self.step_map, self.seed = step_map, seed
+        self.step_map = step_map
+        self.seed = seed
 
     def follow(self, slope: float) -> tuple[float, Floats | None]:
         """Follow the gait to `slope` > 0 (rad), and return the slope reached and z (3,), or None if the
@@ -284,7 +291,8 @@ class SlopeBranch:
         """Return a follower from the gait at s, or at a smaller s if the seed is too inaccurate, or None if
         all fail.
         """
-        seed, s_seed = self.seed, float(np.cbrt(self.seed.slope))
+        seed = self.seed
+        s_seed = float(np.cbrt(self.seed.slope))
         limit = (0.0, np.array([*seed.limit, seed.period]))
         rough = (limit, (s_seed**2, scale_gait(s_seed, seed.z, seed.period)))
         for _ in range(MAX_RETREATS + 1):
@@ -334,7 +342,8 @@ def with_mean_legs(walker: RigidModel, share: float) -> RigidModel:
     models = walker, walker.exchanged
 
     def between(k: int) -> RigidModel:
-        own, other = models[k], models[1 - k]
+        own = models[k]
+        other = models[1 - k]
         parts = {name: 0.5 * ((1.0 + share) * own[name] + (1.0 - share) * other[name]) for name in OF_LEGS}
         alike = walker.alike or share == 0.0
         return with_fields(own, {**parts, "alike": alike})
@@ -412,7 +421,8 @@ class Search:
             passive.draw(generator, starts)
             family = RigidMap(partial(scale_drive, goal, slope), 1.0, goal)
             follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=MAX_DRIVE_POINTS)
-            name, lost = f"passive gait at {slope:.3g} rad", "is lost at {:.0%} of the way to this slope and drive"
+            name = f"passive gait at {slope:.3g} rad"
+            lost = "is lost at {:.0%} of the way to this slope and drive"
             followed = follower.family([Seed(record.cycle.z, 0.0) for record in passive.records], 1)
             for branch in followed:
                 end = max(branch.points, key=lambda point: point.value)

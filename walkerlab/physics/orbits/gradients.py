@@ -102,13 +102,15 @@ def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_Q
     """Differentiate a gait's quantities with respect to the parameter, or return nothing if the step map fails at
     nearby values.
     """
-    h, along = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale, np.zeros(gait.z.size)
+    h = STEP_FACTOR * gait.step_map.tolerances.rtol**0.2 * scale
+    along = np.zeros(gait.z.size)
     for part in APPROACH_STEPS:
         closer = family_direction(gait, part * h, along)
         if closer is None:
             return {}
         along = closer
-    best, coarse = dict[str, Gradient](), None
+    best = dict[str, Gradient]()
+    coarse = None
     for size in STEP_SIZES:
         fine = differentiate(gait, size * h, along, selection)
         if fine is not None and coarse is not None:

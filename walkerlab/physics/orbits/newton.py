@@ -57,7 +57,10 @@ class Effort(NamedTuple):
 def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
     """Solve m equations from a guess (m,). On failure, return NotConverged with the outcome of the walk."""
     tolerance, most, shortest, growth, rounding = effort
-    x, current, corrections, evaluations = guess, equations(guess), 0, 1
+    x = guess
+    current = equations(guess)
+    corrections = 0
+    evaluations = 1
     residual = current.residual
     while tolerance < residual < np.inf:
         try:
@@ -79,7 +82,10 @@ def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solutio
             if remaining < growth * residual or share <= shortest:
                 break
             share *= 0.5
-        x, current, residual, corrections = x + share * move, ahead, remaining, corrections + 1
+        x = x + share * move
+        current = ahead
+        residual = remaining
+        corrections = corrections + 1
     if current.outcome is Outcome.WALKED:
         return Solution(x, current, corrections)
     # if only a later move led to parameters without a valid walker, the guess itself has one

@@ -30,10 +30,13 @@ from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
-METHOD, LIMIT_BUDGET = "radau5", 50_000_000
-GAIT_TOLERANCE, CHECK_TOLERANCE = 1e-10, 1e-11
+METHOD = "radau5"
+LIMIT_BUDGET = 50_000_000
+GAIT_TOLERANCE = 1e-10
+CHECK_TOLERANCE = 1e-11
 # tolerances of timed walks, and of walks that check their numerical error
-WALK_TOLERANCE, WALK_CHECK = 1e-8, 1e-10
+WALK_TOLERANCE = 1e-8
+WALK_CHECK = 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
 TIMED_WALKS = 3
 SERIES_EFFORT = CONTACT_EFFORT._replace(most=30)
@@ -50,9 +53,12 @@ class ContactFactors(NamedTuple):
     stiction: float
 
 
-ALL_SERIES, ALL_POINT_SERIES = "all", "all, point foot"
-STICTION_SERIES, STIFFNESS_SERIES = "stiction velocity", "stiffness"
-DAMPING_SERIES, NORMAL_SERIES = "damping", "stiffness and damping"
+ALL_SERIES = "all"
+ALL_POINT_SERIES = "all, point foot"
+STICTION_SERIES = "stiction velocity"
+STIFFNESS_SERIES = "stiffness"
+DAMPING_SERIES = "damping"
+NORMAL_SERIES = "stiffness and damping"
 HALF_DECADES = math.sqrt(10.0)
 # Number of settings, ratio of successive rigidities, and the powers of rigidity by which stiffness, damping and
 # stiction velocity are multiplied.
@@ -76,7 +82,8 @@ def series_settings(name: str, every: int = 1) -> list[ContactFactors]:
 def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalker:
     """Return the walker on the ground of a setting, with a shortened push-off if the series varies all parameters."""
     # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
-    changed, law = scale_laws(walker, *setting[2:]), walker.normal
+    changed = scale_laws(walker, *setting[2:])
+    law = walker.normal
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
     static = (walker.mass * walker.gravity / law.stiffness) ** (1.0 / law.exponent)
@@ -130,7 +137,9 @@ class Limit:
             near = self.gait(changed, gait, GAIT_TOLERANCE)
             if near is None:
                 break
-            gait, step, check = near, contact_step(near), self.gait(changed, near, CHECK_TOLERANCE)
+            gait = near
+            step = contact_step(near)
+            check = self.gait(changed, near, CHECK_TOLERANCE)
             off = step.period_s - self.period_s
             distance = Distance(
                 setting,
@@ -155,7 +164,8 @@ class Limit:
             solver = solver_settings(tolerance)
             return walk_contact(walker, self.ground, False, STANCE_FOOT, start, solver, self.steps, sampling)
 
-        sampled, check = walk(WALK_TOLERANCE, self.sampling), walk(WALK_CHECK, None)
+        sampled = walk(WALK_TOLERANCE, self.sampling)
+        check = walk(WALK_CHECK, None)
         times = []
         for _ in range(TIMED_WALKS):
             started = time.process_time()
@@ -184,7 +194,8 @@ class Limit:
 
 def leg_motion(states: Floats, walker: ContactWalker) -> tuple[Floats, Floats]:
     """Return angles (rad) and angular velocities (rad/s), (samples, 2) each, of the legs (the thighs of kneed legs)."""
-    upper, half = walker.legs[:, 0], states.shape[1] // 2
+    upper = walker.legs[:, 0]
+    half = states.shape[1] // 2
     return states[:, 2 + upper], states[:, half + 2 + upper]
 
 

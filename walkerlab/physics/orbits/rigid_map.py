@@ -70,11 +70,14 @@ LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples count as at this t
 SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
-NO_RESIDUAL, NEAR_RESIDUAL = 1e300, 1e-6
+NO_RESIDUAL = 1e300
+NEAR_RESIDUAL = 1e-6
 # largest distance from a known gait, and largest fraction of it left after a Newton move with that gait's derivative
-RECOGNITION_DISTANCE, RECOGNITION_RESIDUAL = 0.1, 0.1
+RECOGNITION_DISTANCE = 0.1
+RECOGNITION_RESIDUAL = 0.1
 # results other than the index of a known gait
-NEW_GAIT, NO_GAIT = -1, -2
+NEW_GAIT = -1
+NO_GAIT = -2
 
 
 class StrikeSection(NamedTuple):
@@ -91,14 +94,19 @@ class StrikeSection(NamedTuple):
 @lru_cache(CACHE_SIZE)
 def strike_section(walker: RigidModel) -> StrikeSection:
     """Return the section of a walker just after heel strike, where its legs are straight."""
-    straight, at_strike, d = walker.E[STRAIGHT], walker.E[AT_STRIKE], int(walker.coordinates)
-    n, places = len(straight), walker.section[:d]
-    origin, basis = np.zeros(2 * n), np.zeros((d, 2 * n))
+    straight = walker.E[STRAIGHT]
+    at_strike = walker.E[AT_STRIKE]
+    d = int(walker.coordinates)
+    n = len(straight)
+    places = walker.section[:d]
+    origin = np.zeros(2 * n)
+    basis = np.zeros((d, 2 * n))
     origin[:n] = -feet_on_slope(walker, 0.0, 0.0) * straight[:, SWING]
     basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
     basis[1:, n:] = at_strike[:, places[1:] - n].T
     columns = np.add.outer(places, 2 * n * np.arange(1, d + 1))
-    start, curved = np.append(origin, TANGENT_SCALE * basis), None if walker.alike else walker
+    start = np.append(origin, TANGENT_SCALE * basis)
+    curved = None if walker.alike else walker
     return StrikeSection(models_in_turn(walker), start, basis, np.append(places, columns), curved)
 
 
@@ -107,7 +115,8 @@ def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] 
 
     The swing leg is behind. Returns None if it is too short or too long to reach the slope.
     """
-    psi, straight = stance + walker.slope, walker.E[STRAIGHT]
+    psi = stance + walker.slope
+    straight = walker.E[STRAIGHT]
     raised = hip_height(walker, np.full(2, stance)) - walker.swing_radius
     length, ahead = (f(walker.swing_hip_x, walker.swing_hip_y) for f in (math.hypot, math.atan2))
     if abs(raised) >= length:
@@ -174,9 +183,11 @@ class RigidStepper(local):
     """Step map of walkers of one kind, with separate working memory in each thread."""
 
     def __init__(self, like: RigidModel, tolerances: Tolerances) -> None:
-        size, d = len(like.zero_state), int(like.coordinates)
+        size = len(like.zero_state)
+        d = int(like.coordinates)
         self.budget = tolerances.budget
-        self.plain, varied = tolerances.new(size), tolerances.new(size * (1 + d))
+        self.plain = tolerances.new(size)
+        varied = tolerances.new(size * (1 + d))
         self.with_columns = lru_cache(KEPT_METHODS)(lambda columns: tolerances.new(size * (1 + columns)))
         finder = finder_for(self.plain, EVENTS, size)
         self.memory = Memory(
@@ -248,7 +259,8 @@ class RigidStepper(local):
         if outcome is not Outcome.WALKED:
             return None
         before, after = (states.reshape(m + 2, m) for states in (strikes.before, strikes.after))
-        samples, legs = observer.states.reshape(times.size, m + 2, m), [SWING, STANCE]
+        samples = observer.states.reshape(times.size, m + 2, m)
+        legs = [SWING, STANCE]
         rates = samples[:, 0, m // 2 :][:, legs]
         by = (strikes.waits[0], before[1:], after[1:], samples[:, 1:, legs])
         return StepTangents(before[0], rates, *(each / TANGENT_SCALE for each in by))
@@ -288,10 +300,15 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
     A correction is halved until it reduces the residual. A start without a heel strike, or at rest, is given up.
     The search stops if a known gait is close and one correction with its derivative would almost reach it.
     """
-    method, y, places = memory.varied, memory.y, section.places
+    method = memory.varied
+    y = memory.y
+    places = section.places
     (d, size), like = section.basis.shape, section.walker[0].section
-    best, move, system = vector(like), vector(like), matrix(like)
-    least, share = NO_RESIDUAL, 1.0
+    best = vector(like)
+    move = vector(like)
+    system = matrix(like)
+    least = NO_RESIDUAL
+    share = 1.0
     clear_counts(method)
     for _ in range(MAX_START_EVALUATIONS):
         for i in range(y.size):
@@ -307,13 +324,15 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
             for i in range(d):
                 residual = max(residual, abs(y[places[i]] - z[i]))
         if residual < least:
-            least, share = residual, 1.0
+            least = residual
+            share = 1.0
             if residual <= NEAR_RESIDUAL:
                 return NEW_GAIT
             for i in range(d):
                 best[i], move[i] = z[i], y[places[i]] - z[i]
             for gait in range(len(gaits.z)):
-                distance, remaining = 0.0, 0.0
+                distance = 0.0
+                remaining = 0.0
                 for i in range(d):
                     off = z[i] - gaits.z[gait, i]
                     distance = max(distance, abs(off))
@@ -358,7 +377,8 @@ class RigidMap(StepMap):
             if walker is None:
                 return None
             unit, units = unit_walker(walker)
-            section, n = strike_section(unit), len(unit.arm_x)
+            section = strike_section(unit)
+            n = len(unit.arm_x)
             feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
             sections = (section, strike_section(unit.exchanged)) if unit.legs_differ else (section,)
             rolling = float(unit.radius), float(-section.start[SWING])
@@ -367,7 +387,8 @@ class RigidMap(StepMap):
         self._unit_at = unit_at
         self.scale = scale
         self.names = SECTION_NAMES[: int(like.coordinates)]
-        self._like, self._exact = like, RigidStepper(like, exact)
+        self._like = like
+        self._exact = RigidStepper(like, exact)
 
     @cached_property
     def _quick(self) -> RigidStepper:
@@ -382,7 +403,9 @@ class RigidMap(StepMap):
         if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
             standing = step.outcome is Outcome.WALKED
             return failed_step(Outcome.NO_HEEL_STRIKE if standing else step.outcome, z.size)
-        ahead, period_s, DP = step.z[0], float(step.time[0]) * unit.units.time, step.DP[0]
+        ahead = step.z[0]
+        period_s = float(step.time[0]) * unit.units.time
+        DP = step.DP[0]
         angle = float(ahead[0])
         if len(unit.sections) > 1:
             length = length_of_step(section.walker[0], float(z[0]), step.strikes.before[0])
@@ -393,7 +416,8 @@ class RigidMap(StepMap):
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         unit = valid(self._unit_at(p))
-        walker, units = unit.walker, unit.units
+        walker = unit.walker
+        units = unit.units
         walk = take_walk(walker, MONITORED_STEPS, state_on_section(walker, z), steps)
         extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
         return np.array(extremes) * (units.force, 1.0, units.length)
@@ -401,7 +425,9 @@ class RigidMap(StepMap):
     def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
         unit = valid(self._unit_at(p))
-        walker, units, start = unit.walker, unit.units, np.array(state_on_section(unit.walker, z))
+        walker = unit.walker
+        units = unit.units
+        start = np.array(state_on_section(unit.walker, z))
         start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
         walk = self._exact.walk(unit.section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
         before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
@@ -435,12 +461,15 @@ class RigidMap(StepMap):
         walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
         if walk.outcome is not Outcome.WALKED:
             return None
-        starts, touches = np.vstack((state_on_section(walker, z), walk.strikes.after)), np.append(0.0, walk.time)
+        starts = np.vstack((state_on_section(walker, z), walk.strikes.after))
+        touches = np.append(0.0, walk.time)
         kicks = [unit_kicks(unit, start) for start in starts[1:-1]] if kicked else []
-        given, count = along.shape[1], along.shape[1] + sum(map(len, kicks))
+        given = along.shape[1]
+        count = along.shape[1] + sum(map(len, kicks))
         lifts = np.zeros((steps + 1, count))
         lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
-        columns, since = np.zeros((count, m)), np.zeros(count)
+        columns = np.zeros((count, m))
+        since = np.zeros(count)
         columns[:given] = along[:d].T @ unit.section.basis
         of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
         parts = list[tuple[Floats, ...]]()
@@ -455,7 +484,8 @@ class RigidMap(StepMap):
             lengths = step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
             samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
             parts.append((moved @ tangents.waits, lengths, after[:, STANCE], tangents.rates, samples))
-            columns, since = after, since + parts[-1][0]
+            columns = after
+            since = since + parts[-1][0]
             if step < len(kicks):
                 first = given + sum(map(len, kicks[:step]))
                 columns[first : first + len(kicks[step])] = kicks[step]
@@ -480,7 +510,9 @@ class RigidMap(StepMap):
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
         # Negative values mean that the ground would have to pull.
         unit = valid(self._unit_at(p))
-        walker, units, start = unit.walker, unit.units, state_on_section(unit.walker, z)
+        walker = unit.walker
+        units = unit.units
+        start = state_on_section(unit.walker, z)
         pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
         impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
         walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
@@ -497,11 +529,15 @@ class RigidMap(StepMap):
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """Walk at moderate accuracy, since on a chaotic attractor errors grow whatever the tolerance."""
-        unit, none = self._unit_at(p), np.zeros(0)
+        unit = self._unit_at(p)
+        none = np.zeros(0)
         if unit is None:
             return Iterates(Outcome.REJECTED, np.zeros((0, z.size)), none, none, none)
-        outcome, batch = Outcome.WALKED, steps if tangent is None else STEPS_PER_BATCH
-        points, growth, times = list[Floats](), [none], list[Floats]()
+        outcome = Outcome.WALKED
+        batch = steps if tangent is None else STEPS_PER_BATCH
+        points = list[Floats]()
+        growth = [none]
+        times = list[Floats]()
         while outcome is Outcome.WALKED and len(points) * batch < steps:
             part = self._quick.walk(unit.section, z, min(batch, steps - len(points) * batch), tangent is not None)
             outcome = part.outcome
@@ -511,8 +547,10 @@ class RigidMap(StepMap):
                 images = part.DP @ tangent
                 sizes = np.linalg.norm(images, axis=1)
                 growth.append(sizes / np.append(1.0, sizes[:-1]))
-                z, tangent = part.z[-1], images[-1] / sizes[-1]
-        all_points, periods = np.concatenate(points), np.concatenate(times) * unit.units.time
+                z = part.z[-1]
+                tangent = images[-1] / sizes[-1]
+        all_points = np.concatenate(points)
+        periods = np.concatenate(times) * unit.units.time
         return Iterates(outcome, all_points, np.concatenate(growth), periods, all_points[:, 0])
 
 
@@ -537,7 +575,8 @@ def unit_kicks(unit: SimilarWalker, start: Floats) -> Floats:
     Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
     there. s makes such a change as large as the rates, on average.
     """
-    free, rates = unit.section.basis[1:], coordinates_of(unit.walker, start)[1:]
+    free = unit.section.basis[1:]
+    rates = coordinates_of(unit.walker, start)[1:]
     M = free[:, start.size // 2 :] @ mass_matrix(unit.walker, start) @ free[:, start.size // 2 :].T
     kicks = np.linalg.inv(np.linalg.cholesky(M))
     return np.asarray(np.linalg.norm(rates) / np.linalg.norm(kicks) * kicks @ free)

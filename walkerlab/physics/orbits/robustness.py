@@ -43,7 +43,8 @@ FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25
 # Offsets and weights of fourth-order formulas for a first derivative.
 FORMULAS = (CENTRAL_4TH, FORWARD_4TH, tuple((-offset, -weight) for offset, weight in FORWARD_4TH))
 # grid of the search and accuracy of its bisection, as multiples of `unit_of`
-SEARCH_GRID, BISECTION_WIDTH = 1.0 / 5000.0, 1e-6
+SEARCH_GRID = 1.0 / 5000.0
+BISECTION_WIDTH = 1e-6
 MAX_DISTURBANCE = 0.5  # largest disturbance tried, as a multiple of `unit_of`
 
 
@@ -139,7 +140,8 @@ def largest_survived(stands: Callable[[float], bool], unit: float, width: float 
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
     if low == steps:
         return MAX_DISTURBANCE * unit
-    below, above = low * SEARCH_GRID * unit, (low + 1) * SEARCH_GRID * unit
+    below = low * SEARCH_GRID * unit
+    above = (low + 1) * SEARCH_GRID * unit
     while above - below > width * unit:
         middle = 0.5 * (below + above)
         below, above = (middle, above) if stands(middle) else (below, middle)
@@ -178,7 +180,8 @@ class RoughWalks:
 def rough_walks(steps: Floats, most: int) -> RoughWalks:
     """Estimate the mean number of steps from walks (walks,) that were stopped at `most` steps."""
     capped = int(np.count_nonzero(steps >= most))
-    failed, total = steps.size - capped, float(steps.sum())
+    failed = steps.size - capped
+    total = float(steps.sum())
     if failed == 0:
         return RoughWalks(total, None, steps.size, capped, "lower-bound")
     if capped:

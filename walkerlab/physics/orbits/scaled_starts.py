@@ -29,7 +29,8 @@ START_TOLERANCES = Tolerances("radau5", 1e-7, 1e-9, 10_000_000)
 RIGID_TOLERANCES = Tolerances("dop853", 1e-7, 1e-9, ENDLESS)
 SETTLED_SHARE = 0.02  # largest deviation from the gait, as a fraction of its period and step length
 MARGIN_STEP = 0.02  # spacing of factors until a walk fails
-SMALLEST_FACTOR, LARGEST_FACTOR = 0.0, 4.0
+SMALLEST_FACTOR = 0.0
+LARGEST_FACTOR = 4.0
 MARGIN_HALVINGS = 14
 ZOOMS, ZOOM_CELLS = 4, 4  # number of successively finer grids around the best start, and of cells on each side of it
 ZOOM_OFFSETS = np.array(list(product(range(-ZOOM_CELLS, ZOOM_CELLS + 1), repeat=2)))
@@ -76,7 +77,8 @@ class ScaledStarts:
         if self.gait is None:
             return None
         period, length = self.gait
-        off_period, off_length = np.abs(walk.periods_s - period), np.abs(walk.lengths_m - length)
+        off_period = np.abs(walk.periods_s - period)
+        off_length = np.abs(walk.lengths_m - length)
         off = np.flatnonzero((off_period > SETTLED_SHARE * period) | (off_length > SETTLED_SHARE * abs(length)))
         first = int(off[-1]) + 1 if off.size else 0
         return first if first < walk.periods_s.size else None
@@ -95,7 +97,9 @@ def scaled_starts(
     gait: tuple[float, float] | None,
 ) -> ScaledStarts:
     """Build the scaled starts of a scene. `start_of` is linear in the factors on the two angular velocities."""
-    still, swing, stance = start_of(0.0, 0.0), start_of(1.0, 0.0), start_of(0.0, 1.0)
+    still = start_of(0.0, 0.0)
+    swing = start_of(1.0, 0.0)
+    stance = start_of(0.0, 1.0)
     half = len(still) // 2
     return ScaledStarts(walker, ground, still[:half], swing[half:], stance[half:], steps, gait)
 
@@ -129,14 +133,18 @@ def margins(
     for name, *direction in SCALING_DIRECTIONS:
         sign = 1.0 if max(direction) > 0.0 else -1.0
         limit = largest - 1.0 if sign > 0.0 else 1.0 - SMALLEST_FACTOR
-        good, bad, failure, halvings = 0.0, limit, None, 0
+        good = 0.0
+        bad = limit
+        failure = None
+        halvings = 0
         while good < limit and halvings <= MARGIN_HALVINGS:
             change = min(good + step, limit) if failure is None else 0.5 * (good + bad)
             trial = starts.walk(around[0] * (1.0 + change * direction[0]), around[1] * (1.0 + change * direction[1]))
             if trial.walks:
                 good = change
             else:
-                bad, failure = change, trial
+                bad = change
+                failure = trial
             halvings += failure is not None
         results.append(Margin(name, 1.0 + sign * good, failure))
     return results
@@ -165,7 +173,8 @@ def smallest_change(
     for swing, stance in candidates[order]:
         if not starts.walk(float(swing), float(stance)).walks:
             continue
-        best, spacing = (float(swing), float(stance)), np.array(cell)
+        best = (float(swing), float(stance))
+        spacing = np.array(cell)
         for _ in range(ZOOMS):
             spacing = spacing / ZOOM_CELLS
             grid = np.array(best) + spacing * ZOOM_OFFSETS

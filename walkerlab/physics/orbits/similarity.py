@@ -36,7 +36,8 @@ class Units(NamedTuple):
 
         Raises KeyError if unknown.
         """
-        inertia, damping = self.mass * self.length**2, self.energy * self.time
+        inertia = self.mass * self.length**2
+        damping = self.energy * self.time
         basic = {"": 1.0, "1": 1.0, "m": self.length, "kg": self.mass, "s": self.time}
         derived = {"kg m^2": inertia, "N s": self.impulse, "N m": self.energy}
         return (basic | derived | {"N m/rad": self.energy, "N m s/rad": damping})[unit]
@@ -44,11 +45,13 @@ class Units(NamedTuple):
 
 def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
     """Return the similar walker with L = g = 1 and a total mass of 1, and its units."""
-    length, mass = float(walker.leg_length), float(walker.mass)
+    length = float(walker.leg_length)
+    mass = float(walker.mass)
     if length == mass == walker.gravity == 1.0:
         return walker, Units(1.0, 1.0, 1.0)
     units = Units(length, mass, math.sqrt(length / walker.gravity))
-    inertia, moment = 1.0 / (mass * length * length), 1.0 / (mass * length)
+    inertia = 1.0 / (mass * length * length)
+    moment = 1.0 / (mass * length)
     scales = {
         **dict.fromkeys(("A", "B", "unpaired"), inertia),
         **dict.fromkeys(("arm_x", "arm_y"), moment),

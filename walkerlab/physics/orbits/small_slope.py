@@ -33,7 +33,8 @@ from walkerlab.physics.mechanics.rigid_model import (
 )
 from walkerlab.physics.solvers.system import Floats, State
 
-LONG_PERIOD, SHORT_PERIOD = "long-period seed", "short-period seed"
+LONG_PERIOD = "long-period seed"
+SHORT_PERIOD = "short-period seed"
 SCAN = 400  # number of samples that bracket a root
 LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding errors
 LONG_AMPLITUDE = 0.05  # rad, angle between the legs at which the long-period seed is accurate to a percent
@@ -65,7 +66,9 @@ class Modes(NamedTuple):
 
 def linear_modes(walker: RigidModel) -> Modes | None:
     """Return the modes of the swing phase about upright legs, or None if the legs have too little inertia."""
-    legs, n, level = leg_columns(walker), len(walker.arm_x), change_slope(walker, 0.0)
+    legs = leg_columns(walker)
+    n = len(walker.arm_x)
+    level = change_slope(walker, 0.0)
     inertias, (s, c, F, U, r) = np.empty((n, n)), np.empty((5, n))
     equations(level, level.zero_state, s, c, F, U, inertias, r)
     M, K = legs.T @ inertias @ legs, walker.gravity * legs.T @ np.diag(walker.arm_y) @ legs
@@ -77,7 +80,8 @@ def linear_modes(walker: RigidModel) -> Modes | None:
     # root of the polynomial times `first`, without cancellation
     root = half + math.copysign(math.sqrt(half * half - first * last), half)
     oscillating, growing = sorted((root / first, last / root))
-    swinging, falling = K - oscillating * M, K - growing * M
+    swinging = K - oscillating * M
+    falling = K - growing * M
     V = np.array([[swinging[1, 1], -falling[0, 1]], [-swinging[0, 1], falling[0, 0]]])
     return Modes(math.sqrt(-oscillating), math.sqrt(growing), V)
 
@@ -131,7 +135,8 @@ def cube_root_seed(name: str, walker: RigidModel, per_angle: Floats, period: flo
 def slope_for_loss(walker: RigidModel, per_angle: Floats) -> float:
     """Return slope / angle^3, where the slope balances the heel strike's loss at this angle between the legs."""
     # In the limit the gait ends a step as it began it, with both legs at the same rates.
-    flat, angle = change_slope(walker, 0.0), LOSS_ANGLE
+    flat = change_slope(walker, 0.0)
+    angle = LOSS_ANGLE
     omega = angle * float(per_angle[2])
     before = leg_state(flat, (0.5 * angle, -0.5 * angle), (omega, omega))
     after = apply_strike(flat, before)
@@ -154,7 +159,8 @@ def leg_state(walker: RigidModel, theta: tuple[float, float], omega: tuple[float
 
 def symmetric_half_period(modes: Modes) -> float | None:
     """Return the first time h > 0 (s) after mid-swing with theta_1 + theta_2 = 0 and dtheta_1 = dtheta_2."""
-    total, apart = modes.V[0] + modes.V[1], modes.V[0] - modes.V[1]
+    total = modes.V[0] + modes.V[1]
+    apart = modes.V[0] - modes.V[1]
 
     def mismatch(h: Floats) -> Floats:
         swinging = total[0] * np.sin(modes.swing * h) / modes.swing * apart[1]
@@ -188,8 +194,11 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
     """Return the linearised conditions on a step on a slope of one radian: matrices (..., 4, 4) for durations t (s)."""
     # The matrices act on (z, 1). Three rows require that z repeats after t, one that both feet are down. A solution
     # exists if the determinant vanishes.
-    flat, n = change_slope(walker, 0.0), len(walker.arm_x)
-    swing, fall, inverse = modes.swing, modes.fall, np.linalg.inv(modes.V)
+    flat = change_slope(walker, 0.0)
+    n = len(walker.arm_x)
+    swing = modes.swing
+    fall = modes.fall
+    inverse = np.linalg.inv(modes.V)
     strike = np.zeros((3, 4))  # the heel strike at vanishing angles, including the exchange of roles
     strike[0, 0] = 1.0
     for leg, omega in enumerate(((1.0, 0.0), (0.0, 1.0))):
@@ -205,8 +214,10 @@ def step_conditions(walker: RigidModel, modes: Modes) -> Callable[[Floats], Floa
         return np.asarray(modes.V * weights @ inverse, np.float64)
 
     def conditions(t: Floats) -> Floats:
-        sine, cosine = np.sin(swing * t), np.cos(swing * t)
-        growing, grown = np.sinh(fall * t), np.cosh(fall * t)
+        sine = np.sin(swing * t)
+        cosine = np.cos(swing * t)
+        growing = np.sinh(fall * t)
+        grown = np.cosh(fall * t)
         flow = np.empty((*t.shape, 4, 4))  # maps a state to the state t later
         flow[..., :2, :2] = flow[..., 2:, 2:] = combine_modes(cosine, grown)
         flow[..., :2, 2:] = combine_modes(sine / swing, growing / fall)

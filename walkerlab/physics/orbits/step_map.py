@@ -157,7 +157,9 @@ class StepMap(Stepper, Protocol):
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """Walk up to `steps` steps, transporting a tangent (d,) if there is one."""
-        completed, lengths, outcome = list[MappedStep](), list[float](), Outcome.WALKED
+        completed = list[MappedStep]()
+        lengths = list[float]()
+        outcome = Outcome.WALKED
         for swing in range(steps):
             step = self.step(z, p, tangent is not None, swing)
             outcome = Outcome.REJECTED if step.outcome is None else step.outcome
@@ -199,9 +201,11 @@ def differentiate_along(
     """Differentiate step quantities (steps,) and samples (times, 2) in direction `along`, or None if a walk
     ends early.
     """
-    ends, h = [], VARIATION / np.abs(along).max()
+    ends = []
+    h = VARIATION / np.abs(along).max()
     for offset, weight in CENTRAL_2ND:
-        moved, heights = z + offset * h * along[: z.size], heights_m + offset * h * along[z.size :]
+        moved = z + offset * h * along[: z.size]
+        heights = heights_m + offset * h * along[z.size :]
         walk = step_map.disturbed(moved, p, heights)
         if walk.outcome is not Outcome.WALKED:
             return None
@@ -277,24 +281,28 @@ class Cycle:
 
 def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
     steps: list[MappedStep] = []
-    position, DP = z, identity(z.size)
+    position = z
+    DP = identity(z.size)
     for swing in range(n):
         step = step_map.step(position, p, swing=swing)
         if step.outcome is not Outcome.WALKED:
             return Cycle(step.outcome, p, z, tuple(steps), DP)
-        position, DP = step.z, step.DP @ DP if steps else step.DP
+        position = step.z
+        DP = step.DP @ DP if steps else step.DP
         steps.append(step)
     return Cycle(Outcome.WALKED, p, z, tuple(steps), DP)
 
 
 def add_parameter_derivative(step_map: StepMap, cycle: Cycle) -> Cycle:
     """Return the cycle with its derivative `Dp`, or with the outcome if a step fails at a nearby parameter value."""
-    position, Dp = cycle.z, 0.0 * cycle.z
+    position = cycle.z
+    Dp = 0.0 * cycle.z
     for swing, step in enumerate(cycle.steps):
         outcome, by_parameter = differentiate_by_parameter(step_map, position, cycle.value, swing)
         if outcome is not Outcome.WALKED:
             return replace(cycle, outcome=outcome, Dp=Dp)
-        position, Dp = step.z, step.DP @ Dp + by_parameter
+        position = step.z
+        Dp = step.DP @ Dp + by_parameter
     return replace(cycle, Dp=Dp)
 
 

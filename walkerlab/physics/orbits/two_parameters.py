@@ -59,12 +59,14 @@ def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, 
         return None if evaluated is None or evaluated.outcome is not Outcome.WALKED else evaluated
 
     def equations(x: Floats) -> Evaluated[Cycle | None]:
-        d, reach = x.size - 2, DIFFERENCE_STEP * np.eye(x.size)
+        d = x.size - 2
+        reach = DIFFERENCE_STEP * np.eye(x.size)
         neighbours = (gait(x + sign * unit) for unit in reach for sign in (1.0, -1.0))
         points = [point for point in (gait(x), *neighbours) if point is not None]
         if len(points) < 1 + 2 * x.size:
             return Evaluated(Outcome.NO_HEEL_STRIKE, np.zeros(d + 1), np.zeros((d + 1, d + 2)), None)
-        centre, tests = points[0], np.array([critical_value(kind, point.data.DP) for point in points])
+        centre = points[0]
+        tests = np.array([critical_value(kind, point.data.DP) for point in points])
         by_second = (points[-2].value - points[-1].value) / (2.0 * DIFFERENCE_STEP)
         of_tests = (tests[1::2] - tests[2::2]) / (2.0 * DIFFERENCE_STEP)
         jacobian = np.vstack((np.column_stack((centre.jacobian, by_second)), of_tests))
@@ -110,7 +112,10 @@ def trace_curve(
     points: int, advance: Callable[[], None], control: StepControl,
 ) -> tuple[Floats, BranchEnd]:  # fmt: skip
     scales = np.array([span.size for span in spans])
-    values, before, last, length = [start.x[-2:] * scales], None, start, control.first
+    values = [start.x[-2:] * scales]
+    before = None
+    last = start
+    length = control.first
     while len(values) < points:
         following = step_along(equations, last, length, control, before=before)
         if isinstance(following, NotConverged):
@@ -122,7 +127,8 @@ def trace_curve(
             values.append(clip_to_plane(values[-1], value, spans))
             return np.array(values), BranchEnd(float(values[-1][1]), "end of the plane")
         values.append(value)
-        before, last = last, solved
+        before = last
+        last = solved
     return np.array(values), BranchEnd(float(values[-1][1]), f"the limit of {points} points is reached")
 
 
@@ -171,7 +177,8 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
 
 def interpolate_gaits(branches: Sequence[GaitBranch], values: Floats) -> Points:
     """Interpolate a period-1 gait from the branches at each value, preferably stable, or None if no branch has one."""
-    gaits, stable = list[Floats | None]([None] * len(values)), np.zeros(len(values), bool)
+    gaits = list[Floats | None]([None] * len(values))
+    stable = np.zeros(len(values), bool)
     for branch in branches:
         if branch.period > 1:
             continue
@@ -201,7 +208,8 @@ def correct_row(step_map: StepMap, values: Floats, before: Points) -> Row:
 
 def settle_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) -> tuple[Integers, Points]:
     """Return the periods of a row's attractors and a point on each. `before` holds the points of the previous row."""
-    periods, points = np.full(len(values), ALL_FAILED, np.int64), list[Floats | None]()
+    periods = np.full(len(values), ALL_FAILED, np.int64)
+    points = list[Floats | None]()
     for index, gait in enumerate(gaits):
         if gait is not None and gait.stable:
             periods[index] = 1
@@ -209,7 +217,8 @@ def settle_row(step_map: StepMap, values: Floats, gaits: Row, before: Points) ->
             continue
         # start on the attractors of neighbouring cells, then near the cell's unstable gait, in its direction of growth
         off_gait = None if gait is None else gait.z + UNSTABLE_OFFSET * eigenvector(gait.DP, gait.multipliers[0].real)
-        point, starts = None, (points[index - 1] if index else None, before[index], off_gait)
+        point = None
+        starts = (points[index - 1] if index else None, before[index], off_gait)
         for start in (start for start in starts if start is not None):
             settled = settle(step_map, start, float(values[index]), TRANSIENT_STEPS, KEPT_STEPS)
             if not isinstance(settled, Outcome):

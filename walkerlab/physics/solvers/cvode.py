@@ -44,7 +44,9 @@ class CvodeSolver:
 
         self.solver = CVODE(rate, method=family, jacfn=slopes, **tolerances)
         self.solver.init_step(t, y)
-        self.t_old, self.t, self.y = t, t, y
+        self.t_old = t
+        self.t = t
+        self.y = y
         self.status = "running"
         self.interpolated = False
 
@@ -57,7 +59,9 @@ class CvodeSolver:
         if not ahead.success:
             self.status = "failed"
             return
-        self.t_old, self.t, self.y = self.t, float(ahead.t), ahead.y
+        self.t_old = self.t
+        self.t = float(ahead.t)
+        self.y = ahead.y
 
     def dense_output(self) -> LastStep:
         """Return the solution within the last step, valid until the next step."""

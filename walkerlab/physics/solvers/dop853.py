@@ -31,11 +31,15 @@ from walkerlab.physics.solvers.system import Floats, block, derivative
 
 # With the safety factor of Hairer's code, 0.9, a fifth of a walk's steps are rejected, and the same error costs 11 %
 # more work.
-SAFETY, SHRINK_MOST, GROW_MOST = 0.8, 0.333, 6.0
+SAFETY = 0.8
+SHRINK_MOST = 0.333
+GROW_MOST = 6.0
 EXPONENT = 1.0 / 8.0
-STAGE_COUNT, EXTRA_STAGES = 12, 3
+STAGE_COUNT = 12
+EXTRA_STAGES = 3
 # row of the derivative at the step's end; number of rows with dense output
-LAST_STAGE, ALL_STAGES = STAGE_COUNT, STAGE_COUNT + 1 + EXTRA_STAGES
+LAST_STAGE = STAGE_COUNT
+ALL_STAGES = STAGE_COUNT + 1 + EXTRA_STAGES
 
 
 def rows(weights: Sequence[Sequence[float]], length: int) -> Floats:
@@ -47,7 +51,8 @@ STAGE_NODES = np.array(tableau.NODES)
 # row s: weights of the state of stage s; row LAST_STAGE: weights of the solution
 A = rows([(), *(getattr(tableau, f"A_{stage}") for stage in range(2, ALL_STAGES + 1))], ALL_STAGES)
 D = rows([tableau.D_4, tableau.D_5, tableau.D_6, tableau.D_7], ALL_STAGES)
-ERROR_WEIGHTS_5, ERROR_WEIGHTS_3 = np.array(tableau.ERROR_5), np.array(tableau.ERROR_3)
+ERROR_WEIGHTS_5 = np.array(tableau.ERROR_5)
+ERROR_WEIGHTS_3 = np.array(tableau.ERROR_3)
 
 
 @pass_by_reference
@@ -67,14 +72,17 @@ class Dop853(NamedTuple):
 
 def new_dop853(n: int, rtol: float, atol: float, budget: int) -> Dop853:
     y_old, y, at = np.zeros((3, n))
-    stages, dense = np.zeros((ALL_STAGES, n)), np.zeros((7, n))
+    stages = np.zeros((ALL_STAGES, n))
+    dense = np.zeros((7, n))
     return Dop853(rtol, atol, np.zeros(3), y_old, y, new_counts(budget), at, stages, dense)
 
 
 @kernel_part
 def evaluate_stages(method: Dop853, system: Any, t: float, h: float, first: int, end: int) -> None:
     """Evaluate stages `first` to `end - 1` of a step of h from `y_old` at time t (s). `at` keeps the last state."""
-    y, at, K = method.y_old, method.at, method.stages
+    y = method.y_old
+    at = method.at
+    K = method.stages
     total = vector(block(system))
     width = len(total)
     for s in range(first, end):
@@ -97,11 +105,16 @@ def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
     """Compute a step of h (s) from `y_old` into `y`, and return its error relative to the tolerance,
     equation (10.17).
     """
-    y_old, y, at, K = method.y_old, method.y, method.at, method.stages
+    y_old = method.y_old
+    y = method.y
+    at = method.at
+    K = method.stages
     evaluate_stages(method, system, t, h, 1, LAST_STAGE + 1)
-    by_order_5, by_order_3 = vector(block(system)), vector(block(system))
+    by_order_5 = vector(block(system))
+    by_order_3 = vector(block(system))
     width = len(by_order_5)
-    error_5, error_3 = 0.0, 0.0
+    error_5 = 0.0
+    error_3 = 0.0
     for start in range(0, y.size, width):
         for i in range(width):
             by_order_5[i], by_order_3[i] = 0.0, 0.0
@@ -113,7 +126,8 @@ def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
         for i in range(width):
             y[start + i] = at[start + i]
             scale = 1.0 / (method.atol + method.rtol * max(abs(y_old[start + i]), abs(y[start + i])))
-            relative_5, relative_3 = by_order_5[i] * scale, by_order_3[i] * scale
+            relative_5 = by_order_5[i] * scale
+            relative_3 = by_order_3[i] * scale
             error_5 += relative_5 * relative_5
             error_3 += relative_3 * relative_3
     denominator = error_5 + 0.01 * error_3
@@ -141,7 +155,10 @@ def change_of_step(error: float) -> float:
 @stepping.begin.case(Dop853)
 def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> None:
     """Evaluate the derivative and, for h = 0, choose the first step as Hairer's hinit does."""
-    clock, at, slope, ahead = method.clock, method.at, method.stages[LAST_STAGE], method.stages[0]
+    clock = method.clock
+    at = method.at
+    slope = method.stages[LAST_STAGE]
+    ahead = method.stages[0]
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h
     for i in range(method.y.size):
         method.y[i] = y[i]
@@ -149,7 +166,8 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
     method.counts[RHS] += 1
     if h > 0.0:
         return
-    size, steepness = scaled_norm(method, method.y), scaled_norm(method, slope)
+    size = scaled_norm(method, method.y)
+    steepness = scaled_norm(method, slope)
     guess = 0.01 * size / steepness if size > 1e-5 and steepness > 1e-5 else 1e-6
     for i in range(at.size):
         at[i] = fused(guess, slope[i], method.y[i])
@@ -166,7 +184,11 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
 @stepping.advance.case(Dop853)
 def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     """Advance by one step, with Hairer's step control and a smaller safety factor."""
-    clock, counts, y_old, y, K = method.clock, method.counts, method.y_old, method.y, method.stages
+    clock = method.clock
+    counts = method.counts
+    y_old = method.y_old
+    y = method.y
+    K = method.stages
     t, h = clock[T], clock[H_NEXT]
     for i in range(y.size):
         y_old[i], K[0, i] = y[i], K[LAST_STAGE, i]
@@ -209,7 +231,10 @@ def prepare_dense_dop853(method: Dop853, system: Any) -> None:
     """Evaluate three more stages and the coefficients of the dense output."""
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     evaluate_stages(method, system, t, h, LAST_STAGE + 1, ALL_STAGES)
-    y_old, y, K, dense = method.y_old, method.y, method.stages, method.dense
+    y_old = method.y_old
+    y = method.y
+    K = method.stages
+    dense = method.dense
     for i in range(y.size):
         dense[0, i] = y[i] - y_old[i]
         dense[1, i] = h * K[0, i] - y[i] + y_old[i]
@@ -225,7 +250,8 @@ def prepare_dense_dop853(method: Dop853, system: Any) -> None:
 def interpolate_dop853(method: Dop853, system: Any, fraction: float, y: Any) -> None:
     """Evaluate Hairer's contd8, with nested products expanded into one weight per row."""
     s, r, d = fraction, 1.0 - fraction, method.dense
-    w1, w3 = s * r, s * r * s * r
+    w1 = s * r
+    w3 = s * r * s * r
     for i in range(y.size):
         low = fused(w1 * s, d[2, i], fused(w1, d[1, i], fused(s, d[0, i], method.y_old[i])))
         high = fused(w3 * s * r, d[5, i], fused(w3 * s, d[4, i], fused(w3, d[3, i], low)))

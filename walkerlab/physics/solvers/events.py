@@ -20,7 +20,8 @@ from numpy.polynomial import polynomial
 from walkerlab.physics.kernels import kernel_part, pass_by_reference
 
 NO_CROSSING = 2.0
-FALLING, RISING = -1, 1
+FALLING = -1
+RISING = 1
 MIN_PIECE = 2.0**-48
 ROOT_RESOLUTION = 2.0**-52  # resolution of a crossing, as a fraction of its piece
 DEPTH = 64  # maximum number of pieces on the stack
@@ -76,7 +77,8 @@ def first_crossing(finder: CrossingFinder, event: int, direction: int, after: fl
 @kernel_part
 def crossing_of_piece(finder: CrossingFinder, size: int, direction: int, after: float) -> float:
     """Find the first crossing of the polynomial at the bottom of the stack, with `size` Bernstein coefficients."""
-    stack, ends = finder.stack, finder.ends
+    stack = finder.stack
+    ends = finder.ends
     ends[0, 0], ends[0, 1] = 0.0, 1.0
     top = 0
     while top >= 0:
@@ -109,7 +111,8 @@ def value_at(finder: CrossingFinder, event: int, fraction: float) -> float:
 @kernel_part
 def spans_zero(finder: CrossingFinder, event: int) -> bool:
     """Whether an event function may cross zero: false if its values are much further from zero than they vary."""
-    smallest, largest = finder.values[event, 0], finder.values[event, 0]
+    smallest = finder.values[event, 0]
+    largest = finder.values[event, 0]
     for i in range(1, finder.nodes.size):
         smallest = min(smallest, finder.values[event, i])
         largest = max(largest, finder.values[event, i])
@@ -120,7 +123,8 @@ def spans_zero(finder: CrossingFinder, event: int) -> bool:
 @kernel_part
 def set_root_piece(finder: CrossingFinder, event: int, zero_at_start: bool) -> int:
     """Write the coefficients for the whole step to the bottom of the stack, and return their number."""
-    stack, size = finder.stack, finder.nodes.size
+    stack = finder.stack
+    size = finder.nodes.size
     for i in range(size):
         total = 0.0
         for j in range(size):
@@ -178,7 +182,8 @@ def split(stack: Any, piece: int, size: int) -> None:
 def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> float:
     """Find the only crossing of a piece, as a fraction of the step, by the Illinois variant of regula falsi."""
     a, b = 0.0, 1.0
-    value_a, value_b = stack[piece, 0], stack[piece, size - 1]
+    value_a = stack[piece, 0]
+    value_b = stack[piece, size - 1]
     side = 0
     for _ in range(100):
         if b - a <= 2.0 * ROOT_RESOLUTION or value_a == value_b:
@@ -189,11 +194,13 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
         if value_c == 0.0:
             a, b = c, c
         elif (value_c < 0.0) == (value_b < 0.0):
-            b, value_b = c, value_c
+            b = c
+            value_b = value_c
             value_a = 0.5 * value_a if side == -1 else value_a
             side = -1
         else:
-            a, value_a = c, value_c
+            a = c
+            value_a = value_c
             value_b = 0.5 * value_b if side == 1 else value_b
             side = 1
     return low + 0.5 * (a + b) * (high - low)
@@ -203,7 +210,9 @@ def regula_falsi(stack: Any, piece: int, size: int, low: float, high: float) -> 
 def evaluate(stack: Any, piece: int, size: int, x: float) -> float:
     """Evaluate a piece at x (0 to 1) by nested products."""
     degree = size - 1
-    u, power, binomial = 1.0 - x, 1.0, 1.0
+    u = 1.0 - x
+    power = 1.0
+    binomial = 1.0
     total = stack[piece, 0] * u
     for i in range(1, degree):
         power *= x

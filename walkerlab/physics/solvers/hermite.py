@@ -23,8 +23,10 @@ MAX_ITERATIONS = 50
 @kernel_part
 def hermite(h: float, start: Jet, end: Jet) -> Quintic:
     """Return the quintic over a step of h (s) with the given values and derivatives at both ends."""
-    slope, bend = 0.2 * h * start[1], 0.05 * h * h * start[2]
-    last_slope, last_bend = 0.2 * h * end[1], 0.05 * h * h * end[2]
+    slope = 0.2 * h * start[1]
+    bend = 0.05 * h * h * start[2]
+    last_slope = 0.2 * h * end[1]
+    last_bend = 0.05 * h * h * end[2]
     return (
         start[0],
         start[0] + slope,
@@ -83,7 +85,9 @@ def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, af
 def only_crossing(quintic: Quintic) -> float:
     """Find the zero of a quintic with a single, falling crossing: Newton from the end, safeguarded by bisection."""
     powers = power_coefficients(quintic)
-    low, high, x = 0.0, 1.0, 1.0
+    low = 0.0
+    high = 1.0
+    x = 1.0
     for _ in range(MAX_ITERATIONS):
         value, slope = value_and_slope(powers, x)
         if value < 0.0:

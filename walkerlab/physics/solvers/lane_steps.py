@@ -12,11 +12,20 @@ from walkerlab.physics.solvers.lanes import VECTOR, multiply_add, spread_over
 from walkerlab.physics.solvers.system import State
 
 LANE_NODES = tableau.NODES
-A_2, A_3, A_4 = nonzero(tableau.A_2), nonzero(tableau.A_3), nonzero(tableau.A_4)
-A_5, A_6, A_7 = nonzero(tableau.A_5), nonzero(tableau.A_6), nonzero(tableau.A_7)
-A_8, A_9, A_10 = nonzero(tableau.A_8), nonzero(tableau.A_9), nonzero(tableau.A_10)
-A_11, A_12, A_13 = nonzero(tableau.A_11), nonzero(tableau.A_12), nonzero(tableau.A_13)
-LANE_ERROR_5, LANE_ERROR_3 = nonzero(tableau.ERROR_5), nonzero(tableau.ERROR_3)
+A_2 = nonzero(tableau.A_2)
+A_3 = nonzero(tableau.A_3)
+A_4 = nonzero(tableau.A_4)
+A_5 = nonzero(tableau.A_5)
+A_6 = nonzero(tableau.A_6)
+A_7 = nonzero(tableau.A_7)
+A_8 = nonzero(tableau.A_8)
+A_9 = nonzero(tableau.A_9)
+A_10 = nonzero(tableau.A_10)
+A_11 = nonzero(tableau.A_11)
+A_12 = nonzero(tableau.A_12)
+A_13 = nonzero(tableau.A_13)
+LANE_ERROR_5 = nonzero(tableau.ERROR_5)
+LANE_ERROR_3 = nonzero(tableau.ERROR_3)
 
 
 @dispatch_by_type
@@ -88,10 +97,12 @@ def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tu
 @kernel_part
 def error_sums(method: Any, y: State, y_new: State, by_order_5: State, by_order_3: State) -> tuple[float, float]:
     """Compute, for each error estimate, the sum of squares of error over tolerance. `method` holds rtol and atol."""
-    error_5, error_3 = 0.0, 0.0
+    error_5 = 0.0
+    error_3 = 0.0
     for i in range(len(y)):
         scale = 1.0 / (method.atol + method.rtol * max(abs(y[i]), abs(y_new[i])))
-        relative_5, relative_3 = by_order_5[i] * scale, by_order_3[i] * scale
+        relative_5 = by_order_5[i] * scale
+        relative_3 = by_order_3[i] * scale
         error_5 += relative_5 * relative_5
         error_3 += relative_3 * relative_3
     return error_5, error_3

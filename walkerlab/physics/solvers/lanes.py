@@ -133,7 +133,9 @@ def multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
 def teach_arithmetic() -> None:
     """Register arithmetic on lanes with numba. This is needed before the first kernel with lanes is compiled."""
     # This is not done on import, because it affects everything that the process compiles.
-    unary, binary, variadic = (LANES,), (LANES, LANES), (types.VarArg(LANES),)
+    unary = (LANES,)
+    binary = (LANES, LANES)
+    variadic = (types.VarArg(LANES),)
     for plain, in_place, instruction in (
         (operator.add, operator.iadd, "fadd"),
         (operator.sub, operator.isub, "fsub"),

@@ -47,14 +47,22 @@ P_1 = (13.0 / 3.0 + 7.0 * ROOT6 / 3.0, 13.0 / 3.0 - 7.0 * ROOT6 / 3.0, 1.0 / 3.0
 P_2 = (-23.0 / 3.0 - 22.0 * ROOT6 / 3.0, -23.0 / 3.0 + 22.0 * ROOT6 / 3.0, -8.0 / 3.0)
 P_3 = (10.0 / 3.0 + 5.0 * ROOT6, 10.0 / 3.0 - 5.0 * ROOT6, 10.0 / 3.0)
 
-RADAU_SAFETY, RADAU_SHRINK, RADAU_GROWTH = 0.9, 0.125, 8.0
+RADAU_SAFETY = 0.9
+RADAU_SHRINK = 0.125
+RADAU_GROWTH = 8.0
 KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # range of step ratios in which the factored matrices are kept
 FRESH_RATE = 1e-3  # the Jacobian is kept if Newton converges faster
 FIRST_RADAU_STEP = 1e-6
 MAX_NEWTON = 7
 
 # indices into `control`
-H_FACTORED, H_OLD, ERROR_OLD, RATE, SMOOTH, FRESH, UNKNOWNS = 0, 1, 2, 3, 4, 5, 6
+H_FACTORED = 0
+H_OLD = 1
+ERROR_OLD = 2
+RATE = 3
+SMOOTH = 4
+FRESH = 5
+UNKNOWNS = 6
 
 
 @pass_by_reference
@@ -83,7 +91,8 @@ class Radau5(NamedTuple):
 
 
 def new_radau5(n: int, rtol: float, atol: float, budget: int) -> Radau5:
-    three, square = (3, n), (n, n)
+    three = (3, n)
+    square = (n, n)
     return Radau5(
         rtol, atol, np.zeros(3), np.zeros(n), np.zeros(n), new_counts(budget), np.zeros(n), np.zeros((2, n)),
         np.zeros(three), np.zeros(three), np.zeros(three), np.zeros(three),
@@ -120,7 +129,9 @@ def solve_pair(method: Radau5, r: Any) -> None:
 def first_guess(method: Radau5, h: float) -> None:
     """Extrapolate the stages from the last step's collocation polynomial. After a start, set them to zero."""
     ratio = h / method.control[H_OLD] if method.control[SMOOTH] > 0.0 else 0.0
-    z, w, dense = method.z, method.w, method.dense
+    z = method.z
+    w = method.w
+    dense = method.dense
     for i in range(method.y.size):
         start = dense[0, i] + dense[1, i] + dense[2, i]
         for stage in range(3):
@@ -143,7 +154,9 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
     method.counts[RHS] += 3
     real = method.move
     for i in range(n):
-        f1, f2, f3 = f[0, i], f[1, i], f[2, i]
+        f1 = f[0, i]
+        f2 = f[1, i]
+        f3 = f[2, i]
         real[i] = INV_1[0] * f1 + INV_1[1] * f2 + INV_1[2] * f3 - GAMMA / h * w[0, i]
         re = INV_2[0] * f1 + INV_2[1] * f2 + INV_2[2] * f3 - (ALPHA * w[1, i] + BETA * w[2, i]) / h
         im = INV_3[0] * f1 + INV_3[1] * f2 + INV_3[2] * f3 - (ALPHA * w[2, i] - BETA * w[1, i]) / h
@@ -152,10 +165,14 @@ def newton_move(method: Radau5, system: Any, t: float, h: float) -> float:
     solve_pair(method, method.move_pair)
     size = 0.0
     for i in range(n):
-        d1, d2, d3 = real[i], method.move_pair[i].real, method.move_pair[i].imag
+        d1 = real[i]
+        d2 = method.move_pair[i].real
+        d3 = method.move_pair[i].imag
         scale = 1.0 / (method.atol + method.rtol * abs(y[i]))
         size += (d1 * scale) ** 2 + (d2 * scale) ** 2 + (d3 * scale) ** 2
-        w1, w2, w3 = w[0, i] + d1, w[1, i] + d2, w[2, i] + d3
+        w1 = w[0, i] + d1
+        w2 = w[1, i] + d2
+        w3 = w[2, i] + d3
         w[0, i], w[1, i], w[2, i] = w1, w2, w3
         z[0, i] = T_1[0] * w1 + T_1[1] * w2 + T_1[2] * w3
         z[1, i] = T_2[0] * w1 + T_2[1] * w2 + T_2[2] * w3
@@ -168,7 +185,8 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
     """Iterate until the stages are accurate enough, and return the number of iterations, or 0 if they diverge."""
     tolerance = max(10.0 * 2.3e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
     first_guess(method, h)
-    size_old, rate = 0.0, method.control[RATE]
+    size_old = 0.0
+    rate = method.control[RATE]
     for iteration in range(1, MAX_NEWTON + 1):
         size = newton_move(method, system, t, h)
         if not size < 1e100:
@@ -190,7 +208,8 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
 @stepping.begin.case(Radau5)
 def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> None:
     """Evaluate derivative and Jacobian at the start, and discard the history of step control."""
-    clock, control = method.clock, method.control
+    clock = method.clock
+    control = method.control
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h if h > 0.0 else FIRST_RADAU_STEP
     for i in range(method.y.size):
         method.y[i] = y[i]
@@ -204,7 +223,8 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> Non
 def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> float:
     """Compute the error relative to the tolerance by (8.19). If `again`, an error over 1 is filtered by (8.20)."""
     n = method.y.size
-    error, z = method.f[0], method.z
+    error = method.f[0]
+    z = method.z
     for i in range(n):
         method.f[1, i] = (ERROR[0] * z[0, i] + ERROR[1] * z[1, i] + ERROR[2] * z[2, i]) / h
         error[i] = method.slope[0, i] + method.f[1, i]
@@ -225,7 +245,8 @@ def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> 
 @kernel_part
 def error_size(method: Radau5, error: Any) -> float:
     """Compute the root mean square of the error divided by the tolerance."""
-    y, total = method.y, 0.0
+    y = method.y
+    total = 0.0
     for i in range(y.size):
         scale = method.atol + method.rtol * max(abs(y[i]), abs(y[i] + method.z[2, i]))
         total += (error[i] / scale) ** 2
@@ -235,7 +256,8 @@ def error_size(method: Radau5, error: Any) -> float:
 @stepping.advance.case(Radau5)
 def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
     """Advance by one step, with Hairer's predictive step control."""
-    clock, control = method.clock, method.control
+    clock = method.clock
+    control = method.control
     t, h = clock[T], clock[H_NEXT]
     rejected = False
     while method.counts[RHS] < method.counts[BUDGET]:
@@ -296,8 +318,12 @@ def next_step(method: Radau5, h: float, error: float, shrink: float, safety: flo
 @kernel_part
 def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
     """Move to the end of the step, store its polynomial, and update derivative and Jacobian."""
-    clock, control = method.clock, method.control
-    y, z, slope, dense = method.y, method.z, method.slope, method.dense
+    clock = method.clock
+    control = method.control
+    y = method.y
+    z = method.z
+    slope = method.slope
+    dense = method.dense
     for i in range(y.size):
         dense[0, i] = fused(P_1[2], z[2, i], fused(P_1[1], z[1, i], P_1[0] * z[0, i]))
         dense[1, i] = fused(P_2[2], z[2, i], fused(P_2[1], z[1, i], P_2[0] * z[0, i]))
@@ -317,7 +343,8 @@ def accept(method: Radau5, system: Any, t: float, t_new: float) -> None:
 @stepping.rewind.case(Radau5)
 def rewind_radau5(method: Radau5, system: Any) -> None:
     """Go back to the step's start. The next step's first guess does not use the polynomial."""
-    clock, control = method.clock, method.control
+    clock = method.clock
+    control = method.control
     for i in range(method.y.size):
         method.y[i], method.slope[0, i] = method.y_old[i], method.slope[1, i]
     clock[T] = clock[T_OLD]
@@ -332,6 +359,7 @@ def prepare_dense_radau5(method: Radau5, system: Any) -> None:
 
 @stepping.interpolate.case(Radau5)
 def interpolate_radau5(method: Radau5, system: Any, fraction: float, y: Any) -> None:
-    s, dense = fraction, method.dense
+    s = fraction
+    dense = method.dense
     for i in range(y.size):
         y[i] = fused(s * s * s, dense[2, i], fused(s * s, dense[1, i], fused(s, dense[0, i], method.y_old[i])))

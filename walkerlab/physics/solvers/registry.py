@@ -98,7 +98,8 @@ class Tolerances:
 def share_counts(method: Any, clock: Any, counts: Any) -> Any:
     """Return the method with the clock and counts of another method, so that both integrate the same walk in turns."""
     if isinstance(method, ScipyMethod):
-        method.clock, method.counts = clock, counts
+        method.clock = clock
+        method.counts = counts
         return method
     return method._replace(clock=clock, counts=counts)
 

@@ -58,10 +58,13 @@ class ScipyMethod:
         self, new_solver: Callable[..., Any], takes_jacobian: bool, n: int, rtol: float, atol: float, budget: int
     ) -> None:
         """Prepare for n equations. `begin` calls `new_solver`, which has the signature of scipy's solvers."""
-        self.new_solver, self.takes_jacobian = new_solver, takes_jacobian
-        self.rtol, self.atol = rtol, atol
+        self.new_solver = new_solver
+        self.takes_jacobian = takes_jacobian
+        self.rtol = rtol
+        self.atol = atol
         self.clock = np.zeros(3)
-        self.y_old, self.y = np.zeros(n), np.zeros(n)
+        self.y_old = np.zeros(n)
+        self.y = np.zeros(n)
         self.counts = new_counts(budget)
         self.solver: Any = None
         self.dense: Any = None
@@ -158,12 +161,14 @@ def prepare_dense_scipy(method: ScipyMethod, system: Any) -> None:
 
 @stepping.interpolate.case(ScipyMethod)
 def interpolate_scipy(method: ScipyMethod, system: Any, fraction: float, y: Any) -> None:
-    t_old, t = method.clock[T_OLD], method.clock[T]
+    t_old = method.clock[T_OLD]
+    t = method.clock[T]
     y[:] = method.dense(t_old + fraction * (t - t_old))[: y.size]
 
 
 @stepping.sample.case(ScipyMethod)
 def sample_scipy(method: ScipyMethod, system: Any, fractions: Any, states: Any) -> None:
-    t_old, t = method.clock[T_OLD], method.clock[T]
+    t_old = method.clock[T_OLD]
+    t = method.clock[T]
     columns = method.dense(t_old + fractions * (t - t_old))[: states.shape[1]]
     states[: len(fractions), : len(columns)] = columns.T

@@ -32,7 +32,8 @@ def factor_shifted(J: Any, size: int, s: Any, factors: Any, pivots: Any) -> bool
     """Factor the reduced matrix for shift s into `factors` (size, size), real or complex, or return False if it is
     singular.
     """
-    n, inverse = J.shape[0], reciprocal(s)
+    n = J.shape[0]
+    inverse = reciprocal(s)
     for i in range(size):
         for j in range(size):
             factors[i, j] = -J[i, j] if size == n else -J[size + i, size + j] - inverse * J[size + i, j]

@@ -17,11 +17,19 @@ from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_defa
 from walkerlab.physics.solvers.system import Integers
 
 # indices into `clock`
-T_OLD, T, H_NEXT = 0, 1, 2
+T_OLD = 0
+T = 1
+H_NEXT = 2
 # indices into `counts`
-RHS, ACCEPTED, REJECTED, JACOBIANS, BUDGET = 0, 1, 2, 3, 4
+RHS = 0
+ACCEPTED = 1
+REJECTED = 2
+JACOBIANS = 3
+BUDGET = 4
 # results of `advance`
-STEP_DONE, OUT_OF_BUDGET, STEP_TOO_SMALL = 0, 1, 2
+STEP_DONE = 0
+OUT_OF_BUDGET = 1
+STEP_TOO_SMALL = 2
 SMALLEST_STEP = 1e-15
 
 

@@ -25,7 +25,8 @@ class Graph:
 
         Raises ValueError if two have the same name.
         """
-        self.stages, self.at = stages, at
+        self.stages = stages
+        self.at = at
         self._by_name = {stage.name: stage for stage in stages}
         if len(self._by_name) != len(stages):
             raise ValueError("two stages have the same name")

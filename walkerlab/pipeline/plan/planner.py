@@ -24,8 +24,12 @@ class Planner:
         self, config: Config, results: Results, stages: Sequence[Stage], *, force: bool = False, again: bool = True
     ) -> None:
         """Store the arguments without reading anything."""
-        self.config, self.results, self.stages, self.graph = config, results, tuple(stages), results.keys.graph
-        self.force, self.again = force, again
+        self.config = config
+        self.results = results
+        self.stages = tuple(stages)
+        self.graph = results.keys.graph
+        self.force = force
+        self.again = again
         self.answers: dict[str, Content] = {}
         self.left_out: dict[str, str] = {}
         self._keys: dict[str, str] = {}

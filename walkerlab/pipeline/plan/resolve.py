@@ -59,14 +59,18 @@ def resolve(
 
     Raises ConfigError if `text` matches nothing or the config is invalid.
     """
-    path, run = None if text is None else Path(text), None
+    path = None if text is None else Path(text)
+    run = None
     if path is not None and text not in builtin_names() and not (is_file(path) and path.suffix != SUFFIX):
         run = artifact_at(path) or run_at(str(text), runs)
     if run is not None:
         folder, earlier = run
-        read, runs, source = load(earlier, sets, strides, name), folder.runs_dir, folder.source
+        read = load(earlier, sets, strides, name)
+        runs = folder.runs_dir
+        source = folder.source
     else:
-        read, source = load(path, sets, strides, name), source_of(path, runs)
+        read = load(path, sets, strides, name)
+        source = source_of(path, runs)
     refuse_what_makes_no_walker(read)
     for stage in PIPELINE.stages:
         stage.checks(read.config)

@@ -54,14 +54,18 @@ class FolderResults:
 
     def __init__(self, folder: RunFolder, graph: Graph = PIPELINE, elsewhere: bool = True) -> None:
         """Store the arguments without reading a file."""
-        self.run, self.folder, self.elsewhere, self.keys = folder, folder.path, elsewhere, Keys(graph)
+        self.run = folder
+        self.folder = folder.path
+        self.elsewhere = elsewhere
+        self.keys = Keys(graph)
         self._begun: dict[str, tuple[Provenance, Checkpoint]] = {}
 
     def find(self, stage: Stage, identity: Identity, inputs: Mapping[str, Content], force: bool) -> Step:
         """Return a step that reuses a stage's result or runs the stage. With `force` it always runs the stage."""
         path = self.run.artifact(stage.name)
         verdict = artifact.check(path, identity.key, stage.name)
-        stored, damaged = verdict.artifact, path if verdict.damaged else None
+        stored = verdict.artifact
+        damaged = path if verdict.damaged else None
         why = "--force" if force else self._why_outdated(stage, identity, verdict, inputs)
         if not why and stored is not None:
             reason = UP_TO_DATE if stored.no_answer is None else f"no answer: {stored.no_answer.message}"
@@ -91,7 +95,8 @@ class FolderResults:
 
         With `force`, the checkpoint of an interrupted run is dropped.
         """
-        stage, identity = step.stage, step.identity
+        stage = step.stage
+        identity = step.identity
         assert identity is not None, "a stage that is left out does not run"
         checkpoint = Checkpoint(self.run.checkpoint(stage.name), identity.key)
         if force:

@@ -45,12 +45,14 @@ def runs_in(runs_dir: Path, graph: Graph = PIPELINE) -> Iterator[RunSummary]:
         sweeps = tuple(sorted(file.name for file in path.glob(f"{SWEEP}*.h5")))
         if not stages and not sweeps:
             continue
-        config, current = config_of(folder), None
+        config = config_of(folder)
+        current = None
         if config is not None:
             current = tuple(step.stage.name for step in survey(config, folder, graph) if step.action == "reuse")
         stats = [file.stat() for file in path.rglob("*") if file.is_file()]
         when = datetime.datetime.fromtimestamp(max(stat.st_mtime for stat in stats), datetime.UTC)
-        size, changed = sum(stat.st_size for stat in stats), when.isoformat(timespec="seconds")
+        size = sum(stat.st_size for stat in stats)
+        changed = when.isoformat(timespec="seconds")
         yield RunSummary(folder.name, folder.path, folder.changes, stages, current, sweeps, size, changed)
 
 

@@ -31,7 +31,8 @@ def compile_rigid(method: str, config: Config) -> None:
     from walkerlab.physics.solvers.registry import Tolerances
     from walkerlab.scene.rigid import rigid_walker
 
-    walker, tolerances = rigid_walker(config), Tolerances(method, 1e-6, 1e-6, BUDGET)
+    walker = rigid_walker(config)
+    tolerances = Tolerances(method, 1e-6, 1e-6, BUDGET)
     z = np.eye(1, int(walker.coordinates)) * HALF_ANGLE
     samples = take_walk(walker, tolerances, state_on_section(walker, z[0]), 1, sampled=True).samples
     assert samples is not None
@@ -71,7 +72,8 @@ def compile_plain_systems(config: Config) -> None:
     if config.contact is None:
         return
     scene = contact_scene(config, config.walker.leg_length_m * 2.0 * float(np.sin(HALF_ANGLE)))
-    system, y = OnPads(place_on_ground(scene.walker, (True, True)), scene.ground.terrain), np.zeros(scene.walker.size)
+    system = OnPads(place_on_ground(scene.walker, (True, True)), scene.ground.terrain)
+    y = np.zeros(scene.walker.size)
     right_hand_side(system, 0.0, y, np.empty_like(y))
     semi_implicit_euler(system, y, np.empty_like(y), 0.0, 1e-4, 1)
 

@@ -39,7 +39,9 @@ class Executor:
 
     def __init__(self, planner: Planner, jobs: int = 1, reporter: Reporter | None = None) -> None:
         """Store the arguments without running anything."""
-        self.planner, self.jobs, self.reporter = planner, jobs, reporter or Silent()
+        self.planner = planner
+        self.jobs = jobs
+        self.reporter = reporter or Silent()
         self.done: list[Step] = []
         self._early = EarlyDrawings(planner, self.reporter)
         self._waiting: list[Stage] = []
@@ -51,11 +53,9 @@ class Executor:
 
     def carry_out(self, likely: Sequence[Stage] = ()) -> None:
         """Reuse, run or leave out each stage. `likely` holds the stages that the plan expects to run."""
-        self._waiting, self._left, self._total = (
-            list(self.planner.stages),
-            [stage.name for stage in likely],
-            len(likely),
-        )
+        self._waiting = list(self.planner.stages)
+        self._left = [stage.name for stage in likely]
+        self._total = len(likely)
         side_by_side = self.jobs > 1 and any_side_by_side(likely, self.planner.config)
         try:
             with WorkerPool(self.jobs) as pool:
@@ -123,7 +123,8 @@ class Executor:
     def _begin(self, step: Step) -> RunningStage:
         if step.damaged is not None:
             self.reporter.warn(f"{step.damaged} is {step.reason}; recomputing it")
-        planner, stage = self.planner, step.stage
+        planner = self.planner
+        stage = step.stage
         inputs = planner.inputs(stage)
         offered = dict(planner.results.begin(step, planner.config, inputs, planner.force))
         offered |= {"jobs": self.jobs, "again": planner.again, "left_out": planner.missing_inputs(stage)}
@@ -139,7 +140,8 @@ class Executor:
     def _finish(self, future: Future[Any] | None, answer: Content) -> None:
         """Store a stage's result (partial if the stage found no answer) and report that the stage has ended."""
         running_stage = self._running[future]
-        step, name = running_stage.step, running_stage.step.stage.name
+        step = running_stage.step
+        name = running_stage.step.stage.name
         awaited = any(name in stage.results(self.planner.config) for stage in self._waiting)
         stored = self.planner.results.keep(step, answer, awaited)
         del self._running[future]
@@ -160,7 +162,8 @@ class EarlyDrawings:
     """
 
     def __init__(self, planner: Planner, reporter: Reporter) -> None:
-        self.planner, self.reporter = planner, reporter
+        self.planner = planner
+        self.reporter = reporter
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
@@ -169,7 +172,8 @@ class EarlyDrawings:
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """
-        planner, folder = self.planner, self.planner.results.folder
+        planner = self.planner
+        folder = self.planner.results.folder
         for stage in drawings:
             missing = unsettled.intersection(stage.results(planner.config))
             inputs = planner.inputs(stage) | {name: self.drawn[name] for name in missing & self.drawn.keys()}

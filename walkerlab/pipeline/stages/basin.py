@@ -72,7 +72,8 @@ def run(
     Raises ConfigError if the contact model has no contact block, NoAnswer if its pads should fit a gait that does
     not exist.
     """
-    gait, rigid = inputs["fixedpoint"].summary, rigid_walker(config)
+    gait = inputs["fixedpoint"].summary
+    rigid = rigid_walker(config)
     if len(rigid.section_indices) != len(COORDINATES):
         raise ConfigError(
             f"basin needs a walker with {len(COORDINATES)} coordinates just after heel strike; this one has "
@@ -82,7 +83,8 @@ def run(
     window = window_of(config, [float(gait["state"][place]) for place in rigid.section_indices])
     progress.start("basin: attractors")
     question = question_of(config, inputs, window, rigid)
-    started_at, shared_from = time.perf_counter(), question.shared_from
+    started_at = time.perf_counter()
+    shared_from = question.shared_from
     every = range(window.size)
     units = units_of("cells", every, question.cells_at_once, 1, partial(ends_of, question, window))
     parts, walks = complete(units, checkpoint, "basin", progress, jobs, shared_from)
@@ -92,7 +94,8 @@ def run(
     walking = is_walking.astype(float)
     if config.basin.refine > 1 and edges.size:
         refine = config.basin.refine
-        walks_of_cell, shares = refine ** len(window.axes), partial(shares_of, question, window, refine)
+        walks_of_cell = refine ** len(window.axes)
+        shares = partial(shares_of, question, window, refine)
         units = units_of("edge", edges.tolist(), question.edges_at_once, walks_of_cell, shares)
         edge_shares, more = complete(units, checkpoint, "basin: edges", progress, jobs, shared_from)
         walking[edges], walks = np.concatenate(edge_shares), walks + more
@@ -152,8 +155,10 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     # Imported here: it loads interpolation code, which the rigid model does not need.
     from walkerlab.scene.scaled import scale_for_map, starts_of
 
-    gait, steps = inputs["fixedpoint"].summary, config.basin.contact_steps
-    step_length_m, state = float(gait["step_length_m"]), as_state(gait["state"])
+    gait = inputs["fixedpoint"].summary
+    steps = config.basin.contact_steps
+    step_length_m = float(gait["step_length_m"])
+    state = as_state(gait["state"])
     answer = contact_gait(config, step_length_m, state)
     scene = replace(scene_on_pads(config, step_length_m, state, answer), pinned=False)
     starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
@@ -184,7 +189,8 @@ def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -
 
 
 def summary(settings: Basin, window: Window, ends: WalkEnds, walking: Floats, question: Question) -> dict[str, Any]:
-    walks, attractors = ends.outcome == Outcome.WALKED, question.attractor_rows()
+    walks = ends.outcome == Outcome.WALKED
+    attractors = question.attractor_rows()
     for number, row in enumerate(attractors):
         reaches = walks & (ends.attractor == number)
         row["cells"] = int(np.count_nonzero(reaches))

@@ -59,7 +59,8 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     limps = "fixedpoint" in inputs and have_different_legs(config)
     asymmetry = inputs["fixedpoint"].summary["asymmetry"]["step_length"] if limps else 0.0
     scene = scene_on_pads(config, rigid_step, rigid_state, asymmetry=asymmetry)
-    start, steps = start_state(scene, rigid_state), 2 * config.strides
+    start = start_state(scene, rigid_state)
+    steps = 2 * config.strides
     tolerances = tolerances_of(config, steps)
     interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     heights = foothold_heights(config.ground, steps + 1)
@@ -71,7 +72,8 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
         progress.advance()
         return result
 
-    stored, summarise = partial(groups, config, scene), partial(summary, config, scene)
+    stored = partial(groups, config, scene)
+    summarise = partial(summary, config, scene)
     return content_of_walk("contact-sim", walk, tolerances, stored, summarise, progress, again)
 
 
@@ -167,10 +169,13 @@ def trajectory_group(
 
 def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     """Return the motion of legs, shanks and torso, and the positions of hip and knees."""
-    walker, layout = scene.walker, scene.walker.whole
+    walker = scene.walker
+    layout = scene.walker.whole
     names = [body.name for body in scene.assembly.bodies]
     n = len(names)
-    angle, velocity, tilted = y[:, 2 : 2 + n], y[:, 4 + n :], y[:, 2 : 2 + n] + walker.slope
+    angle = y[:, 2 : 2 + n]
+    velocity = y[:, 4 + n :]
+    tilted = y[:, 2 : 2 + n] + walker.slope
     s, c = np.sin(tilted), np.cos(tilted)
     upper = [leg[0] for leg in walker.legs]
     along = y[:, 0] + c @ layout.hip_x[:n] - s @ layout.hip_y[:n]
@@ -184,7 +189,8 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
             hip = hinge_point(scene.assembly, names[thigh], names[thighs[1 - leg]])
             knee = hinge_point(scene.assembly, names[thigh], names[shank])
-            ahead, up = knee[0] - hip[0], knee[1] - hip[1]
+            ahead = knee[0] - hip[0]
+            up = knee[1] - hip[1]
             knees[0, :, leg] = along + c[:, thigh] * ahead - s[:, thigh] * up
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
         variables |= variables_over_time(knee_along_m=knees[0], knee_height_m=knees[1])
@@ -200,7 +206,8 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
     """
     kinetic, potential, total = sample_energies(scene.walker, samples).T
     driven = samples.driven_J.T
-    lost, walker = samples.dissipated_J, scene.walker
+    lost = samples.dissipated_J
+    walker = scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
     return variables_over_time(
         kinetic_J=kinetic,

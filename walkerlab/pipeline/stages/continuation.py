@@ -102,7 +102,9 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
 
     Raises ConfigError for a key that affects no requested model, NoAnswer if no gait is found in the span.
     """
-    block, families, isolated = config.continuation, [], []
+    block = config.continuation
+    families = []
+    isolated = []
     question = question_over(block, config, "continuation")
     parameter = question.parameter
     for model in models_of(question):
@@ -111,7 +113,8 @@ def run(config: ContinuationConfig, _inputs: Mapping[str, Content], progress: Pr
         short = SHORTEST_REACH * question.span.size
         isolated += [alone_at(branch, model, parameter) for branch in family.branches if branch.reach <= short]
         families.append(replace(family, branches=tuple(branch for branch in family.branches if branch.reach > short)))
-    answer, second = summary(families, question, again), question.second
+    answer = summary(families, question, again)
+    second = question.second
     answer["left_out"] += isolated
     content = Content(groups(families, answer, config, parameter, None if second is None else second.parameter), answer)
     if not any(family.branches for family in families):
@@ -135,7 +138,8 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     Raises ConfigError if the contact model is requested but not configured, a key affects no requested model, an end
     of a span is invalid, or the second key equals the first or has a range without the config's own value.
     """
-    config, second = question.config, question.second
+    config = question.config
+    second = question.second
     if question.models != (RIGID,) and config.contact is None:
         raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
     question.refuse_ends("continuation")
@@ -147,7 +151,9 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
         )
     if second is not None:
         second.refuse_ends("continuation", "second")
-        own, span, name = second.parameter.value_in(config), second.span, second.parameter.key
+        own = second.parameter.value_in(config)
+        span = second.span
+        name = second.parameter.key
         if second.parameter.path == question.parameter.path:
             raise ConfigError(
                 f"continuation.second: {name} is already the parameter that gaits are followed over",
@@ -164,13 +170,16 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
 
 def search_of(model: str, question: FamilyQuestion, progress: Progress) -> FamilySearch | None:
     """Set up the search for a model's families, over both parameters if there are two, or None if no gait is found."""
-    seeding, second, block = SEEDS[model](question, progress), question.second, question.config.continuation
+    seeding = SEEDS[model](question, progress)
+    second = question.second
+    block = question.config.continuation
     if seeding is None:
         return None
     seeds, map_of = seeding
     plane = None
     if second is not None and second.touches(model):
-        parameter, config = second.parameter, question.config
+        parameter = second.parameter
+        config = question.config
         plane = Plane(parameter.over(config, map_of), second.span, parameter.value_in(config))
     periods = min(block.periods, THOROUGHNESS[model].periods)
     return FamilySearch(model, map_of(question.config), question.span, seeds, periods, block.points, progress, plane)
@@ -178,7 +187,8 @@ def search_of(model: str, question: FamilyQuestion, progress: Progress) -> Famil
 
 def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
     """Find all one-step gaits of the rigid model at each start value."""
-    walker_at, seeds = question.parameter.over(question.config, rigid_walker), list[Seed]()
+    walker_at = question.parameter.over(question.config, rigid_walker)
+    seeds = list[Seed]()
     progress.start("continuation: gaits of the rigid model")
     for value in question.start_values():
         walker = walker_at(value)
@@ -218,7 +228,8 @@ SEEDS: Final[Mapping[str, Callable[[FamilyQuestion, Progress], Begun | None]]] =
 
 def summary(families: Sequence[Family], question: FamilyQuestion, again: bool) -> dict[str, Any]:
     """Summarise the families, with values in the unit of the requested key. `again` is as in `run`."""
-    config, parameter = question.config, question.parameter
+    config = question.config
+    parameter = question.parameter
 
     def rows(of_model: Callable[[Family], Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
         return [{"model": family.model, **row} for family in families for row in of_model(family)]
@@ -301,7 +312,8 @@ def sample_again(family: Family) -> dict[str, Any] | None:
     gait exists.
     """
     # the gaits are solved for, not only walked again, so that the residual of Newton's method counts as well
-    step_map, every = family.step_map, [(branch, point) for branch in family.branches for point in branch.points]
+    step_map = family.step_map
+    every = [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
         return None
     tighter, by = tightened(step_map.tolerances)
@@ -343,7 +355,8 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
 def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
     """Return the side of a crossing on which the monitored quantity exceeds its limit."""
     assert step_map is not None, "a followed branch has a step map"
-    place, limit = list(step_map.monitors).index(crossing.monitor), crossing.monitor.limit
+    place = list(step_map.monitors).index(crossing.monitor)
+    limit = crossing.monitor.limit
     nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
     beyond = limit is not None and nearest.monitors[place] > limit
     return "Above" if beyond == (nearest.value > crossing.value) else "Below"
@@ -384,7 +397,8 @@ def attractor_summary(family: Family) -> dict[str, Any]:
     Just beyond a flip, walks leave the gait slowly. A walk that has not repeated itself therefore counts as aperiodic
     only if neighbouring walks may diverge, no followed gait is stable and no cascade is still doubling.
     """
-    attractors, exponents = family.attractors, family.exponents
+    attractors = family.attractors
+    exponents = family.exponents
     periodic = [pair for branch in family.branches for pair in branch.stable_ranges]
     periodic += [(row["flips"][0], row["accumulates_at"]) for row in cascade_rows(family) if "accumulates_at" in row]
     aperiodic = [
@@ -435,7 +449,9 @@ def alone_at(branch: GaitBranch, model: str, parameter: Parameter) -> dict[str, 
 
 def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> list[dict[str, str]]:
     """List the families that were not followed, with the reasons."""
-    followed, entries, second = {family.model: family for family in families}, [], question.second
+    followed = {family.model: family for family in families}
+    entries = []
+    second = question.second
     for model in question.models:
         if model not in followed:
             entries.append((f"the {model} model's gaits", f"{question.parameter.key} does not affect this model"))

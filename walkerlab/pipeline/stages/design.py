@@ -69,11 +69,14 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
     question = DesignProblem(quantity, -1.0 if design.maximise else 1.0, lower, upper, keep, gaits.gait_at)
     own = np.array([parameter.value_in(config) for parameter in parameters])
     progress.start("design")
-    own_gait, own_z = gaits.gait_at(own), gaits.z
+    own_gait = gaits.gait_at(own)
+    own_z = gaits.z
 
     def search(number: int, start: Floats) -> DesignSearch:
         progress.start(f"design: search {number + 1} of {design.starts}")
-        name, before, gaits.z = f"search {number}", gaits.counts.copy(), own_z
+        name = f"search {number}"
+        before = gaits.counts.copy()
+        gaits.z = own_z
         if name in checkpoint.kept:
             entry = np.array(checkpoint.kept[name])
             counts, gradient_norm, x, gaits.z = np.split(entry, (2, 3, 3 + own.size))
@@ -82,7 +85,8 @@ def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress,
             return DesignSearch(x, point, float(gradient_norm[0]))
         result = minimise(question, start)
         if result.point is not None:
-            counts, z = gaits.counts - before, gaits.sections[result.x.tobytes()]
+            counts = gaits.counts - before
+            z = gaits.sections[result.x.tobytes()]
             checkpoint.keep(name, [*counts.tolist(), result.gradient_norm, *result.x.tolist(), *z.tolist()])
         return result
 
@@ -143,7 +147,8 @@ def refuse(config: DesignConfig) -> None:
     parameters = [parameter_of(key, config, ("design", "over")) for key in design.over]
     for key in design.over:
         refuse_unread("design.over", key, config, (design.model,))
-    own, bounds = [parameter.value_in(config) for parameter in parameters], list(design.over.values())
+    own = [parameter.value_in(config) for parameter in parameters]
+    bounds = list(design.over.values())
     corners = np.column_stack((own, bounds)).T
     for place, parameter in enumerate(parameters):
         for bound in bounds[place]:
@@ -171,13 +176,14 @@ class Gaits:
         gait: Mapping[str, Any],
         progress: Progress,
     ) -> None:
-        self.config, self.model, self.parameters, self.progress = config, design.model, parameters, progress
+        self.config = config
+        self.model = design.model
+        self.parameters = parameters
+        self.progress = progress
         wanted = {*filter(None, (design.minimise, design.maximise)), *design.keep}
-        self.wanted, self.largest, self.steps = (
-            wanted - LARGEST.keys(),
-            wanted & LARGEST.keys(),
-            config.robustness.steps,
-        )
+        self.wanted = wanted - LARGEST.keys()
+        self.largest = wanted & LARGEST.keys()
+        self.steps = config.robustness.steps
         self.gaps = [DIFFERENCE * (high - low) for low, high in design.over.values()]
         self.counts = np.zeros(2, int)  # numbers of evaluations: all, and those without a gait
         self.sections: dict[bytes, Floats] = {}  # section coordinates of gaits, by parameter values
@@ -211,7 +217,9 @@ class Gaits:
         if match is None:
             return None
         standpoint, numbers = match
-        self.z, subject, by_key = standpoint.z, replace(subject, z=standpoint.z), []
+        self.z = standpoint.z
+        subject = replace(subject, z=standpoint.z)
+        by_key = []
         numbers |= self.largest_disturbances(subject, self.largest)
         for parameter, gap in zip(self.parameters, self.gaps, strict=True):
             of_key = subject.gradients(parameter, self.wanted)

@@ -35,7 +35,8 @@ TOLERANCES = Tolerances("dop853", 1e-9, 1e-11, ENDLESS)
 ALL_OUTPUTS: Final[tuple[Output, ...]] = ("states", "energies", "forces")
 SAMPLE_STRIDE = 3  # every third sample between heel strikes is stored
 
-MODEL, KIND = Label("", "model"), Label("", "fold, flip or torus")
+MODEL = Label("", "model")
+KIND = Label("", "fold, flip or torus")
 PERIOD = Label("1", "steps of the gait")
 STANCE = Label("rad", "angle of the stance leg just after each heel strike", name="stance_angle")
 CURVES = {"model": MODEL, "kind": Label("", "fold or flip"), "period": PERIOD}
@@ -189,7 +190,8 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
         return
     scene = rigid_scene(changed, Footholds(), ALL_OUTPUTS)
     unit, units = unit_walker(scene.walker)
-    section, n = state_on_section(unit, point.z), len(scene.walker.arm_x)
+    section = state_on_section(unit, point.z)
+    n = len(scene.walker.arm_x)
     start = (*section[:n], *(rate / units.time for rate in section[n:]))
     steps = max(period, STRIDE)
     walk = scene.walk(start, steps, TOLERANCES, sampled=True)

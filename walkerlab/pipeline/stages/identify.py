@@ -40,7 +40,8 @@ LABELS: Final = {
     "standard_error": Label("SI", "standard error; absent if the walk does not determine the parameter"),
     "start": Label("SI", "value in the config"),
 }
-SHOWN_STEPS, SHOWN_SAMPLES = 10, 800
+SHOWN_STEPS = 10
+SHOWN_SAMPLES = 800
 """Number of steps, and approximate number of samples, that the motion player shows."""
 FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
 
@@ -65,7 +66,8 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
         return identify_walk(cast("Config", config), measured, gait, block, progress.note, begin)
 
     result = identify_divided(config, block, ask)
-    content, verdict = content_of(config, result), result.verdict
+    content = content_of(config, result)
+    verdict = result.verdict
     if verdict.fit == "not-converged":
         open_combinations = "".join(f"; open: {entry.combination}" for entry in result.not_identifiable)
         reason = f"the fit of the {verdict.model} model did not converge: {verdict.reasons[0]}{open_combinations}"
@@ -102,7 +104,8 @@ def identify_divided(
     config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification]
 ) -> Identification:
     """Try divisions of the walk into steps, and return the first that fits, or else the best, the earlier of equals."""
-    answers, problems = list[Identification](), list[NoAnswer]()
+    answers = list[Identification]()
+    problems = list[NoAnswer]()
     for measured in read_divisions(block, config):
         try:
             answers.append(divide_again(config, block, ask, ask(measured)))
@@ -137,7 +140,8 @@ def divide_again(
 
 def content_of(config: IdentifyConfig, result: Identification) -> Content:
     """Build the content: estimates, steps and, for measured angles, residuals over the phase of a step."""
-    known, block = result.information, config.identify or Identify()
+    known = result.information
+    block = config.identify or Identify()
     estimates = [
         {**asdict(estimate), "value": float(f"{estimate.value:.12g}"), "start": float(f"{estimate.start:.12g}")}
         for estimate in result.estimates
@@ -252,7 +256,9 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
     config  config of the identified walker
     """
-    walker, walk, sensors = rigid_walker(config), result.walk, result.sensors
+    walker = rigid_walker(config)
+    walk = result.walk
+    sensors = result.sensors
     if walker.kneed:
         return {}
     measured = result.measured
@@ -260,7 +266,8 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
     sides = np.flatnonzero(np.diff(measured.step[shown])) + np.array([[0], [1]])
     every = max(1, shown.size // SHOWN_SAMPLES)
     rows = np.union1d(shown[::every], shown[sides])
-    step, stance = measured.step[rows], 1 - measured.step[rows] % 2
+    step = measured.step[rows]
+    stance = 1 - measured.step[rows] % 2
     residuals = angle_residuals(result)[rows] / sensors[GAIN]
     seen = (measured.angles_rad[rows] - sensors[OFFSET]) / sensors[GAIN]
     along, touches = (np.append(0.0, np.cumsum(each)) for each in (walk.lengths_m, walk.durations_s))

@@ -71,7 +71,8 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
         yield refuse_count(path, read_steps(path, block, config.slope_rad))
         return
     walk, resolution = read_angles(block, config.slope_rad)
-    problem, divided = None, False
+    problem = None
+    divided = False
     for touch_sum_rad in touch_sums(walk, block, config):
         try:
             measured = divide_angles(walk, config, str(path), touch_sum_rad, resolution)
@@ -227,7 +228,8 @@ def refuse_sizes(table: Recording, name: str, source: str, values: Floats) -> No
     possible = [abs(value) <= math.pi if angle else is_plausible(value) for value in values.tolist()]
     if all(possible):
         return
-    step, unit = possible.index(False), unit_by_name(name)
+    step = possible.index(False)
+    unit = unit_by_name(name)
     allowed = "up to half a turn" if angle else f"{PLAUSIBLE[0]:g} to {PLAUSIBLE[1]:g} {unit}"
     raise ConfigError(
         f"{table.path}: {source!r} is {values[step]:.3g} {unit} in step {step + 1}; possible: {allowed}.",

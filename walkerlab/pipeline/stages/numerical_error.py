@@ -55,7 +55,8 @@ def change(first: Summary, again: Summary, by: str = DEFAULT_TIGHTENING) -> dict
         steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
         return {"reason": f"with {by} the walk ends differently: {again['outcome']} after {steps}"}
     changes: dict[str, Any] = {}
-    of_steps, later = dict[str, list[float | None]](), steps_later(first, again)
+    of_steps = dict[str, list[float | None]]()
+    later = steps_later(first, again)
     for key, name in ERROR_OF_EACH_STEP.items():
         apart = step_changes(first.get(key) or (), again.get(key) or (), first.get("repeats_after") or 0, later)
         if np.isfinite(apart).any() and any(first[key]):  # skip a list of zeros, such as the rolling of point feet
@@ -96,7 +97,8 @@ def step_changes(first: Values, again: Values, period: int, later: int | None) -
     largest = np.where(np.isnan(apart), np.nan, np.fmax.accumulate(apart))
     if not period or count < 2 * period:
         return largest
-    end, steps = count - 1 - (later or 0), np.arange(count)
+    end = count - 1 - (later or 0)
+    steps = np.arange(count)
     last = end - (end - steps) % period  # the last such step with a partner
     between = apart[0] if later is None else np.abs(values[last] - others[last + later])
     return np.asarray(np.fmin(largest, np.abs(values - values[last]) + between))

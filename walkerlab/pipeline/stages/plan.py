@@ -30,7 +30,8 @@ def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -
     Raises ConfigError for an invalid request.
     """
     refuse(config)
-    block, plan = cast("Identify", config.identify), config.plan or Plan()
+    block = cast("Identify", config.identify)
+    plan = config.plan or Plan()
     progress.start("plan")
     if block.data:
         progress.note(f"a plan needs no measured walk: {block.data} is not read")
@@ -54,7 +55,8 @@ def run(config: PlanConfig, inputs: Mapping[str, Content], progress: Progress) -
 
 def refuse(config: PlanConfig) -> None:
     """Raise ConfigError for an invalid `plan` or `identify` block."""
-    block, plan = config.identify or Identify(), config.plan or Plan()
+    block = config.identify or Identify()
+    plan = config.plan or Plan()
     if not block.fit:
         raise ConfigError("a plan needs a parameter to estimate.", "For example --fit walker.hip_mass_kg.")
     if block.model == "both":

@@ -112,7 +112,8 @@ def read_artifact(path: Path) -> Recording:
     group = groups.get("trajectory")
     if group is None or "angle" not in group.variables:
         raise ConfigError(f"{path} contains no walk over time.", "Run it with outputs: [states, energies, forces].")
-    columns, units = {TIME: np.asarray(group["time"], float)}, {TIME: "s"}
+    columns = {TIME: np.asarray(group["time"], float)}
+    units = {TIME: "s"}
     for name, variable in group.variables.items():
         if variable.dims[:1] != ("time",) or name not in (*OF_LEG, *OF_WALKER) or name == TIME:
             continue
@@ -165,7 +166,8 @@ def content_of(
 
 def recorded_besides(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:
     """Interpolate the other recorded quantities, (samples,) or (samples, 2), at the times of the samples."""
-    time, besides = walk.time_s - steps.origin_s, {}
+    time = walk.time_s - steps.origin_s
+    besides = {}
     for name in OVER_TIME:
         if name in ("time", "angle", "velocity"):
             continue

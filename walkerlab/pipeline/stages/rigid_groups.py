@@ -63,8 +63,10 @@ def stance_leg(samples: Samples) -> Any:
 
 def leg_variables(samples: Samples) -> dict[str, Variable]:
     """Return angles and velocities by leg. The legs change roles at each heel strike."""
-    n, stance = samples.state.shape[1] // 2, stance_leg(samples)
-    angle, velocity = samples.state[:, :2], samples.state[:, n : n + 2]
+    n = samples.state.shape[1] // 2
+    stance = stance_leg(samples)
+    angle = samples.state[:, :2]
+    velocity = samples.state[:, n : n + 2]
     return variables_over_time(angle=reorder_by_leg(angle, stance), velocity=reorder_by_leg(velocity, stance))
 
 
@@ -78,7 +80,8 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
     n = samples.state.shape[1] // 2
     variables: dict[str, Variable] = {}
     for k, name in enumerate(scene.names[2:n], 2):
-        angle, rate = samples.state[:, k], samples.state[:, n + k]
+        angle = samples.state[:, k]
+        rate = samples.state[:, n + k]
         if name.startswith("theta_1_"):  # the stance leg's shank is in line with its thigh
             angle = reorder_by_leg(np.column_stack((angle, samples.state[:, 1])), stance)
             rate = reorder_by_leg(np.column_stack((rate, samples.state[:, n + 1])), stance)

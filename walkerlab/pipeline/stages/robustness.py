@@ -114,7 +114,8 @@ def run(
     """
     refuse(config)
     answer: dict[str, Any] = {"gaits": [], **{name: [] for name in LABELS}}
-    unstable, steps = [], {}
+    unstable = []
+    steps = {}
     for subject in subjects(config, inputs, progress):
         gait = subject.at()
         # the rigid model's gradients and largest disturbances take less time than the start of a process
@@ -127,12 +128,15 @@ def run(
             unstable.append(subject.model)
             continue
         answer["gait_sensitivity_norm"] += norms(subject.model, gait)
-        rough_walks, label = [*rough_ground_units(subject, config)], f"robustness: {subject.model} model"
-        units, processes = [*single(subject, config), *rough_walks], jobs if rough_walks else jobs_but_for_walks
+        rough_walks = [*rough_ground_units(subject, config)]
+        label = f"robustness: {subject.model} model"
+        units = [*single(subject, config), *rough_walks]
+        processes = jobs if rough_walks else jobs_but_for_walks
         # the computation of the gait's quantities has compiled all kernels
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
-        model, target = {"model": subject.model}, {"steps": config.robustness.steps}
+        model = {"model": subject.model}
+        target = {"steps": config.robustness.steps}
         answer["largest_step"].append({**model, "down_m": down, "up_m": up, **target})
         answer["largest_push"].append({**model, "forward_N_s": forward, "backward_N_s": backward, **target})
         pushes = answer["largest_push"][-1]
@@ -185,7 +189,9 @@ def models_of(config: RobustnessConfig) -> tuple[str, ...]:
 def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
     """Yield a row with the sensitivity norm for each disturbance and indicator."""
     for disturbance in DISTURBANCES:
-        answer, units, disturbance_unit = sensitivity(gait, disturbance), gait.units, UNITS[disturbance]
+        answer = sensitivity(gait, disturbance)
+        units = gait.units
+        disturbance_unit = UNITS[disturbance]
         if answer is None:
             continue
         to_pure = gait.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
@@ -221,7 +227,8 @@ def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int
 
 def rough_ground_units(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
     """Yield work units, each a batch of walks on rough ground."""
-    block, most = config.robustness, cap(subject.model, config)
+    block = config.robustness
+    most = cap(subject.model, config)
     for roughness in block.roughness_m:
         for first in range(0, block.walks, WALKS_AT_ONCE):
             walks = range(first, min(first + WALKS_AT_ONCE, block.walks))
@@ -241,7 +248,8 @@ def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range,
 
 
 def rough_steps(config: RobustnessConfig, steps: Mapping[str, Floats]) -> Group:
-    roughness, caps = np.array(config.robustness.roughness_m), np.array([cap(model, config) for model in steps])
+    roughness = np.array(config.robustness.roughness_m)
+    caps = np.array([cap(model, config) for model in steps])
     about = "steps that a walk took, at most cut_off_at"
     return Group(
         {
@@ -266,7 +274,8 @@ def rough_walk(config: RobustnessConfig, inputs: Mapping[str, Content]) -> dict[
 
 def rough_rows(model: str, config: RobustnessConfig, steps: Floats) -> Rows:
     """Summarise the step counts (roughness, walk) for each roughness of the ground."""
-    most, rows = cap(model, config), []
+    most = cap(model, config)
+    rows = []
     for roughness, counts in zip(config.robustness.roughness_m, steps, strict=True):
         seen = asdict(rough_walks(counts, most))
         measures = {name: value for name, value in seen.items() if value is not None}
@@ -283,7 +292,8 @@ def sensitivities(
 ) -> Rows:
     """Return rows of derivatives in order of decreasing relative effect. Parameters of value 0 come last."""
     keys = numbers_read(subject, requested)
-    label, rows = f"robustness: gradients of the {subject.model} model", list[dict[str, Any]]()
+    label = f"robustness: gradients of the {subject.model} model"
+    rows = list[dict[str, Any]]()
     results = map_in_order([partial(gradients_of, subject, key) for key in keys], jobs)
     for key, gradients in track(progress, label, len(keys), zip(keys, results, strict=True)):
         parameter = parameter_of(key, subject.config)

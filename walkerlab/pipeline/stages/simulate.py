@@ -23,7 +23,8 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
 
     Raises NoAnswer if the integrator fails.
     """
-    scene, settings = rigid_scene(config, config.ground, config.outputs), config.solver.rigid
+    scene = rigid_scene(config, config.ground, config.outputs)
+    settings = config.solver.rigid
     tolerances = Tolerances(settings.method, settings.rtol, settings.atol, ENDLESS)
     (length, start), steps = rigid_start(config, inputs), 2 * config.strides
     reference = length if "fixedpoint" in inputs or isinstance(config.start, MidStep) else None
@@ -32,7 +33,8 @@ def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progres
         progress.start("simulate" if sampled else "simulate: numerical error", steps)
         return scene.walk(start, steps, tolerances, sampled, progress.advance, reference)
 
-    of_scene, of_config = partial(groups, scene), partial(summary, config)
+    of_scene = partial(groups, scene)
+    of_config = partial(summary, config)
     return content_of_walk("simulate", walk, tolerances, of_scene, of_config, progress, again)
 
 

@@ -29,21 +29,28 @@ from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.footholds import UNEVEN
 from walkerlab.scene.rigid import first_step_length
 
-FIRST_STEPS, LAST_STEPS = 200, 20
+FIRST_STEPS = 200
+LAST_STEPS = 20
 """Numbers of first and last steps of a walk for which every sample is stored."""
 MAX_BETWEEN = 50_000
 """Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
-MIN_REPEATED, MAX_REPEATED = 4, 32
+MIN_REPEATED = 4
+MAX_REPEATED = 32
 """Numbers of steps at the end of a walk that may repeat: minimum, and maximum unless a quarter of the walk is more."""
 FEWEST_SETTLED = 8
 """Fewest last steps in which a walk that has just settled may repeat."""
-REPEATED, SETTLED = 1e-5, 1e-2
+REPEATED = 1e-5
+SETTLED = 1e-2
 """Largest difference between steps that repeat, relative to the first step, and relative to the spread of the steps."""
-ON_GAIT, OFF_GAIT = 1e-6, 1e-2
+ON_GAIT = 1e-6
+OFF_GAIT = 1e-2
 """Relative differences from the first step, in period or length, of steps on the same gait and of steps off it."""
 STRIDE: Final = 2
 """Steps of a stride."""
-STEP, TIME, LEG, COORDINATE = "step", "time", "leg", "coordinate"
+STEP = "step"
+TIME = "time"
+LEG = "leg"
+COORDINATE = "coordinate"
 OF_STEPS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
     "period_s": Label("s", "time from touch to touch"),
@@ -128,7 +135,8 @@ def content_of_walk(
     result = walk(tolerances, True)
     if result.samples is not None:
         result = replace(result, samples=thin_samples(result.samples, result.touch_time_s, progress))
-    stored, answer = groups(result), summary(result)
+    stored = groups(result)
+    answer = summary(result)
     if not result.outcome.answered:
         why = f"{stage}: {result.outcome.label} after {result.steps} steps, {result.end_time_s:.4g} s"
         raise NoAnswer(why, answer["advice"], Content(stored, answer))
@@ -321,7 +329,9 @@ def mean_step(walk: Mapping[str, Any]) -> dict[str, Any]:
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
     """Return period (s), length (m) and knee strike time (s) of a walk's last step, or None for what did not happen."""
-    periods, lengths, strikes = walk["step_periods_s"], walk["step_lengths_m"], walk.get("knee_strike_times_s")
+    periods = walk["step_periods_s"]
+    lengths = walk["step_lengths_m"]
+    strikes = walk.get("knee_strike_times_s")
     step = {"period_s": periods[-1] if periods else None, "length_m": lengths[-1] if lengths else None}
     if not strikes:
         return step

@@ -133,7 +133,8 @@ def read(path: Path) -> Stored:
     """
     try:
         data = read_bounded(path, LIMIT_BYTES)
-        image, end = data[:-SEAL_BYTES], SEAL.fullmatch(data[-SEAL_BYTES:])
+        image = data[:-SEAL_BYTES]
+        end = SEAL.fullmatch(data[-SEAL_BYTES:])
         if end is None:
             raise Damaged(
                 "it does not end with the seal of a finished artifact: cut short, or not written by walkerlab"

@@ -23,7 +23,8 @@ class Checkpoint:
 
         path  path of the journal; None to keep the numbers only in memory
         """
-        self.path, self.key = path, key
+        self.path = path
+        self.key = key
         self.kept: dict[str, Numbers] = {}
         self._intact = 0  # number of valid bytes in the file
         with contextlib.suppress(OSError, ValueError, TypeError):  # the last line may be incomplete
@@ -60,7 +61,8 @@ class Checkpoint:
 
         Raises StorageError if the journal cannot be removed.
         """
-        self.kept, self._intact = {}, 0
+        self.kept = {}
+        self._intact = 0
         if self.path is not None:
             with storing(self.path):
                 self.path.unlink(missing_ok=True)

@@ -11,7 +11,8 @@ from walkerlab.pipeline.store.runfolder import LOCK, RECORD, WORKER, RunFolder
 
 DRAWN = ("figures/figure-*.svg", "figures/figure-*.png", "report.html", "report-*.html")
 """Patterns of the files that drawing stages write, needed if their index is lost."""
-CHUNKS, FIGURES = "sweep-chunks", "figures"
+CHUNKS = "sweep-chunks"
+FIGURES = "figures"
 UNFINISHED = (TEMPORARY, f"{FIGURES}/{TEMPORARY}", f"{CHUNKS}/{TEMPORARY}")
 SWEPT = ("sweep-*.h5", "sweep-*.csv", f"{CHUNKS}/*.h5", "sweep.html", "figures/sweep-*.svg", "figures/sweep-*.png")
 STATE_FILES = (RECORD, LOCK, WORKER)

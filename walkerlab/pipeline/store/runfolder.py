@@ -14,7 +14,9 @@ from pathlib import Path
 from walkerlab.errors import LockedError
 from walkerlab.pipeline.store.files import make_folder, read_bounded, remove_leftovers, storing, write_atomically
 
-RECORD, LOCK, WORKER = ".run.json", ".lock", ".worker.json"
+RECORD = ".run.json"
+LOCK = ".lock"
+WORKER = ".worker.json"
 RECORD_BYTES = 1 << 20
 """Maximum size of a run record."""
 
@@ -90,7 +92,8 @@ class RunFolder:
         """Read the run record, or return None if it is missing or unreadable."""
         try:
             entry = json.loads(read_bounded(self.path / RECORD, RECORD_BYTES))
-            run, changes = str(entry["run"]), entry.get("changes")
+            run = str(entry["run"])
+            changes = entry.get("changes")
             listed = changes_in(run) if changes is None else tuple(map(str, changes))
             return Record(run, str(entry["source"]), str(entry["config"]), listed)
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):

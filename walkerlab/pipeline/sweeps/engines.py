@@ -32,7 +32,8 @@ RESTART_S: Final = 20.0
 """Time without a Dask worker after which workers are started again; Dask itself needs some seconds to replace one."""
 SILENCE_S: Final = 600.0
 """Time without an answer of Slurm's queue after which its jobs are taken for lost."""
-GONE, SILENT = "gone", "silent"
+GONE = "gone"
+SILENT = "silent"
 ENDED_STATES: Final = {
     "BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL", "OUT_OF_MEMORY", "PREEMPTED", "REVOKED",
     "TIMEOUT", GONE, SILENT,
@@ -131,7 +132,9 @@ class DaskWorkers:
     """Workers of a cluster that this process started. Dask does not always replace one that it ended for its memory."""
 
     def __init__(self, cluster: Any, client: Any, count: int) -> None:
-        self.cluster, self.client, self.count = cluster, client, count
+        self.cluster = cluster
+        self.client = client
+        self.count = count
         self._lock = threading.Lock()
         self._seen_at = time.monotonic()  # when there was a worker
 
@@ -278,7 +281,9 @@ class JobExecutor(SizedExecutor):
         start     called with a function and its arguments; returns a job whose `result()` waits
         wait_for  called with a job; returns when its result is there, or raises an error; None to call only `result()`
         """
-        self._start, self.size, self._wait_for = start, size, wait_for
+        self._start = start
+        self.size = size
+        self._wait_for = wait_for
         self.jobs: set[Any] = set()
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:

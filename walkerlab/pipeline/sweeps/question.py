@@ -230,7 +230,9 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     refuse_too_many(f"--sample {sample}", int(number))
     import numpy as np
 
-    count, dimensions, generator = int(number), len(axes), np.random.default_rng(seed)
+    count = int(number)
+    dimensions = len(axes)
+    generator = np.random.default_rng(seed)
     if name == "random":
         unit = generator.random((count, dimensions))
     else:

@@ -21,7 +21,8 @@ from walkerlab.pipeline.sweeps.chunk import Chunk
 from walkerlab.pipeline.sweeps.question import SweptStage, described
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
-CONTACT, PAD_PITCH = "contact-sim", "contact.pad_pitch"
+CONTACT = "contact-sim"
+PAD_PITCH = "contact.pad_pitch"
 
 
 STATUS_TEXTS: Final = {
@@ -92,7 +93,9 @@ class Merge:
 
     def __init__(self, question: SweptStage, config: Config, inverse: Integers) -> None:
         """Start without rows."""
-        self.question, self.config, self.inverse = question, config, inverse
+        self.question = question
+        self.config = config
+        self.inverse = inverse
         self.has_row = np.zeros(int(inverse.max()) + 1, bool)
         self.labels: dict[str, tuple[str, str]] = {}
         self.columns: dict[str, SweepVariable] = {}
@@ -160,10 +163,13 @@ class Merge:
         """Describe the endings of the walks and the role of the ground, or return nothing for a stage that does not
         walk.
         """
-        question, config = self.question, self.config
+        question = self.question
+        config = self.config
         outcomes = self.columns["outcome"].values[self.inverse]
-        pads, pitch = None, self.values_of("pitch_m")
-        off, lengths = outcomes == "off-pad", self.values_of("step_lengths_m")
+        pads = None
+        pitch = self.values_of("pitch_m")
+        off = outcomes == "off-pad"
+        lengths = self.values_of("step_lengths_m")
         if pitch is not None and off.any():
             last = np.zeros(0) if lengths is None else last_of_each(lengths[off])
             steps = last[np.isfinite(last)]
@@ -175,7 +181,8 @@ class Merge:
     def numerical_error(self) -> dict[str, Any]:
         """Return the largest errors of the repeated walks. `ended_otherwise` counts those that ended differently."""
         errors = {key: self.values_of(f"numerical_error.{key}") for key in ("end_time_s", *ERROR_OF_EACH_STEP.values())}
-        reasons, ends = self.values_of("numerical_error.reason"), errors["end_time_s"]
+        reasons = self.values_of("numerical_error.reason")
+        ends = errors["end_time_s"]
         otherwise = 0 if reasons is None else int(np.sum(reasons != ""))
         measured = 0 if ends is None else int(np.sum(np.isfinite(ends)))
         if otherwise + measured == 0:
@@ -192,13 +199,16 @@ class Merge:
         own = tuple(f"{name}_index{axis if len(extra) > 1 else ''}" for axis in range(len(extra)))
         last = name.rpartition(".")[2]
         if column.text:
-            unit, text = "", STATUS_TEXTS.get(name, name)
+            unit = ""
+            text = STATUS_TEXTS.get(name, name)
         elif last in STATES:
-            unit, text = "rad, rad/s", last.replace("_", " ")
+            unit = "rad, rad/s"
+            text = last.replace("_", " ")
         elif last in self.labels:
             unit, text = self.labels[last]
         else:
-            unit, text = unit_by_name(name), axis_label(name)
+            unit = unit_by_name(name)
+            text = axis_label(name)
         gaps = values.dtype.kind == "f" and bool(np.isnan(values).any())
         return Variable(values.reshape(self.question.shape + extra), self.question.dims + own, unit, text, missing=gaps)
 
@@ -231,7 +241,8 @@ def count_texts(texts: NDArray[Any]) -> dict[str, int]:
 
 def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
     """Format a CSV table of the points: parameters, outcome and headline quantities, or with `every` all values."""
-    group, dimensions = content[""], len(question.shape)
+    group = content[""]
+    dimensions = len(question.shape)
     columns: dict[str, list[Any]] = {}
     for place, (name, axis) in enumerate(zip(question.names, question.axes, strict=True)):
         columns[name] = [axis.values[question.places(index)[place]] for index in range(len(question))]
@@ -249,7 +260,8 @@ def as_csv(content: Content, question: SweptStage, every: bool = False) -> str:
 def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tuple[str, list[Any]]]:
     """Split a variable into columns, one for each entry of a list. Gaps are empty."""
     values = variable.values
-    points, own = values.shape[:dimensions], values.shape[dimensions:]
+    points = values.shape[:dimensions]
+    own = values.shape[dimensions:]
     rows = values.reshape((int(np.prod(points)), *own))
     for place in np.ndindex(own):
         column = rows[(slice(None), *place)].tolist()

@@ -108,7 +108,9 @@ class SweepRun:
         Raises ConfigError for invalid points and for a stage that cannot be swept.
         """
         refuse_unknown_stage(question.stage, graph)
-        self.question, self.folder, self.loaded = question, folder, loaded
+        self.question = question
+        self.folder = folder
+        self.loaded = loaded
         self.keys = Keys(graph)
         keys = np.frombuffer(b"".join(self.checked_keys()), dtype="S32")
         unique, self.inverse = np.unique(keys, return_inverse=True)
@@ -172,7 +174,9 @@ class SweepRun:
         Raises ConfigError if the folder holds results of another config, LockedError (only without `wait`),
         StorageError, and NoAnswer if workers keep dying.
         """
-        started, count, reporter = time.perf_counter(), len(self.question), reporter or Silent()
+        started = time.perf_counter()
+        count = len(self.question)
+        reporter = reporter or Silent()
         for key in unread_keys(self):
             reporter.note(f"sweep: {self.question.stage} does not read {key}; points that differ only in it are equal")
         make_folder(self.folder.path)
@@ -216,7 +220,8 @@ class SweepRun:
             return ()
         bugs: dict[str, str] = {}
         progress.start("sweep", int(missing.size))
-        stage, digest = self.question.stage, self.code_digest
+        stage = self.question.stage
+        digest = self.code_digest
 
         def keep(chunk: Chunk) -> None:
             store(self.folder, stage, digest, chunk, origin)
@@ -234,7 +239,8 @@ class SweepRun:
             why = f"its worker died: {type(error).__name__}: {error}"
             keep(Chunk((PointResult(unit.name, "failed", why),), {}))
 
-        todo, chunk_s = self._units(missing.tolist(), work), work.chunk_s or work.engine.chunk_s
+        todo = self._units(missing.tolist(), work)
+        chunk_s = work.chunk_s or work.engine.chunk_s
         spread = Spread(todo, int(missing.size), lambda _units, points: keep(join_points(points)), give_up, chunk_s)
         with work.engine.opened(work.order) as pool:
             spread.run(pool)
@@ -242,7 +248,9 @@ class SweepRun:
 
     def _units(self, indices: list[int], work: SweepWork) -> Iterator[WorkUnit]:
         """Iterate over the points to compute. A sample of their walks is repeated to measure the numerical error."""
-        stage, graph, forced = self.question.stage, self.keys.graph, token_hex() if work.force else ""
+        stage = self.question.stage
+        graph = self.keys.graph
+        forced = token_hex() if work.force else ""
         sample = set(np.sort(self.first)[evenly_spread(self.first.size, SAMPLE)].tolist())
         for index in indices:
             config = self.config(index)

@@ -31,7 +31,8 @@ def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: boo
         if not sys.stdin.isatty():
             raise typer.BadParameter("cannot ask for confirmation without a terminal; give --yes", param_hint="--yes")
         if not typer.confirm(f"Remove {len(files)} files from {where}?", err=True):
-            files_by_folder, files = {}, []
+            files_by_folder = {}
+            files = []
     if not request.dry_run:
         for folder, paths in files_by_folder.items():
             if paths:

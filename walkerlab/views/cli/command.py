@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 def as_parameter(entry: Field[Any]) -> inspect.Parameter:
     """Convert a field declared by `option` to a parameter of the signature that typer reads."""
-    kind, declared = inspect.Parameter.KEYWORD_ONLY, entry.metadata["option"]
+    kind = inspect.Parameter.KEYWORD_ONLY
+    declared = entry.metadata["option"]
     return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, declared])
 
 

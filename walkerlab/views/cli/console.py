@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 SILENCE_S = 8.0
 """Maximum time (s) without a message while a stage runs and stderr is not a terminal."""
 
-ENOUGH_DONE, ENOUGH_S = 0.1, 3.0
+ENOUGH_DONE = 0.1
+ENOUGH_S = 3.0
 """Fraction of the parts, and time (s), after which the remaining time is predicted; the first parts are not typical."""
 
 
@@ -148,7 +149,10 @@ class StageLine:
     """A running stage, with its current work and progress."""
 
     def __init__(self, console: Console, stage: str, place: str, expected_s: float | None) -> None:
-        self.console, self.stage, self.place, self.expected_s = console, stage, place, expected_s
+        self.console = console
+        self.stage = stage
+        self.place = place
+        self.expected_s = expected_s
         self.label = stage
         self.total: int | None = None
         self.done = 0
@@ -157,7 +161,10 @@ class StageLine:
 
     def start(self, label: str, total: int | None = None) -> None:
         """Begin a piece of work of `total` parts, or None if their number is unknown."""
-        self.label, self.total, self.done, self.progress = label, total, 0, []
+        self.label = label
+        self.total = total
+        self.done = 0
+        self.progress = []
         self.work_began = time.monotonic()
         self.console.detail(label if total is None else f"{label} ({total})")
         self.console.refresh()

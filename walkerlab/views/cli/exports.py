@@ -42,12 +42,14 @@ from walkerlab.views.report.tex import as_tex
 if TYPE_CHECKING:
     from walkerlab.views.figures.illustration import Illustration
 
-FIGURE_KINDS, TRAJECTORY_KINDS = ("pdf", "svg", "png", "eps", "tiff"), ("csv", "nc")
+FIGURE_KINDS = ("pdf", "svg", "png", "eps", "tiff")
+TRAJECTORY_KINDS = ("csv", "nc")
 DRAWING_KINDS = ("svg", "pdf", "png")
 FILM_KINDS = ("gif", "mp4")
 TABLES = {"table": "paper_numbers", "table-1": "table1", "table-2": "table2", "table-3": "table3"}
 NOT_IN_NAMES = re.compile(r"[^a-z0-9]+")
-TRAJECTORY, STEPS = "trajectory", "steps"
+TRAJECTORY = "trajectory"
+STEPS = "steps"
 STORED_WITH = "Run it with outputs: [states, energies, forces]."
 """Advice for a walk that was stored without a trajectory."""
 FIGURE_NUMBER = re.compile(r"(?:fig(?:ure)?[- .]*)?0*(\d+)")
@@ -136,7 +138,8 @@ def page_tables(folder: RunFolder) -> dict[str, Table]:
     from walkerlab.views.report.registry import pages_of
     from walkerlab.views.report.results import Results
 
-    planner, report = plan_run(folder), PIPELINE["report"]
+    planner = plan_run(folder)
+    report = PIPELINE["report"]
     results = Results(planner.config, planner.inputs(report), (), planner.missing_inputs(report))
     sections = [section for page in pages_of(results, folder.name) for section in page.sections]
     tables = [block for section in sections for block in section.blocks if isinstance(block, Table)]
@@ -192,7 +195,8 @@ def figure(
     Raises StaleError if its results are missing.
     """
     stored = results_in(folder, illustration.stages)
-    run, plot = plan_run(folder), PIPELINE["plot"]
+    run = plan_run(folder)
+    plot = PIPELINE["plot"]
     inputs = {name: result for name, result in run.inputs(plot).items() if isinstance(result, Stored)}
     available = inputs.keys() | run.left_out.keys()
     outdated, _ = read_all(folder, (name for name in plot.results(run.config) if name not in available))

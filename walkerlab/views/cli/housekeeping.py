@@ -66,7 +66,8 @@ def schema(
 
 def list_extensions(request: Request) -> None:
     """List all extensions with their version, what they add, and why some are left out."""
-    rows, lines = [], []
+    rows = []
+    lines = []
     for each in registry():
         said = {
             "name": each.name,

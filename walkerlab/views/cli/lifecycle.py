@@ -131,7 +131,8 @@ def export(
     from walkerlab.views.cli.exports import export_from, run_to_export, walk_in
     from walkerlab.views.report.tex import COLUMN_WIDTHS
 
-    folder, points = run_to_export(run, request), width or COLUMN_WIDTHS[columns]
+    folder = run_to_export(run, request)
+    points = width or COLUMN_WIDTHS[columns]
     whose = walk_in(folder, model)
     print(export_from(folder, what, Target(to, output), points, whose, request.console, dpi, columns))
 

@@ -32,7 +32,8 @@ def write_model(
     Raises ConfigError for an unknown run or format, or if a format cannot express the walker; NoAnswer without a gait.
     """
     resolved = resolve(run, sets, runs=runs)
-    config, folder = resolved.loaded.config, resolved.folder
+    config = resolved.loaded.config
+    folder = resolved.folder
     for warning in resolved.loaded.warnings:
         console.warn(warning)
     warn_of_edits(config, folder, console.warn)
@@ -40,7 +41,8 @@ def write_model(
     named_mjcf = target.output is not None and target.output.suffix == ".mjcf"
     to = "xml" if target.to == "mjcf" and not named_mjcf else target.to
     path, ending = replace(target, to=to).of("a model", folder.name, list(ENDINGS))
-    kind, adams_law = ENDINGS[ending], law_named(law or "contact")
+    kind = ENDINGS[ending]
+    adams_law = law_named(law or "contact")
     if law is not None and kind == "mjcf":
         raise ConfigError("--law chooses between contact laws of ADAMS.", "Leave it out for MuJoCo.")
     inputs = {}

@@ -32,9 +32,12 @@ def report_on(request: Request, stage: Stage) -> None:
     options = Options(request.force, not request.no_wait, request.processes, request.full, request.dry_run)
     reporter = None if options.dry else request.console
     report = run_and_write(request.resolved_run, stage.name, options, reporter, request.graph)
-    value, error = report.as_json(), report.no_answer
+    value = report.as_json()
+    error = report.no_answer
     if options.dry:
-        value, error, lines = value | {"dry_run": True}, None, plan_lines(report)
+        value = value | {"dry_run": True}
+        error = None
+        lines = plan_lines(report)
     else:
         lines = report_lines(request, report)
         if request.open_page and "html" in report.summary and not request.console.shown:

@@ -74,7 +74,8 @@ def sweep(request: SweepRequest) -> None:
     if bad := [text for text in request.engine_option or () if "=" not in text]:
         raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
     chosen, address = engine_named(request.engine)
-    loaded, over = request.loaded, request.over or ()
+    loaded = request.loaded
+    over = request.over or ()
     block = loaded.config.sweep or Sweep()  # used where no option is given
     own = [(key, values, f"sweep.over.{key}") for key, values in block.over.items()]
     question = build_sweep(
@@ -109,7 +110,8 @@ def sweep(request: SweepRequest) -> None:
             flags = {flag: name for flag, name in quantities.items() if name not in question.names}
             check_options(question.stage, flags, available)
 
-        seconds, waits = request.chunk_seconds, not request.no_wait
+        seconds = request.chunk_seconds
+        waits = not request.no_wait
         work = SweepWork(engine, order, seconds, waits, request.force, check)
         swept = run.run(work, request.console)
     show_result(request, swept)

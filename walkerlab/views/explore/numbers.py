@@ -46,9 +46,12 @@ def adjustable(start: Config, config: Config) -> Iterator[dict[str, Any]]:
         key = ".".join(path)
         if path[0] in HIDDEN_KEYS or key in ("walker.type", "contact.units"):
             continue
-        value, first = value_at(config, path), value_at(start, path)
+        value = value_at(config, path)
+        first = value_at(start, path)
         if path == ("slope_rad",):
-            key, value, first = "slope_deg", math.degrees(value), math.degrees(first)
+            key = "slope_deg"
+            value = math.degrees(value)
+            first = math.degrees(first)
         if value is not None:
             unit, meaning = described(config, key)
             shown = {"key": key, "value": value, "start": first, "unit": unit, "meaning": meaning}
@@ -77,9 +80,11 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         name: getattr(item, name) for item in field.metadata for name in ("ge", "gt", "le", "lt") if hasattr(item, name)
     }
     low, high = limits.get("ge", limits.get("gt", -math.inf)), limits.get("le", limits.get("lt", math.inf))
-    ordinary, logarithmic = ordinary_size(key, unit, start), False
+    ordinary = ordinary_size(key, unit, start)
+    logarithmic = False
     if first == 0:
-        least, most = 0.0 if low >= 0.0 else -ordinary, ordinary
+        least = 0.0 if low >= 0.0 else -ordinary
+        most = ordinary
     else:
         by = FAR_AROUND if any(part in key for part in BY_MAGNITUDE) else AROUND
         least, most = sorted((first / by, first * by))
@@ -87,7 +92,8 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         # a value close to zero must be able to reach the typical size
         most = max(most, ordinary) if logarithmic else most
     if unit != "deg":
-        least, most = max(least, low), min(most, high)
+        least = max(least, low)
+        most = min(most, high)
     parameter = gaits_by(key, start)
     ends = [end if parameter is None else last_allowed(parameter, start, first, end) for end in (least, most)]
     if ends[0] == ends[1]:
@@ -99,7 +105,9 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
 
 def ordinary_size(key: str, unit: str, start: Config) -> float:
     """Return the typical size of a quantity with this unit for the walker, or 0 if unknown."""
-    mass, leg, gravity = start.walker.total_mass_kg, start.walker.leg_length_m, start.gravity_m_s2
+    mass = start.walker.total_mass_kg
+    leg = start.walker.leg_length_m
+    gravity = start.gravity_m_s2
     speed = math.sqrt(gravity * leg)
     if key.startswith("ground."):
         return 100.0 if unit == "1" else 0.01 * leg
@@ -123,7 +131,8 @@ def last_allowed(parameter: Parameter, start: Config, first: float, end: float) 
     """Return the valid value closest to a slider's end, with the config's other values kept."""
     if parameter.config_at(start, end) is not None:
         return end
-    good, bad = first, end
+    good = first
+    bad = end
     for _ in range(HALVINGS):
         middle = 0.5 * (good + bad)
         good, bad = (good, middle) if parameter.config_at(start, middle) is None else (middle, bad)

@@ -37,7 +37,9 @@ class Desk:
         """Start the worker. With `drops`, a new request cancels the one in progress."""
         self.drops = drops
         self.worker = self._hire()
-        self._turn, self._count, self._newest = threading.Lock(), threading.Lock(), 0
+        self._turn = threading.Lock()
+        self._count = threading.Lock()
+        self._newest = 0
 
     def _hire(self) -> Worker:
         worker = Worker(("walkerlab.views.explore.walks",))
@@ -86,10 +88,13 @@ class Server(ThreadingHTTPServer):
     def __init__(self, port: int, base: ExploredConfig) -> None:
         """Listen on `port`, or on a free one if it is 0."""
         super().__init__(("127.0.0.1", port), Handler)
-        self.base, self.token, self.job = base, secrets.token_urlsafe(16), Job()
+        self.base = base
+        self.token = secrets.token_urlsafe(16)
+        self.job = Job()
         self.cookie = f"walkerlab-explore-{self.server_port}"
         # curves plotted in the background must not delay the answer to a moved slider
-        self.desk, self.background = Desk(), Desk(drops=True)
+        self.desk = Desk()
+        self.background = Desk(drops=True)
         self._thread: threading.Thread | None = None
 
     @property
@@ -129,7 +134,8 @@ class Server(ThreadingHTTPServer):
         Raises TypeError if the body is malformed.
         """
         known = walks.WALK_STAGES.keys()
-        changes, models = body.get("set", {}), body.get("models", list(known))
+        changes = body.get("set", {})
+        models = body.get("models", list(known))
         if not isinstance(changes, Mapping) or not isinstance(models, list) or not {*models} <= known:
             raise TypeError
         question = replace(self.base, changes=changes, models=models)

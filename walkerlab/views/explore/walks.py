@@ -171,7 +171,8 @@ def walkable(branch: Group) -> bool:
 
 def curve(branch: Group) -> dict[str, list[Any]]:
     """Return quantities along a branch, from the first step of each gait."""
-    period, length = branch["step_period"][:, 0], branch["step_length"][:, 0]
+    period = branch["step_period"][:, 0]
+    length = branch["step_length"][:, 0]
     multipliers = abs(branch["multiplier_real"] + 1j * branch["multiplier_imag"]).max(axis=1)
     found = {
         "value": branch["value"], "stable": branch["stable"], "period_s": period, "step_length_m": length,
@@ -187,7 +188,9 @@ def config_text(question: ExploredConfig, name: str) -> str:
 
     Raises ConfigError if invalid.
     """
-    start, named = config_to_extend(question.config), replace(question, changes={**question.changes, "name": name})
-    base, changed = load(Path(start)).config, named.loaded.config
+    start = config_to_extend(question.config)
+    named = replace(question, changes={**question.changes, "name": name})
+    base = load(Path(start)).config
+    changed = named.loaded.config
     alike = base.walker.type == changed.walker.type
     return to_extending_yaml(start, base, changed, name) if alike else to_yaml(changed)

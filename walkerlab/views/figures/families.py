@@ -84,7 +84,9 @@ class Curve:
 
 def curve_of(group: Group, name: str) -> Curve:
     """Read a quantity along a branch and at its bifurcations. A stretch between two points is stable if both are."""
-    value, quantity, stable = group["value"], group[name], group["stable"].astype(bool)
+    value = group["value"]
+    quantity = group[name]
+    stable = group["stable"].astype(bool)
     if "mark_after" not in group.variables:
         return Curve(value, quantity, stable[:-1] & stable[1:], ())
     order = np.argsort(group["mark_after"].astype(int), kind="stable")
@@ -92,7 +94,8 @@ def curve_of(group: Group, name: str) -> Curve:
     value = np.insert(value, places, group["mark_value"][order])
     quantity = np.insert(quantity, places, group[f"mark_{name}"][order], axis=0)
     # a bifurcation counts as stable, so that stable stretches reach up to it
-    known, on_mark = np.insert(stable, places, True), np.insert(np.zeros(stable.size, bool), places, True)
+    known = np.insert(stable, places, True)
+    on_mark = np.insert(np.zeros(stable.size, bool), places, True)
     between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
     marks = zip(np.flatnonzero(on_mark).tolist(), group["mark_kind"][order].astype(str).tolist(), strict=True)
     return Curve(value, quantity, between, tuple(marks))
@@ -123,7 +126,8 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the parameter values and quantities to plot between two points of a branch, given by index."""
     # near the flip at which a branch begins, the steps' values separate as the square root of the distance from it
-    value, quantity = curve.value[begin : end + 1], curve.quantity[begin : end + 1]
+    value = curve.value[begin : end + 1]
+    quantity = curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
         return value, quantity
     root = np.linspace(0.0, 1.0, FROM_FLIP, endpoint=False)
@@ -151,7 +155,9 @@ POINTS_BETWEEN: Final = 16
 def draw_branches(results: Results) -> Drawn:
     """Plot step period and stance angle over the full range (left) and around the bifurcations, if any (right)."""
     summary = results[STAGE].summary
-    branches, settled, close = list(branches_of(results)), list(clouds(results)), close_of(results)
+    branches = list(branches_of(results))
+    settled = list(clouds(results))
+    close = close_of(results)
     parts = {"(a) full range": None} | ({"(b) bifurcations": close} if close else {})
     if is_narrow():
         figure, stack = panels(5.6 * len(parts), 2 * len(parts))
@@ -220,7 +226,8 @@ def close_of(results: Results) -> tuple[float, float] | None:
     if not found:
         return None
     ends = [item["to"] for item in summary["attractors"]] or [summary["to"]]
-    least, most = min(found), max(*ends, max(found))
+    least = min(found)
+    most = max(*ends, max(found))
     room = max(ROOM * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
     return max(least - room, summary["from"]), min(most + room, summary["to"])
 
@@ -280,7 +287,8 @@ def draw_multipliers(results: Results) -> Drawn:
     looks = {model: cycle(zip(colours, DASHES, strict=False)) for model, colours in GAITS.items()}
     key = []
     for branch in drawn:
-        value, multipliers = interpolate(branch.group["value"]), multipliers_of(branch)
+        value = interpolate(branch.group["value"])
+        multipliers = multipliers_of(branch)
         colour, dash = next(looks[branch.model])
         left.plot(multipliers.real.ravel(), multipliers.imag.ravel(), color=colour, **DOTS)
         last = multipliers[int(np.argmax(value))]

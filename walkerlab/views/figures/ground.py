@@ -22,14 +22,16 @@ from walkerlab.views.figures.walks import (
     walk_of,
 )
 
-NORMAL, FRICTION = "normal_force_N", "friction_force_N"
+NORMAL = "normal_force_N"
+FRICTION = "friction_force_N"
 FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL, FRICTION), "'forces' is not among the config's outputs")
 TOTAL: Final = "total_energy_J"
 LOSS_STYLES: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
 DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
-STRIDES, STEPS = 2, 40
+STRIDES = 2
+STEPS = 40
 """Number of strides in the force figure, few enough to tell impacts apart, and of steps in the loss figure."""
 OF_SAMPLES: Final = 0.99
 """Fraction of the loaded samples that the axis shows; impact forces, many times the weight, lie beyond it."""
@@ -41,13 +43,17 @@ def draw_forces(results: Results) -> Drawn:
     """Plot normal force and friction over time (left) and against each other, with the friction cone (right)."""
     result = results[CONTACT_STAGE]
     whole = walk_of(result, CONTACT)
-    walk, every = whole.first_strides(STRIDES), whole[NORMAL]
-    loads, pulls = walk[NORMAL], walk[FRICTION]
+    walk = whole.first_strides(STRIDES)
+    every = whole[NORMAL]
+    loads = walk[NORMAL]
+    pulls = walk[FRICTION]
     # upper limit of the normal-force axis (N)
     top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
     figure = blank(4.4)
     parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
-    normal, friction, cone = parts["normal"], parts["friction"], parts["cone"]
+    normal = parts["normal"]
+    friction = parts["friction"]
+    cone = parts["cone"]
     key: list[Artist] = [entry(look.label, **look.line) for look in LEGS]
     steepest = 0.0
     # draw no cone if there is no friction
@@ -60,14 +66,16 @@ def draw_forces(results: Results) -> Drawn:
         steepest = max(steepest, coefficient)
     cone.axhline(0.0, color=GREY, linewidth=0.6)
     for leg, look in enumerate(LEGS):
-        load, pull = loads[:, leg], pulls[:, leg]
+        load = loads[:, leg]
+        pull = pulls[:, leg]
         line(normal, walk.time, load, look)
         line(friction, walk.time, pull, look)
         loaded = (load > 0.0) & (load < top)
         cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
     reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
     wide = max(reach, 0.6 * steepest * top)
-    of_normal, of_friction = walk.label("normal force", NORMAL), walk.label("friction", FRICTION)
+    of_normal = walk.label("normal force", NORMAL)
+    of_friction = walk.label("friction", FRICTION)
     end = (0.0, float(walk.time[-1]))
     normal.set(ylabel=of_normal, title="(a) normal force", xlim=end, ylim=(-0.03 * top, top))
     friction.set(ylabel=of_friction, title="(b) friction, downhill positive", xlim=end, ylim=(-reach, reach))

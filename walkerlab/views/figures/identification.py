@@ -41,11 +41,13 @@ def axis_name(quantity: str) -> str:
 def draw_steps(results: Results) -> Drawn:
     """Plot measured steps over predicted ones. The caption gives their number and the fraction inside the bands."""
     steps = results[IDENTIFY_STAGE].groups["steps"]
-    names, number = quantities(steps), 1 + steps["step"]
+    names = quantities(steps)
+    number = 1 + steps["step"]
     figure, axes = panels(0.6 + STEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     inside = []
     for panel, name in zip(axes[:, 0], names, strict=True):
-        predicted, measured = steps[f"predicted_{name}"], steps[f"{MEASURED}{name}"]
+        predicted = steps[f"predicted_{name}"]
+        measured = steps[f"{MEASURED}{name}"]
         reach = TWO_SIGMA * steps[f"deviation_{name}"]
         panel.fill_between(number, predicted - reach, predicted + reach, color=BLUE, alpha=0.2, linewidth=0.0)
         panel.plot(number, predicted, color=BLUE, linewidth=1.0)
@@ -62,8 +64,10 @@ def draw_steps(results: Results) -> Drawn:
 def draw_residuals(results: Results) -> Drawn:
     """Plot the residuals of each step and, if angles were measured, of the angles over the phase of the step."""
     groups = results[IDENTIFY_STAGE].groups
-    steps, samples = groups["steps"], groups.get("samples")
-    names, number = quantities(steps), 1 + steps["step"]
+    steps = groups["steps"]
+    samples = groups.get("samples")
+    names = quantities(steps)
+    number = 1 + steps["step"]
     rows = len(names) + (samples is not None)
     figure, axes = panels(0.6 + STEP_PANEL_HEIGHT * rows, rows, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=False):
@@ -80,11 +84,10 @@ def draw_residuals(results: Results) -> Drawn:
 
 def draw_residuals_in_phase(panel: Axes, samples: Group) -> None:
     """Plot the residuals of the angles over the phase of the step, with their mean in each interval."""
-    phase, residual = samples["phase"], 1e3 * samples["residual_rad"]
-    every, bins = (
-        max(1, phase.size // MAX_RESIDUALS),
-        np.minimum((PHASE_INTERVALS * phase).astype(int), PHASE_INTERVALS - 1),
-    )
+    phase = samples["phase"]
+    residual = 1e3 * samples["residual_rad"]
+    every = max(1, phase.size // MAX_RESIDUALS)
+    bins = np.minimum((PHASE_INTERVALS * phase).astype(int), PHASE_INTERVALS - 1)
     filled = np.unique(bins)
     for leg, (name, colour) in enumerate(LEG_LOOKS):
         look: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 1.5, "alpha": 0.35}
@@ -100,10 +103,12 @@ def draw_trade_off(results: Results) -> Drawn:
     """Plot the 95 % region of the two worst-determined combinations, over the two parameters that show it best."""
     rows, freedom = (results[IDENTIFY_STAGE].summary[name] for name in ("estimates", "degrees_of_freedom"))
     semi_axis = semi_axis_of_region(freedom)
-    moves, values = results[IDENTIFY_STAGE].groups["worst"]["moves"], np.array([row["value"] for row in rows])
+    moves = results[IDENTIFY_STAGE].groups["worst"]["moves"]
+    values = np.array([row["value"] for row in rows])
     relative = moves / np.where(values == 0.0, 1.0, np.abs(values))
     pair = max(combinations(range(len(rows)), 2), key=lambda pair: abs(float(np.linalg.det(relative[:, pair]))))
-    centre, reach = values[list(pair)], semi_axis * moves[:, pair]
+    centre = values[list(pair)]
+    reach = semi_axis * moves[:, pair]
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     outline = centre[:, None] + reach.T @ np.array([np.cos(angle), np.sin(angle)])
     figure, axes = panels(3.9)

@@ -66,7 +66,8 @@ def is_logarithmic(values: NDArray[Any], span: float = LOG_SPAN) -> bool:
     """Whether the values are spaced geometrically and the largest is at least `span` times the smallest."""
     if values.size < 3 or values.min() <= 0.0 or values.max() / values.min() < span:
         return False
-    gaps, plain = np.diff(np.log(np.sort(values))), np.diff(np.sort(values))
+    gaps = np.diff(np.log(np.sort(values)))
+    plain = np.diff(np.sort(values))
     return bool(gaps.max() / gaps.min() < min(1.01, plain.max() / plain.min()))
 
 
@@ -75,7 +76,8 @@ def axis_of(cells: Group, name: str) -> str:
     return label_of(variable.long_name, variable.units)
 
 
-SWING, STANCE = "swing_factor", "stance_factor"
+SWING = "swing_factor"
+STANCE = "stance_factor"
 MAP = Need(
     TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no walk was computed"
 )
@@ -87,8 +89,10 @@ STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 def draw_starts(results: Results) -> Drawn:
     """Plot the starts for both models on equal axes, coloured by outcome, with contours of the number of steps."""
-    cells, summary = results[TUNE_STAGE]["map"], results[TUNE_STAGE].summary
-    across, up = cells[SWING], cells[STANCE]
+    cells = results[TUNE_STAGE]["map"]
+    summary = results[TUNE_STAGE].summary
+    across = cells[SWING]
+    up = cells[STANCE]
     marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
     for name, marker, size, face in (("adjusted", "D", 9, "none"), ("gait", "X", 6, WHITE)):
         place = cells.attrs.get(f"{name}_{SWING}"), cells.attrs.get(f"{name}_{STANCE}")
@@ -125,7 +129,8 @@ NO_ATTRACTOR: Final = -1
 
 def draw_basins(results: Results) -> Drawn:
     """Plot attractors and failures by colour (left), and the number of steps to settle by brightness (right)."""
-    summary, cells = results[BASIN].summary, results[BASIN]["basin"]
+    summary = results[BASIN].summary
+    cells = results[BASIN]["basin"]
     plane = [str(name) for name in summary["plane"][:2]]
     xlim, ylim = (sides_of(cells[name]) for name in plane)
     # show the middle plane of a grid over three coordinates
@@ -192,7 +197,9 @@ def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
 
 
 MAPS: Final = "stability-maps"
-STIFFNESS, VELOCITY, STEP = "stiffness", "stiction_velocity", "step_size"
+STIFFNESS = "stiffness"
+VELOCITY = "stiction_velocity"
+STEP = "step_size"
 _LAW: Final = Contact().in_si()
 PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
 SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # error ranges of the colour scales: stiction map, step map
@@ -209,7 +216,8 @@ class OverStiffness:
     """Figure with two panels, outcomes and errors, over stiffness and a second coordinate."""
 
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
-        self.cells, self.edges = cells, (edges(cells[STIFFNESS]), edges(cells[up]))
+        self.cells = cells
+        self.edges = (edges(cells[STIFFNESS]), edges(cells[up]))
         self.figure, (self.left, self.right) = panels(3.9, 1, 2, sharex=True, sharey=True)
         xlim, ylim = (ends[[0, -1]] for ends in self.edges)
         for axes, title in ((self.left, titles[0]), (self.right, titles[1])):
@@ -238,7 +246,8 @@ def draw_stiction(results: Results) -> Drawn:
     """Plot outcomes (left) and errors (right) over stiffness and stiction velocity."""
     cells = results[MAPS]["stiction"]
     made = OverStiffness(cells, VELOCITY, ("(a) outcome", "(b) difference at a ten times tighter tolerance"))
-    outcomes, compared = cells["outcome"], cells["compared"] == 1
+    outcomes = cells["outcome"]
+    compared = cells["compared"] == 1
     made.draw(made.left, outcomes, **OUTCOMES)
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
     otherwise = (VERMILLION, "(b) other outcome", ~compared & ~unanswered)

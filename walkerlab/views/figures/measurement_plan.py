@@ -15,7 +15,8 @@ MEASUREMENT_COLOURS: Final = (BLUE, ORANGE, GREEN, VERMILLION)
 
 def draw_errors(results: Results) -> Drawn:
     """Plot the standard error of each parameter over the number of steps, a curve for each measurement and start."""
-    summary, group = results["plan"].summary, results["plan"].groups["errors"]
+    summary = results["plan"].summary
+    group = results["plan"].groups["errors"]
     rows = summary["measurements"]
     names = list(dict.fromkeys(row["measurement"] for row in rows))
     first_start = rows[0]["start"]

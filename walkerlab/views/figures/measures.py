@@ -18,18 +18,22 @@ from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 Point = tuple[float, float]
 
-HEIGHT, SMALL = 4.6, 7.5
+HEIGHT = 4.6
+SMALL = 7.5
 """Nominal height of the figure (in) and font size of its labels (pt)."""
 SMALL_ARC = 0.02
 """Length (leg lengths) up to which a dimension has a label but no arrow, and a sole has no mark at its centre."""
 FAINT = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
-BEHIND, BENT = -0.3, -0.75
+BEHIND = -0.3
+BENT = -0.75
 """Angles (rad) at which the second leg is drawn: of the whole leg or, with knees, its thigh; and of the shank."""
-BESIDE, FIRST_LANE = 0.62, 0.24
+BESIDE = 0.62
+FIRST_LANE = 0.24
 """Distances from the leg (leg lengths): of the labels behind it, and of the first dimension line ahead of it."""
-LETTER, LINE = 0.0088, 0.0195
+LETTER = 0.0088
+LINE = 0.0195
 """Width of a character and height of a line of text, as fractions of the picture's width."""
 CLEAR = 0.05
 """Minimum distance between the centres of labels in a lane, in leg lengths."""
@@ -83,8 +87,12 @@ def value_of(walker: Any, key: str, *otherwise: float) -> float:
 
 def measure_leg(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
     """Return the geometry of one upright leg, with its dimensions and masses."""
-    radius, top, sole = walker.foot_radius_m, walker.leg_length_m, (0.0, 0.0)
-    hip, centre, joints = (0.0, top), (0.0, radius), [(0.0, top)]
+    radius = walker.foot_radius_m
+    top = walker.leg_length_m
+    sole = (0.0, 0.0)
+    hip = (0.0, top)
+    centre = (0.0, radius)
+    joints = [(0.0, top)]
     lengths: list[Length] = []
     masses = [(mass_labels(walker, "hip_"), hip)]
 
@@ -104,7 +112,8 @@ def measure_leg(walker: CompassWalker | StraightLegs | Kneed) -> UprightLeg:
             mass = (0.0, walker.foot_to_mass_m)
             measured("foot_to_mass_m", mass, sole)
         else:
-            below, ahead = f"{limb}mass_below_{joint}_m", f"{limb}mass_ahead_m"
+            below = f"{limb}mass_below_{joint}_m"
+            ahead = f"{limb}mass_ahead_m"
             mass = (value_of(walker, ahead), above[1] - value_of(walker, below))
             measured(below, above, mass)
             measured(ahead, (0.0, mass[1]), mass)
@@ -128,7 +137,8 @@ def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
 def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """Draw one upright leg on the ground with its dimensions, and the second leg faintly behind it."""
     leg = measure_leg(walker)
-    length, centre = leg.joints[0][1], leg.centre
+    length = leg.joints[0][1]
+    centre = leg.centre
     # the leg's line ends where it meets the arc of the sole
     line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
     labels, lanes = arrange_labels(leg)
@@ -140,7 +150,9 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     left = -BESIDE * length - LETTER * behind * width
     sizes = [LINE * width * len(words.split("\n")) for words, *_ in labels]
     heights = spread([spot[1] for *_, spot in labels], sizes, 0.0)
-    bottom, top, ends = -0.16 * length, max(leg.top, *heights) + 0.1 * length, (left, left + width)
+    bottom = -0.16 * length
+    top = max(leg.top, *heights) + 0.1 * length
+    ends = (left, left + width)
     figure = blank(WIDTH * (top - bottom) / width)
     axes = figure.add_subplot()
     axes.set_axis_off()
@@ -151,7 +163,8 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
     # the second leg, behind and off the ground, with its knee bent if it has one
-    second, angles = [leg.joints[0]], (BEHIND, BENT)[: len(leg.joints)]
+    second = [leg.joints[0]]
+    angles = (BEHIND, BENT)[: len(leg.joints)]
     for angle, above, below in zip(angles, leg.joints, line[1:], strict=True):
         second.append(rotate(angle, above, below, second[-1]))
     draw_leg(axes, second, rotate(angles[-1], leg.joints[-1], centre, second[-2]), leg.radius, FAINT)
@@ -176,7 +189,8 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
 
 def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
     """Return the labels behind the leg (text, colour, position), and the vertical dimensions by lane."""
-    length, lanes = leg.joints[0][1], list[list[Length]]()
+    length = leg.joints[0][1]
+    lanes = list[list[Length]]()
     labels = [("\n".join(words), GREEN, spot) for words, spot in leg.masses]
     for dimension in (dimension for dimension in leg.lengths if dimension.value):
         level = dimension.start[1] == dimension.end[1]
@@ -234,7 +248,8 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
     """Draw a vertical dimension line at `x`, with its label to the right."""
     for point in (measure.start, measure.end):
         axes.plot([point[0], x], [point[1], point[1]], color=GREY, linewidth=0.5, linestyle=":", zorder=1)
-    high, low = measure.start[1], measure.end[1]
+    high = measure.start[1]
+    low = measure.end[1]
     axes.annotate("", xy=(x, high), xytext=(x, low), arrowprops={"arrowstyle": "<|-|>", "color": BLUE})
     axes.text(x + letter, 0.5 * (high + low), measure.label, color=BLUE, fontsize=SMALL, va="center")
 

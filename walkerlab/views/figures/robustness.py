@@ -44,7 +44,8 @@ ACTUATIONS: Final = {
 UP: Final = "largest_step.{}.up_m"
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
-BELOW, BESIDE = 1.7, 0.4
+BELOW = 1.7
+BESIDE = 0.4
 """Mean height of the panels below the walker, and width of the axis labels beside it (in)."""
 
 
@@ -66,7 +67,9 @@ def can_be_drawn(group: Group, parameters: Sequence[str]) -> bool:
 
 def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Drawn:
     """Plot figure 17. The caption names the parameter and each model's least sensitive gait with its norm (s/m)."""
-    x, said, unit = group[parameter].astype(float), axis_label(parameter), group.variables[parameter].units
+    x = group[parameter].astype(float)
+    said = axis_label(parameter)
+    unit = group.variables[parameter].units
     models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
     for panel, (label, name, shown) in zip(axes, PANELS, strict=True):
@@ -102,7 +105,8 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
     for panel, (said, name, logarithmic) in zip(axes, ACTUATION_PANELS, strict=True):
         for parameter, points in driven.items():
             order = np.argsort(speed[points])
-            at, values = speed[points][order], group[name].astype(float)[points][order]
+            at = speed[points][order]
+            values = group[name].astype(float)[points][order]
             panel.plot(at, values, **looks[parameter], markersize=3.0, linewidth=1.2)
         panel.set_ylabel(said)
         if logarithmic:
@@ -117,7 +121,8 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
 def plot_rough_ground(results: Results) -> Drawn:
     """Plot figure 18. The caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
     result = results[STAGE]
-    sticks, steps = sticks_of(result, "rough_walk/"), result["rough_steps"]
+    sticks = sticks_of(result, "rough_walk/")
+    steps = result["rough_steps"]
     across = sticks.project(sticks.landings)[:, 0]
     seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)
     left, bottom, right, top = frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
@@ -152,7 +157,8 @@ def draw_shares(axes: Axes, steps: Group) -> None:
             # a walk that was cut off has not failed
             ended = np.sort(walks[walks < last])
             going = 1.0 - np.arange(ended.size + 1) / walks.size
-            at, share = np.concatenate(([1.0], ended, [min(walks.max(), last)])), np.append(going, going[-1])
+            at = np.concatenate(([1.0], ended, [min(walks.max(), last)]))
+            share = np.append(going, going[-1])
             axes.step(at, share, where="post", color=MODELS[str(model)], linestyle=dash)
     axes.set(xscale="log", xlabel="steps", ylabel="share still walking", ylim=(0.0, 1.02))
 

@@ -36,7 +36,8 @@ def run(
     absent = {entry.what: entry.why for entry in left_out}
     reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
     progress.start("plot", reasons.count(None))
-    drawn, missing = [], []
+    drawn = []
+    missing = []
     for figure, why in zip(FIGURES, reasons, strict=True):
         if why is None:
             drawn.append(finished.get(paths_of(figure.name)["svg"]) or draw(figure, inputs, folder))

@@ -40,9 +40,12 @@ CYCLE = 2
 """Steps per gait cycle."""
 POSTURES_BETWEEN = 5
 """Number of postures drawn between two heel strikes."""
-FAINT, FULL = 0.8, 2.2
+FAINT = 0.8
+FULL = 2.2
 """Line widths (pt) of legs between heel strikes and at them."""
-HEADROOM, FOOTROOM, SIDEROOM = 0.19, 0.13, 0.12
+HEADROOM = 0.19
+FOOTROOM = 0.13
+SIDEROOM = 0.12
 """Free space above, below and beside the walker (leg lengths)."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
@@ -50,7 +53,9 @@ ARC_MIDDLE = np.zeros(1)
 SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
-UNDER, BESIDE, ABOVE = 0.36, 0.7, 1.05
+UNDER = 0.36
+BESIDE = 0.7
+ABOVE = 1.05
 """Room (in) for landing times below the lowest foot, for axis labels at the side, and for the legend."""
 SHAPE = 0.68
 """Maximum height of the axes relative to their width."""
@@ -116,7 +121,8 @@ class Sticks:
     def project(self, points: Array) -> Array:
         """Convert points in the slope's frame (..., 2) to horizontal and vertical position (m)."""
         s, c = math.sin(self.slope), math.cos(self.slope)
-        along, normal = points[..., 0], points[..., 1]
+        along = points[..., 0]
+        normal = points[..., 1]
         return np.stack((c * along + s * normal, c * normal - s * along), axis=-1)
 
     def postures(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -132,13 +138,16 @@ class Sticks:
 def sticks_of(result: Identified, under: str = "") -> Sticks:
     """Read the joint positions of a stored walk. `under` is the prefix of its groups."""
     asked = result.identity.config_slice
-    trajectory, walker = result[f"{under}trajectory"], asked["walker"]
+    trajectory = result[f"{under}trajectory"]
+    walker = asked["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
 
     def joints(name: str) -> Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
 
-    slope, hip, head = float(asked["slope_rad"]), joints("hip"), None
+    slope = float(asked["slope_rad"])
+    hip = joints("hip")
+    head = None
     if "torso_angle" in trajectory.variables:
         tilted = trajectory["torso_angle"] + slope
         head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
@@ -151,7 +160,8 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
     ending = outcome.label if outcome is not None and outcome.stumbled else ""
     landings = np.append(0.0, steps["touch_along_m"])
-    heights, outline = np.zeros(landings.size), None
+    heights = np.zeros(landings.size)
+    outline = None
     if levels is not None:
         begins, heights = levels
         outline = np.column_stack((np.append(begins, begins[-1] + FAR_EDGE_M).repeat(2)[1:-1], heights.repeat(2)))
@@ -206,7 +216,8 @@ def draw_postures(axes: Axes, sticks: Sticks, rows: NDArray[np.int64], width: fl
     """Draw legs, soles and torso at the given samples. The legs differ in colour, line style and foot marker."""
     hip = sticks.project(sticks.hip[rows])
     for leg, look in enumerate(LEGS):
-        lines, order = sticks.project(sticks.leg(leg)[rows]), look.order + width
+        lines = sticks.project(sticks.leg(leg)[rows])
+        order = look.order + width
         dots: dict[str, Any] = {"marker": look.marker, "markevery": [*range(1, lines.shape[1])]}
         style: dict[str, Any] = {**look.line, "linewidth": width, "zorder": order}
         axes.plot(*lines.T, **style, **dots, markersize=2.0 + width)
@@ -230,7 +241,8 @@ def annotate(axes: Axes, sticks: Sticks, path: Array) -> None:
             arrowprops=arrow, ha="center", va="top", fontsize=matplotlib.rcParams["xtick.labelsize"],
         )  # fmt: skip
     height = path[:, 1].max() + 0.09 * length
-    middle, half = 0.5 * (path[0, 0] + path[-1, 0]), 0.22 * length
+    middle = 0.5 * (path[0, 0] + path[-1, 0])
+    half = 0.22 * length
     tail, head = sticks.project(np.array([[middle - half, height], [middle + half, height]]))
     axes.annotate("", xy=tuple(head), xytext=tuple(tail), arrowprops={"arrowstyle": "-|>", "color": BLACK})
     slope = f"walking direction, slope {sticks.slope:.4g} rad = {math.degrees(sticks.slope):.3g}°"
@@ -252,7 +264,8 @@ def draw_slope(axes: Axes, sticks: Sticks) -> None:
 def entries(sticks: Sticks) -> list[Artist]:
     """Return the legend entries of the legs, the hip and any torso."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
-    strike, between = entry("at heel strike", color=GREY, linewidth=FULL), entry("between", color=GREY, linewidth=FAINT)
+    strike = entry("at heel strike", color=GREY, linewidth=FULL)
+    between = entry("between", color=GREY, linewidth=FAINT)
     hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
     torso = [] if sticks.head is None else [entry("torso", color=BLACK, linewidth=1.6)]
     return [*legs, strike, between, hip, *torso]
@@ -289,7 +302,8 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
 def draw_cycle(stage: str, results: Results) -> Drawn:
     """Draw one gait cycle of a stage's walk on its pads or plane (figures 2 and 6)."""
     result = results[stage]
-    sticks, pads = sticks_of(result), result.groups.get("terrain")
+    sticks = sticks_of(result)
+    pads = result.groups.get("terrain")
     figure, axes = stick_diagram(sticks)
     add_legend(figure, [*entries(sticks), *draw_ground(axes, sticks, pads)])
     strikes = sticks.strikes[:CYCLE]
@@ -309,21 +323,26 @@ FIGURE_2, FIGURE_6 = (
 )
 FIGURES = (FIGURE_2, FIGURE_6)
 
-SEEN_S, PUSH_SHARE = 0.08, 0.3
+SEEN_S = 0.08
+PUSH_SHARE = 0.3
 """Time for which an animation shows a push-off (s), and length of the mark relative to the leg."""
-FILM_SIZE, FILM_DPI = (6.4, 3.6), 100
+FILM_SIZE = (6.4, 3.6)
+FILM_DPI = 100
 """Size (in) and resolution (pixels per in) of a frame: both sides are even, as video formats require."""
 STEPS_SHOWN = 4
-RELIEF, RELIEF_UNDER = 0.04, 0.075
+RELIEF = 0.04
+RELIEF_UNDER = 0.075
 """Maximum height of the magnified ground profile, and its distance below the ground (leg lengths)."""
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
     """Return frame times (s) of an animation, by default of four steps or, for a fall, the last four and the fall."""
     # the last frame of a fall is shown for a second
-    begin, shown = 0, STEPS_SHOWN if steps is None else steps
+    begin = 0
+    shown = STEPS_SHOWN if steps is None else steps
     if steps is None and sticks.ending:
-        begin, shown = max(0, sticks.strikes.size - STEPS_SHOWN), sticks.strikes.size + 1
+        begin = max(0, sticks.strikes.size - STEPS_SHOWN)
+        shown = sticks.strikes.size + 1
     strikes = np.append(0.0, sticks.strikes)
     to_its_end = shown >= strikes.size
     end = float(sticks.time[-1] if to_its_end else strikes[shown])

@@ -166,7 +166,8 @@ def legend_entries(group: Group, names: Sequence[str]) -> list[Artist]:
 def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
     """Plot each quantity over the parameter with more values. Each value of the other parameter gets a line."""
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
-    x, values = numbers(group, across), group[few].tolist()
+    x = numbers(group, across)
+    values = group[few].tolist()
     looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
              for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)

@@ -22,9 +22,13 @@ from walkerlab.views.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, REC
 
 Array = NDArray[np.float64]
 
-RIGID_STAGE, CONTACT_STAGE, COMPARE_STAGE, TUNE_STAGE = "simulate", "contact-sim", "compare", "tune"
+RIGID_STAGE = "simulate"
+CONTACT_STAGE = "contact-sim"
+COMPARE_STAGE = "compare"
+TUNE_STAGE = "tune"
 RECORDED_STAGE = "recorded-walk"
-TRAJECTORY, STEPS = "trajectory", "steps"
+TRAJECTORY = "trajectory"
+STEPS = "steps"
 STATES = ("time", "angle", "velocity", "stance_leg")
 JOINTS = ("hip_along_m", "hip_height_m", "foot_along_m", "foot_height_m")
 ENERGIES = ("time", "kinetic_J", "potential_J", "mechanical_J")
@@ -112,7 +116,8 @@ def time_axes(rows: int, row_height: float, walks: list[DrawnWalk]) -> tuple[Fig
     axes = list(column[:, 0])
     for panel in axes:
         for walk in walks:
-            look, across = walk.look, panel.get_xaxis_transform()
+            look = walk.look
+            across = panel.get_xaxis_transform()
             panel.vlines(walk.strikes, 0.0, 1.0, look.colour, look.style, transform=across, lw=STRIKE_WIDTH, zorder=1.5)
     end = max(float(walk.time[-1]) for walk in walks)
     if end > 0.0:
@@ -161,7 +166,8 @@ def redoes_the_procedure(results: Results) -> bool:
 
 def draw_adjusted(results: Results) -> Drawn:
     """Plot the rigid model from its start and the contact model from the adjusted start, a row per leg."""
-    result, named = results[TUNE_STAGE], redoes_the_procedure(results)
+    result = results[TUNE_STAGE]
+    named = redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
     whole = []
     for group, look, end in (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome)):
@@ -230,7 +236,9 @@ def draw_cycles(results: Results) -> Drawn:
 def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
     """Plot the last stride in the model's style, with earlier strides as thin lines below."""
     # markers show the state just before a heel strike: filled if this leg strikes, open if the other does
-    angle, velocity, look = walk["angle"][:, leg], walk["velocity"][:, leg], walk.look
+    angle = walk["angle"][:, leg]
+    velocity = walk["velocity"][:, leg]
+    look = walk.look
     axes.plot(angle, velocity, color=look.colour, linewidth=EARLIER_WIDTH, zorder=look.order - 2)
     last = walk.time >= (walk.strikes[-1 - LAST_STRIDE] if walk.strikes.size > LAST_STRIDE else 0.0)
     line(axes, angle[last], velocity[last], look)
@@ -251,7 +259,8 @@ def show_direction(axes: Axes, walk: DrawnWalk, leg: int) -> None:
         first = rows[: np.argmax(np.diff(rows, append=rows[-1] + 2) > 1) + 1] if rows.size else rows
         if first.size < 3:
             continue
-        middle, ahead = first[first.size // 2], first[first.size // 2 + max(1, int(ARROW_LENGTH * first.size))]
+        middle = first[first.size // 2]
+        ahead = first[first.size // 2 + max(1, int(ARROW_LENGTH * first.size))]
         tail, head = (tuple(walk[name][row, leg] for name in ("angle", "velocity")) for row in (middle, ahead))
         arrow = {"arrowstyle": "-|>", "color": walk.look.colour, "mutation_scale": 13.0, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate("", xy=head, xytext=tail, arrowprops=arrow, zorder=7)
@@ -274,14 +283,16 @@ def draw_energies(results: Results) -> Drawn:
     walks, extent = first_strides(walks_with(results, ENERGIES))
     figure, axes = plot_over_time(walks, 1.75, ENERGIES_IN_TIME)
     ends = np.array([np.quantile(walk["mechanical_J"], (TRIMMED_SHARE, 1.0 - TRIMMED_SHARE)) for walk in walks])
-    bottom, top = float(ends[:, 0].min()), float(ends[:, 1].max())
+    bottom = float(ends[:, 0].min())
+    top = float(ends[:, 1].max())
     lacking = max(0.0, SMALLEST_SPAN * max(abs(bottom), abs(top)) - (top - bottom))
     room = 0.5 * lacking + MARGIN * (top - bottom)
     axes[-1].set_ylim(bottom - room, top + room)
     legend(figure, walks)
     means = []
     for walk in walks:
-        energy, durations = walk["mechanical_J"], np.diff(walk.time)
+        energy = walk["mechanical_J"]
+        durations = np.diff(walk.time)
         integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
         means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
     impacts = any(walk.look is CONTACT for walk in walks)

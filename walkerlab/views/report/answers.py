@@ -26,7 +26,8 @@ Summary = Mapping[str, Any]
 Answer = Callable[[Summary], Sequence[str | Table]]
 """Function that returns the paragraphs and tables of an answer."""
 
-FIRST_VALUES, LAST_VALUES = 4, 6
+FIRST_VALUES = 4
+LAST_VALUES = 6
 """Numbers of values shown at the start and at the end of a long row."""
 MAX_CYCLE = 12
 """Maximum number of steps of a cycle whose periods a sentence lists."""
@@ -96,7 +97,8 @@ def fixedpoint(summary: Summary) -> list[str | Table]:
         for name, gait in summary.get("equation_sets", {}).items()
         if "state" in gait and [fixed(value, 6) for value in gait["state"]] != state
     }
-    sets, names = {summary["equations"]: summary, **different}, summary.get("state_names", gaits.COMPASS_STATE)
+    sets = {summary["equations"]: summary, **different}
+    names = summary.get("state_names", gaits.COMPASS_STATE)
     search = f" Method: {summary['sought']}; very unstable gaits may be missed." if summary.get("sought") else ""
     steps = "one stride" if legs_differ(summary) else "one step"
     return [head, gaits.gait_table(sets, names), f"{count(summary['gaits_found'], 'gait')} of {steps} found.{search}"]
@@ -132,11 +134,13 @@ WALK_ROWS = (
 
 def walk(model: str, summary: Summary) -> list[str | Table]:
     columns = [Column(title, key, numeric=True) for key, title in STEP_HEADS.items()]
-    head, step_rows = f"The {model} {walk_text(summary['steps'], summary['outcome'])}", each_step(summary)
+    head = f"The {model} {walk_text(summary['steps'], summary['outcome'])}"
+    step_rows = each_step(summary)
     if summary["step_periods_s"]:
         last = list(step_rows.values())[-1]
         head += f"; the last takes {last['step_periods_s']} s and is {last['step_lengths_m']} m long"
-    error, advised = summary.get("numerical_error"), summary.get("advice") and summary["outcome"] != WALKED_LABEL
+    error = summary.get("numerical_error")
+    advised = summary.get("advice") and summary["outcome"] != WALKED_LABEL
     return [
         f"{head}.",
         " ".join(settling(summary)),
@@ -167,7 +171,9 @@ def settling(summary: Summary) -> Iterator[str]:
     """Yield sentences about a gait that a walk leaves, and about the cycle of steps that it repeats in the end."""
     from walkerlab.views.report.sections.walks import format_step
 
-    steps, period, left = summary["steps"], summary.get("repeats_after") or 0, summary.get("leaves_gait_at")
+    steps = summary["steps"]
+    period = summary.get("repeats_after") or 0
+    left = summary.get("leaves_gait_at")
     if left:
         yield f"It begins on an unstable gait and leaves it: step {left} is the first that differs by more than 1 %."
     if 1 < period <= MAX_CYCLE:

@@ -12,7 +12,10 @@ from markupsafe import Markup
 from walkerlab.views.report.tables import Table, Tone
 from walkerlab.views.report.tracks import Track
 
-MAIN, PAPER_PAGE, CASES, COSTS = "report.html", "report-paper.html", "report-stability.html", "report-accuracy.html"
+MAIN = "report.html"
+PAPER_PAGE = "report-paper.html"
+CASES = "report-stability.html"
+COSTS = "report-accuracy.html"
 """The report and the pages linked from it."""
 
 
@@ -121,7 +124,8 @@ class Walker:
     @property
     def meta(self) -> dict[str, object]:
         """Metadata that the script needs to decode the samples."""
-        channels, samples = tuple(self.track.channels), int(self.track["t"].size)
+        channels = tuple(self.track.channels)
+        samples = int(self.track["t"].size)
         return {
             "name": self.name, "style": self.style, "channels": channels, "samples": samples, "strikes": self.strikes,
             "pushes": self.pushes,

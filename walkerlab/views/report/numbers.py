@@ -11,9 +11,11 @@ SPACE = "\u00a0"
 """No-break space between a number and its unit."""
 MIN_LENGTH_M = 1e-9
 """Lengths below this count as zero: walkers are centimetres to metres tall, and walks are accurate to 1e-10 of that."""
-PLAIN_FROM, PLAIN_BELOW = 1e-4, 1e6
+PLAIN_FROM = 1e-4
+PLAIN_BELOW = 1e6
 """Range of magnitudes written without a power of ten."""
-MAX_DECIMALS, DEFAULT_DECIMALS = 6, 4
+MAX_DECIMALS = 6
+DEFAULT_DECIMALS = 4
 """Decimals of step periods (s) and lengths (m): maximum, and default if the error is unknown."""
 
 
@@ -84,7 +86,8 @@ def span(values: Iterable[float], unit: str, digits: int = 5) -> str:
     ordered = sorted(values)
     if not ordered:
         return NONE
-    least, largest = number(ordered[0], digits), number(ordered[-1], digits)
+    least = number(ordered[0], digits)
+    largest = number(ordered[-1], digits)
     text = least if least == largest else f"{least} to {largest}"
     return f"{text}{SPACE}{unit}" if unit else text
 

@@ -8,7 +8,8 @@ from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 from walkerlab.views.report.numbers import count, number, quantity
 from walkerlab.views.report.tables import Tone
 
-RIGID_STAGE, CONTACT_STAGE = "simulate", "contact-sim"
+RIGID_STAGE = "simulate"
+CONTACT_STAGE = "contact-sim"
 MODEL_NAMES = {RIGID_STAGE: "Rigid model", CONTACT_STAGE: "Contact model"}
 """Stages that simulate a walk, with the name of the model."""
 

@@ -78,7 +78,8 @@ def fitting(drawings: Sequence[tuple[Path, Path]], most: int = MAX_BYTES) -> lis
     return chosen
 
 
-SVG, XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
+SVG = "{http://www.w3.org/2000/svg}"
+XLINK = "{http://www.w3.org/1999/xlink}"
 SVG_ELEMENTS = frozenset(
     {"svg", "g", "path", "rect", "circle", "line", "polyline", "polygon", "text", "tspan", "use", "defs", "clipPath"}
     | {"pattern", "image"}

@@ -76,7 +76,8 @@ def pages_of(results: Results, run: str) -> tuple[Page, ...]:
         main.insert([section.anchor for section in main].index("glossary"), links)
     relation = "After" if results.departures else "Redoes"
     option = "" if run == DEFAULT else run
-    title, source = f"{'Driven' if drives_of(results.config) else 'Passive'} walking: {run}", results.config.source
+    title = f"{'Driven' if drives_of(results.config) else 'Passive'} walking: {run}"
+    source = results.config.source
     return (
         Page(title, tuple(main), (lead(results.config, run),), MAIN, source, relation, results.pending, option),
         *(Page(f"{closing.TITLES[file]} · {run}", parts, file=file, run=option) for file, parts in further.items()),
@@ -87,7 +88,8 @@ def lead(config: Config, run: str) -> str:
     """Describe what was run: the walker, its slope and its task."""
     equations = config.equations if is_passive_compass(config) else ""
     change = run.partition("@")[2].replace(",", ", ")
-    degrees, alone = math.degrees(config.slope_rad), why_rigid_alone(config.walker)
+    degrees = math.degrees(config.slope_rad)
+    alone = why_rigid_alone(config.walker)
     acting = drives_of(config), springs_of(config)
     return words("lead.scene", config, change, degrees, equations, *acting, alone)
 

@@ -33,7 +33,8 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
 
     Raises ConfigError for an unknown quantity, StorageError if writing fails.
     """
-    group, question = swept.group, swept.question
+    group = swept.group
+    question = swept.question
     check_quantities(group, names)
     if against and against not in question.names:
         check_quantities(group, [against], "--against")
@@ -41,7 +42,9 @@ def draw(swept: Swept, folder: RunFolder, names: Sequence[str] = (), against: st
     own = None if names or against else robustness.sweep_illustration(group, question.names)
     if own is None and quantities:
         own = illustration(group, question.stage, question.names, quantities, against)
-    page, paths, pictures = folder.path / PAGE, [], []
+    page = folder.path / PAGE
+    paths = []
+    pictures = []
     if own is not None:
         make_folder(folder.figures)
         pictures = [picture(draw_figure(own, {}, folder.path, swept.path.stem), folder.path)]
@@ -73,7 +76,9 @@ PARAMETER_COLUMNS = (Column("name"), Column("key"), Column("unit"), Column("valu
 
 def page_of(swept: Swept, pictures: Sequence[Picture], quantities: Sequence[str]) -> Page:
     """Build the page: the figure, the parameters and the first points."""
-    summary, question, group = swept.summary, swept.question, swept.group
+    summary = swept.summary
+    question = swept.question
+    group = swept.group
     outcomes = ", ".join(f"{count} {name}" for name, count in summary["outcomes"].items())
     parameters = [
         (name, f"`{axis.key}`", variable.units, values_summary(axis.values), variable.long_name)

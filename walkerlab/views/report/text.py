@@ -9,7 +9,8 @@ from walkerlab.views.report.tables import record_table, table_lines
 INDENT = "  "
 PARAGRAPH_WIDTH = 100
 """Line width of a paragraph (characters)."""
-LONGEST_ROW, ENDS = 12, 4
+LONGEST_ROW = 12
+ENDS = 4
 """Length of the longest row shown in full, and number of values shown at each end of a longer row."""
 
 

@@ -61,7 +61,9 @@ class Simulation(ABC):
         forces  external forces on the walker
         own     the engine's own ground contact, if it is used
         """
-        self.stepping, self.forces, self.own = stepping, forces, own
+        self.stepping = stepping
+        self.forces = forces
+        self.own = own
         self.build(model, q, v)
 
     @abstractmethod

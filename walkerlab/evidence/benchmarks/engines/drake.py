@@ -64,7 +64,8 @@ class DrakeRun(adapter.Simulation):
         from pydrake.systems.framework import DiagramBuilder
 
         logging.getLogger("drake").setLevel(logging.ERROR)
-        own, self._h = self.own, self.stepping.step_s
+        own = self.own
+        self._h = self.stepping.step_s
         name, _, adaptive = self.stepping.integrator.partition(" ")
         self._discrete = name == "discrete"
         builder = DiagramBuilder()
@@ -86,7 +87,8 @@ class DrakeRun(adapter.Simulation):
         self._context = self._simulator.get_mutable_context()
         self._at = self._plant.GetMyMutableContextFromRoot(self._context)
         self._declared: dict[int, Any] = {}
-        positions, velocities = np.zeros(len(q)), np.zeros(len(v))
+        positions = np.zeros(len(q))
+        velocities = np.zeros(len(v))
         positions[self._order], velocities[self._order] = q, v
         self._plant.SetPositions(self._at, positions)
         self._plant.SetVelocities(self._at, velocities)
@@ -155,7 +157,8 @@ def add_model(plant: Any, model: PlanarModel, own: adapter.OwnContact | None) ->
     bodies: list[Any] = []
     joints: list[Any] = []
     for link in model.links:
-        inertia, centre = RotationalInertia(*[link.inertia_kg_m2] * 3), np.array((*link.centre_m, 0.0))
+        inertia = RotationalInertia(*[link.inertia_kg_m2] * 3)
+        centre = np.array((*link.centre_m, 0.0))
         body_inertia = SpatialInertia.MakeFromCentralInertia(link.mass_kg, centre, inertia)
         body = plant.AddRigidBody(link.name, body_inertia)
         joints += join_to_parent(
@@ -203,7 +206,8 @@ def material(own: adapter.OwnContact) -> Any:
     from pydrake.geometry import AddContactMaterial, ProximityProperties
     from pydrake.multibody.plant import CoulombFriction
 
-    settings, properties = own.settings, ProximityProperties()
+    settings = own.settings
+    properties = ProximityProperties()
     AddContactMaterial(
         properties=properties,
         dissipation=settings.get("hunt_crossley_dissipation"),

@@ -36,7 +36,8 @@ SETTLED_CHANGE = 1e-4  # relative change of the period on an engine's own contac
 LARGEST_STEP_S = 0.01  # largest step of adaptive integrators
 START_FACTORS = (0.95, 0.99)  # factors on the gait's velocities
 TUNING_STEP_S = 2e-5
-COMPARED_TOUCHES, OWN_TOUCHES = 2, 10
+COMPARED_TOUCHES = 2
+OWN_TOUCHES = 10
 INTO_NEXT_STEP = 0.9  # states are compared at this fraction of the step after the last compared touch
 SWING_S = 0.48
 RUN_TIMEOUT_S = 120.0  # time limit of a run, after which its process is killed
@@ -77,7 +78,8 @@ def make_truth(scene: EngineScene) -> Truth | None:
     last, following = walk.touch_time_s[COMPARED_TOUCHES - 1 : COMPARED_TOUCHES + 1]
     until = float(last + INTO_NEXT_STEP * (following - last))
     reference, second = (simulate(scene, *method, COMPARED_TOUCHES + 1, until) for method in REFERENCES)
-    end, second_end = sampled_end(reference), sampled_end(second)
+    end = sampled_end(reference)
+    second_end = sampled_end(second)
     assert end is not None, "the walk goes on beyond that time"
     assert second_end is not None, "the other method's walk goes on, too"
     return Truth(until, end, reference.touch_time_s[:COMPARED_TOUCHES], float(np.max(np.abs(end - second_end))), walk)
@@ -106,15 +108,18 @@ class EngineExperiment:
         # under our law, the errors are those of the end state and the touch times; on the engine's own contact, it is
         # the error of the last period, and only completed walks that start from the gait have one
         head = (self.scene.name, self.engine, self.version, self.experiment, integrator, start)
-        step_s, tolerance = stepping.step_s, stepping.tolerance
+        step_s = stepping.step_s
+        tolerance = stepping.tolerance
         if isinstance(answer, TaskLost):
             outcome = Outcome.BUDGET_EXHAUSTED if answer.timed_out else Outcome.SOLVER_FAILED
             nothing = (None, None, None, None, None, None)
             return EngineRow(*head, step_s, tolerance, *nothing, 0, outcome.label, answer.why)
         period_s = length_m = slip_m = error = touch_error = None
-        touches, truth = answer.touches_s, self.truth
+        touches = answer.touches_s
+        truth = self.truth
         if touches.size >= 2:
-            period_s, length_m = float(np.diff(touches)[-1]), float(np.diff(answer.along_m)[-1])
+            period_s = float(np.diff(touches)[-1])
+            length_m = float(np.diff(answer.along_m)[-1])
             if answer.slips_m.size == touches.size:  # otherwise the last foot has not lifted
                 slip_m = float(answer.slips_m[-1])
         if truth is not None and self.experiment == OWN_LAW:
@@ -142,8 +147,11 @@ def our_walk(
         start_s = time.process_time()
         result = simulate(scene, OUR_METHOD, rtol, touches + (until_s is not None), until_s)
         walls.append(time.process_time() - start_s)
-    times, along, slips = result.touch_time_s[:touches], result.touch_along_m[:touches], result.slip_m[:touches]
-    steps, time_s = int(result.work[1]), float(result.end_time_s)
+    times = result.touch_time_s[:touches]
+    along = result.touch_along_m[:touches]
+    slips = result.slip_m[:touches]
+    steps = int(result.work[1])
+    time_s = float(result.end_time_s)
     return runs.WalkAnswer(result.outcome.label, sampled_end(result), times, along, slips, steps, time_s, median(walls))
 
 
@@ -203,7 +211,8 @@ class EngineOnScene:
 
     def tune(self, contact: str, target: EngineContact) -> tuple[OwnContact, list[TuningRow]] | TaskLost:
         """Tune a contact model to the scene's contact and measure how close it comes."""
-        name, sliding = self.engine.name, 1.5 * self.scene.ours.friction.sliding_from
+        name = self.engine.name
+        sliding = 1.5 * self.scene.ours.friction.sliding_from
         answer = self.process.do(runs.TuningTask(name, contact, target, TUNING_STEP_S, sliding).run, RUN_TIMEOUT_S)
         if isinstance(answer, TaskLost):
             return answer
@@ -223,7 +232,9 @@ class EngineOnScene:
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
         most = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps
-        before, completed, spent = None, [], 0
+        before = None
+        completed = []
+        spent = 0
         usual_s = float(self.truth.walk.touch_time_s[-1])
         for stepping in steppings(name, integrator, [h for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps]):
             row, answer = self.walk(contact, stepping, most, own)
@@ -241,7 +252,9 @@ class EngineOnScene:
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
         """Simulate the passive swing of the pinned walker with each integrator. Return results and lost runs."""
-        scene, engine, model = self.scene, self.engine, runs.pinned_model(self.scene)
+        scene = self.scene
+        engine = self.engine
+        model = runs.pinned_model(self.scene)
         n = len(model.chain)
         start = np.array((*scene.start[2 : 2 + n], *scene.start[4 + n :]))
         truth, energy = swing_truth(scene, start)
@@ -258,7 +271,8 @@ class EngineOnScene:
                 error = float(np.max(np.abs(answer.end - truth)))
                 drift = abs(energy(answer.end) - energy(start))
                 order = math.log2(before / error) if before and error and not entry.adapts else None
-                who, how = (scene.name, engine.name, integrator, entry.order), (stepping.step_s, stepping.tolerance)
+                who = (scene.name, engine.name, integrator, entry.order)
+                how = (stepping.step_s, stepping.tolerance)
                 rows.append(SwingRow(*who, *how, error, drift, order, answer.wall_s))
                 before = error
         return rows, lost

@@ -60,7 +60,9 @@ class ExudynRun(adapter.Simulation):
 
         self._container = exu.SystemContainer()
         self._system = self._container.AddSystem()
-        zero, position, velocity = [0.0] * model.size, q.tolist(), v.tolist()
+        zero = [0.0] * model.size
+        position = q.tolist()
+        velocity = v.tolist()
         start = NodeGenericODE2(
             referenceCoordinates=zero,
             initialCoordinates=position,
@@ -98,7 +100,8 @@ class ExudynRun(adapter.Simulation):
         settings.solution.file.write = False
         if adaptive:
             stepping.relativeTolerance = stepping.absoluteTolerance = self.stepping.tolerance
-            stepping.minimumStepSize, stepping.initialStepSize = SMALLEST_STEP_S, 1e-5
+            stepping.minimumStepSize = SMALLEST_STEP_S
+            stepping.initialStepSize = 1e-5
         self._system.SetPostStepUserFunction(after_step)
         self._system.SolveDynamic(settings, solverType=getattr(exu.DynamicSolverType, name))
 
@@ -114,12 +117,17 @@ def add_tree(system: Any, model: PlanarModel, node: Any, forces: adapter.Forces 
 
     kinds = {"along": exu.JointType.PrismaticX, "height": exu.JointType.PrismaticY, "turn": exu.JointType.RevoluteZ}
     joints: list[Any] = []
-    parents, offsets, centres, masses, inertias = [], [], [], [], []
+    parents = []
+    offsets = []
+    centres = []
+    masses = []
+    inertias = []
     places: list[int] = []
     for link in model.links:
         freedoms = model.freedoms if link.parent < 0 else ("turn",)
         for freedom in freedoms:
-            last, hangs = freedom == freedoms[-1], link.parent >= 0
+            last = freedom == freedoms[-1]
+            hangs = link.parent >= 0
             offset = link.parent_point_m if hangs or not joints else (0.0, 0.0)
             from_hinge = np.subtract(offset, model.links[link.parent].point_m if hangs else (0.0, 0.0))
             joints.append(kinds[freedom])
@@ -156,7 +164,8 @@ def add_contacts(
     import exudyn as exu
     from exudyn import itemInterface
 
-    settings, r = own.settings, PLANE_M
+    settings = own.settings
+    r = PLANE_M
     plane = exu.Vector3DList([[-r, 0.0, r], [r, 0.0, r], [0.0, 0.0, -r]])  # its normal points upwards
     floor = system.AddObject(itemInterface.ObjectGround())
     for ball in model.balls:

@@ -67,11 +67,15 @@ class RuleFollower:
 
     def _see(self, scene: EngineScene, q: Floats, v: Floats) -> None:
         """Bind the compiled function to a scene's model and its constant arguments, and evaluate it once."""
-        size, state = scene.model.size, self.walk_state
+        size = scene.model.size
+        state = self.walk_state
         # the system shares the walk state's progress array, which is therefore current at every call
         system = place_on_ground(scene.walker, self._ground, progress=state.progress)
-        self.scene, self._fixed = scene, (system, scene.model.chain)
-        self._motion, self._forces, self._none = np.zeros((2, 4)), np.zeros(size), np.zeros(0)
+        self.scene = scene
+        self._fixed = (system, scene.model.chain)
+        self._motion = np.zeros((2, 4))
+        self._forces = np.zeros(size)
+        self._none = np.zeros(0)
         self._call = entry_point(
             feet_and_forces, *self._fixed, 0.0, np.zeros(size), np.zeros(size), self._motion, self._forces
         )
@@ -101,7 +105,8 @@ class RuleFollower:
 
     def follow(self, time_s: float, q: Floats, v: Floats) -> bool:
         """Update the walk after an engine step. Return whether the ground under a foot may have changed."""
-        before, now = self._feet, self.feet(q, v)
+        before = self._feet
+        now = self.feet(q, v)
         if not all(-DIVERGED_M < place < DIVERGED_M for foot in now for place in (foot.along, foot.height)):
             self._end(Outcome.SOLVER_FAILED)
             return False
@@ -119,12 +124,15 @@ class RuleFollower:
         happened = happened or not (left0 <= y0 < right0 and left1 <= y1 < right1)
         if happened:
             self._apply_events(time_s, before, now, q, v)
-        self._feet, self.time_s = now, time_s
+        self._feet = now
+        self.time_s = time_s
         self._judge(now, q, v)
         return happened
 
     def _apply_events(self, time_s: float, before: Feet, now: Feet, q: Floats, v: Floats) -> None:
-        walk_state, terrain, form = self.walk_state, self.scene.ground.terrain, self.scene.ours.whole
+        walk_state = self.walk_state
+        terrain = self.scene.ground.terrain
+        form = self.scene.ours.whole
         for foot in range(2) if terrain.has_pads else ():
             cell = cell_at(terrain, foot, now[foot].along)
             if cell == walk_state.cells[foot]:
@@ -143,7 +151,8 @@ class RuleFollower:
             if (before[foot].height >= 0.0) == above:
                 continue
             walk_state.sides[foot * contact_events.PER_FOOT + contact_events.HEIGHT] = 1 if above else -1
-            old, new = before[foot], now[foot]
+            old = before[foot]
+            new = now[foot]
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
             feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
@@ -160,7 +169,8 @@ class RuleFollower:
         """Return the first lock or release of a knee within a step of h (s), or None if no knee locks or is
         released.
         """
-        walk_state, turns = self.walk_state, []
+        walk_state = self.walk_state
+        turns = []
         stance = walk_state.progress.stance
         pushing_s = pulse_left(self._fixed[0], self.time_s)
         if walk_state.progress.release == contact_state.AT_PULSE_END:
@@ -186,7 +196,9 @@ class RuleFollower:
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Lock or release the knee in `turn`, and return coordinates and velocities of the model with the new locks."""
-        walker, walk_state, y = self.scene.ours, self.walk_state, self.scene.about_centre(q, v)
+        walker = self.scene.ours
+        walk_state = self.walk_state
+        y = self.scene.about_centre(q, v)
         if self.turn is not None and contact_events.EXTENSION <= self.turn.event < contact_events.PULSE_END:
             contact_transitions.knee_stops(walker.stop, walk_state, self.turn.event, self.time_s)
             y = lock_knee(walker.whole, walker.forms[0, locked_knees(walk_state.knee)], y).state
@@ -204,8 +216,10 @@ class RuleFollower:
             self.outcome = Outcome(outcome)
 
     def _judge(self, now: Feet, q: Floats, v: Floats) -> None:
-        ground, has_ground = self.scene.ground, self.walk_state.has_ground
-        tau, t = ground.frame.pendulum_time, self.time_s
+        ground = self.scene.ground
+        has_ground = self.walk_state.has_ground
+        tau = ground.frame.pendulum_time
+        t = self.time_s
         inside = (now[0].height < 0.0 and has_ground[0] != 0, now[1].height < 0.0 and has_ground[1] != 0)
         if inside[0] or inside[1]:
             self.grounded_s = t

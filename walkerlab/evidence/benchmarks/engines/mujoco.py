@@ -39,7 +39,9 @@ class MujocoRun(adapter.Simulation):
         mujoco.set_mjcb_passive(None if self.forces is None else force_callback(self.forces, self._data))
 
     def run(self, steps: int, until_s: float, on_step: adapter.OnStep) -> None:
-        model, data, advance = self._model, self._data, self._advance
+        model = self._model
+        data = self._data
+        advance = self._advance
         q, v, h = data.qpos, data.qvel, float(model.opt.timestep)
         for count in range(1, min(steps, round(until_s / h)) + 1):
             advance(model, data)
@@ -53,7 +55,9 @@ class MujocoRun(adapter.Simulation):
 
 def force_callback(forces: adapter.Forces, data: Any) -> Any:
     """Build the callback for passive forces, which MuJoCo calls in every stage of every integrator."""
-    q, v, passive_forces = data.qpos, data.qvel, data.qfrc_passive
+    q = data.qpos
+    v = data.qvel
+    passive_forces = data.qfrc_passive
 
     def passive(_model: Any, _data: Any) -> None:
         passive_forces[:] = forces(data.time, q, v)
@@ -63,7 +67,9 @@ def force_callback(forces: adapter.Forces, data: Any) -> Any:
 
 def model_xml(model: PlanarModel, own: adapter.OwnContact | None) -> str:
     """Write the model as MJCF, with a floor for its feet if the engine's own contact is used."""
-    contact, floor, pairs = None if own is None else own.settings, "", ""
+    contact = None if own is None else own.settings
+    floor = ""
+    pairs = ""
     if contact is not None:
         place = f'pos="0 0 {model.balls[0].ground_m!r}" contype="0" conaffinity="0"'
         floor = f'<geom name="floor" type="plane" size="0 0 1" {place}/>'

@@ -6,7 +6,8 @@ from typing import Annotated
 from walkerlab.labels import Label
 
 OURS = "walkerlab"
-SAME_LAW, OWN_LAW = "same-law", "own-law"
+SAME_LAW = "same-law"
+OWN_LAW = "own-law"
 TOLERANCE = Label("1", "relative tolerance of an adaptive integrator")
 RUN_TIME = Label("s", "run time", timing=True)
 FROM_REFERENCE = "difference from the reference in the end state (SI); on own contact, in the last period (s)"

@@ -53,12 +53,14 @@ class WalkTask:
     def run(self) -> WalkAnswer:
         walk = EngineWalk(self)
         walk.go()
-        rules, walk_state = walk.rules, walk.rules.walk_state
+        rules = walk.rules
+        walk_state = walk.rules.walk_state
         outcome = rules.outcome
         if outcome is None:
             outcome = Outcome.WALKED if walk.is_over else Outcome.BUDGET_EXHAUSTED
         end = rules.scene.about_centre(walk.q, walk.v) if outcome is Outcome.WALKED else None
-        steps, lifted = int(walk_state.progress.steps), steps_with_lift(walk_state)
+        steps = int(walk_state.progress.steps)
+        lifted = steps_with_lift(walk_state)
         touches = walk_state.touch_time[:steps].copy(), walk_state.touch_along[:steps].copy()
         slips = walk_state.slip[:lifted].copy()
         return WalkAnswer(outcome.label, end, *touches, slips, walk.steps, walk.time_s, walk.wall_s)
@@ -68,10 +70,13 @@ class EngineWalk:
     """Walk in an engine, which continues in a new model after each lock or release of a knee."""
 
     def __init__(self, task: WalkTask) -> None:
-        self.task, self.engine = task, PHYSICS_ENGINES[task.engine]
+        self.task = task
+        self.engine = PHYSICS_ENGINES[task.engine]
         self.q, self.v = task.scene.from_base(task.scene.start)
         self.rules = RuleFollower(task.scene, task.touches, self.q, self.v, carries=task.own is None)
-        self.steps, self.time_s, self.wall_s = 0, 0.0, 0.0
+        self.steps = 0
+        self.time_s = 0.0
+        self.wall_s = 0.0
 
     @property
     def is_over(self) -> bool:
@@ -93,7 +98,9 @@ class EngineWalk:
 
     def _simulate(self, until_s: float) -> None:
         """Simulate from the current state to `until_s`. Fixed steps are shortened so that a whole number fits."""
-        task, rules, span = self.task, self.rules, until_s - self.time_s
+        task = self.task
+        rules = self.rules
+        span = until_s - self.time_s
         stepping = task.stepping
         if not self.engine.adapter().INTEGRATORS[stepping.integrator].adapts:
             stepping = replace(stepping, step_s=span / math.ceil((1.0 - TIME_ROUNDING) * span / stepping.step_s))
@@ -116,7 +123,9 @@ class EngineWalk:
             if rules.turn is not None and rules.watches:
                 return False
             self.steps += 1
-            self.time_s, self.q, self.v = self.seen_s, q.copy(), v.copy()
+            self.time_s = self.seen_s
+            self.q = q.copy()
+            self.v = v.copy()
             if changed:
                 hand_over_ground()
             return rules.outcome is None and not (changed and rules.is_outdated)
@@ -236,7 +245,8 @@ class TuningTask:
 
         h  step size (s)
         """
-        target, engine = self.target, PHYSICS_ENGINES[self.engine]
+        target = self.target
+        engine = PHYSICS_ENGINES[self.engine]
         link = planar.Link("ball", target.mass, (0.0, 0.0), target.mass, -1, (0.0, 0.0), (0.0, 0.0))
         ball = planar.Ball(0, (0.0, 0.0), *planar.ball_and_ground(0.0))
         model = planar.PlanarModel((link,), planar.UPRIGHT, (ball,), along * target.gravity, target.gravity, np.eye(1))
@@ -262,12 +272,14 @@ class TuningTask:
         # the mean of a step's two ends stands for its middle, whatever the engine's integration rule
         middle = np.column_stack((x[1:] + x[:-1], v[1:] + v[:-1])) / 2.0
         (k, c), *_ = np.linalg.lstsq(middle, -np.diff(motion.v[:, 1]) / np.diff(motion.t), rcond=None)
-        stiffness, damping = k / depth, c / (depth * omega)
+        stiffness = k / depth
+        damping = c / (depth * omega)
         return float(damping / (2.0 * math.sqrt(stiffness))) if stiffness > 0.0 else 0.0
 
     def friction(self, depth: float) -> float:
         """Return the deceleration of a sliding block, divided by gravity. `depth` is the penetration at rest (m)."""
-        target, settled = self.target, self.settling_s
+        target = self.target
+        settled = self.settling_s
         start = self.sliding_velocity + target.friction * target.gravity * 1.25 * settled
         motion = self.simulate_contact(1.25 * settled, self.step_s, 0.0, depth, (start, 0.0))
         watched = -1 - len(motion.v) // 5
@@ -276,7 +288,8 @@ class TuningTask:
 
     def creep(self, depth: float) -> float:
         """Return the creep velocity (m/s) of a block standing on an incline. `depth` is the penetration at rest (m)."""
-        target, h = self.target, STEADY_STEP_FACTOR * self.step_s
+        target = self.target
+        h = STEADY_STEP_FACTOR * self.step_s
         return float(
             self.simulate_contact(self.settling_s, h, target.creep_load, depth, (target.creep_velocity, 0.0)).v[-1, 0]
         )

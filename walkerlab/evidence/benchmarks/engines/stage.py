@@ -94,7 +94,8 @@ def missing_engines() -> list[dict[str, str]]:
 
 
 def measure(pair: EngineOnScene) -> EngineFindings:
-    findings, name = EngineFindings(), pair.engine.name
+    findings = EngineFindings()
+    name = pair.engine.name
     target = contact_target(pair.scene)
     with pair.process:
         findings.swings, lost = pair.swings()
@@ -236,13 +237,16 @@ def convergence(rows: Sequence[EngineRow]) -> dict[str, dict[str, float]]:
 
 def conclusions(rows: Sequence[EngineRow], truth: experiments.Truth) -> dict[str, str]:
     same, own = (series_by_name(rows, experiment) for experiment in (SAME_LAW, OWN_LAW))
-    sizes, changes, shares = three_digits(rows, truth), convergence(rows), ratios(rows)
+    sizes = three_digits(rows, truth)
+    changes = convergence(rows)
+    shares = ratios(rows)
     by_level = {label: shares.get(label, {}) for label in map(plain_power, RATIO_LEVELS)}
     engines = list(dict.fromkeys(runs[0].engine for runs in same.values()))
     falling = {name: by for name, by in changes[SAME_LAW].items() if same[name][-1].tolerance is None}
     finest = [runs[-1] for runs in own.values()]
     settled = [name for name in changes[OWN_LAW] if experiments.has_settled(*own[name][-2:])]
-    best, period = closest(rows), float(truth.walk.periods_s[-1])
+    best = closest(rows)
+    period = float(truth.walk.periods_s[-1])
     return {
         SAME_LAW: words(
             "engines.same_law", by_level, engines, sizes[SAME_LAW], falling, plain_power(experiments.ERROR_GOAL)

@@ -53,7 +53,8 @@ def costs(summary: Row) -> Table:
 def method_rows(summary: Row, scene: str, levels: Sequence[float]) -> Iterator[Row]:
     """Yield the methods of a scene, each with its fastest run for each error level and its smallest error."""
     # errors below the uncertainty of the reference are shown as upper bounds
-    best, bound = summary["best"].get(scene, {}).values(), float(summary["reference"][scene]["agreement"])
+    best = summary["best"].get(scene, {}).values()
+    bound = float(summary["reference"][scene]["agreement"])
     for method, runs in grouped((row for row in summary["rows"] if row["scene"] == scene), "method").items():
         ended = [run for run in runs if run["error"] is not None]
         exact: Row = min(ended, key=lambda run: float(run["error"]), default={})

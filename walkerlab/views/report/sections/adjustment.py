@@ -36,7 +36,8 @@ ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit
 def limit(results: Results) -> Section | None:
     """Show how the contact model converges to the rigid one, or return None if that was not computed."""
     summary = results.summary("tune")
-    reaches, orders = summary.get("reaches") or {}, summary.get("orders") or {}
+    reaches = summary.get("reaches") or {}
+    orders = summary.get("orders") or {}
     pushes = results.config.push_off.impulse_N_s != 0.0
     note = words("adjustment.factors", pushes)
     titles = words.terms("adjustment.distances").items()
@@ -55,9 +56,12 @@ def starts_table(results: Results, summary: Summary) -> Table:
     them.
     """
     rows = [{"name": name, **row} for name, row in summary["table2"].items()]
-    caption, note, head = "The start before and after the adjustment", "", "coordinate"
+    caption = "The start before and after the adjustment"
+    note = ""
+    head = "coordinate"
     if results.claims:
-        caption, head = "Table 2 again: the start before and after the adjustment", "row"
+        caption = "Table 2 again: the start before and after the adjustment"
+        head = "row"
         note = "The paper's percentages are relative to the ADAMS value, which it does not state."
     named = typeset if results.claims else symbol
     first = Column(head, lambda row: f"{named(row['name'])} ({row['unit']})")

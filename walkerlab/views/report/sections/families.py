@@ -61,9 +61,13 @@ class DiagramAxis:
     """Maps values to positions along an axis, with a margin."""
 
     def __init__(self, values: NDArray[np.float64], start: float, end: float) -> None:
-        least, most = float(values.min()), float(values.max())
+        least = float(values.min())
+        most = float(values.max())
         room = 0.04 * (most - least) or 1.0
-        self.least, self.most, self.start, self.end = least - room, most + room, start, end
+        self.least = least - room
+        self.most = most + room
+        self.start = start
+        self.end = end
 
     def place(self, value: float) -> float:
         return round(self.start + (value - self.least) / (self.most - self.least) * (self.end - self.start), 1)
@@ -98,7 +102,8 @@ def gait_diagram(results: Results) -> Diagram | None:
     across = DiagramAxis(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
     up = DiagramAxis(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
     pushes = results.config.push_off.impulse_N_s != 0.0
-    gap, unit = SAMPLING_MARGIN * sampling_gap(results.config), summary["unit"]
+    gap = SAMPLING_MARGIN * sampling_gap(results.config)
+    unit = summary["unit"]
     marks = []
     for branch, place, motion in moving:
         x, y = float(branch["value"][place]), float(branch["step_period"][place][0])

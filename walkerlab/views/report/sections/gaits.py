@@ -31,7 +31,8 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
     """Tabulate all gaits by set of equations. A remark marks the chosen one or says why a gait is unphysical."""
-    four, five = partial(fixed, decimals=4), partial(fixed, decimals=5)
+    four = partial(fixed, decimals=4)
+    five = partial(fixed, decimals=5)
     columns = (
         Column("gait", "gait", numeric=True),
         measured("T", "period_s", five),

@@ -32,7 +32,8 @@ RELEASE_COLUMNS = (
 def section(results: Results) -> Section | None:
     """Tabulate the largest differences of the legs' motions and, with knees, the effect of the release instant."""
     summary = results.summary("compare")
-    angle, velocity = summary.get("max_angle_error_rad"), summary.get("max_velocity_error_rad_s")
+    angle = summary.get("max_angle_error_rad")
+    velocity = summary.get("max_velocity_error_rad_s")
     if not angle or not velocity:
         return None
     rows = [(label, angle[key], velocity.get(key)) for key, label in words.terms("models.ways").items() if key in angle]

@@ -34,7 +34,8 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
     tracks = {stage: track.cut(end) for stage, track in by_stage.items() if track is not None}
     if not tracks:
         return None
-    config, torso = results.config, results.config.walker.torso
+    config = results.config
+    torso = results.config.walker.torso
     length = config.walker.leg_length_m
     steps = {MODEL_NAMES[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
     return Player(
@@ -149,7 +150,8 @@ def view(tracks: tuple[Track, ...], slope: float, margin: float) -> tuple[int, i
     above: Array = np.concatenate([track[name] for track in tracks for name in ("fy0", "hy", "fy1")])
     right = along * math.cos(slope) + above * math.sin(slope)
     down = along * math.sin(slope) - above * math.cos(slope)
-    left, top = right.min() - margin, down.min() - margin
+    left = right.min() - margin
+    top = down.min() - margin
     width, height = right.max() + margin - left, down.max() + margin - top
     return math.floor(1000 * left), math.floor(1000 * top), math.ceil(1000 * width), math.ceil(1000 * height)
 

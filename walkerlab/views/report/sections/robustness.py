@@ -118,7 +118,8 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
     environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
     zeros = [row for row in rows if row["of"] == NORM and "relative" not in row and row["value"] is not None]
-    first, top = [row for row in built if row["of"] == NORM][:MAX_DERIVATIVES], built[:MAX_DERIVATIVES]
+    first = [row for row in built if row["of"] == NORM][:MAX_DERIVATIVES]
+    top = built[:MAX_DERIVATIVES]
     left = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
     return [
         table("Gait sensitivity norms", NORM_COLUMNS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),

@@ -17,7 +17,8 @@ def section(results: Results) -> Section | None:
     walks = {model.lower(): summary for stage, model in MODEL_NAMES.items() if (summary := results.summary(stage))}
     verdicts = Counter(row["verdict"] for row in results.claims)
     misprint = any(erratum["where"].startswith("A.5") for erratum in results.summary("compare").get("errata", ()))
-    arguments, config = (results.summary("fixedpoint"), verdicts, misprint), results.config
+    arguments = (results.summary("fixedpoint"), verdicts, misprint)
+    config = results.config
     opening = ""
     if walks:
         opening = words("verdict.opening", walks, *arguments, drives_of(config), springs_of(config), config.ground.even)
@@ -47,7 +48,8 @@ def outcome_statements(results: Results) -> Iterator[Statement]:
     """Yield a statement for each walk (outcome, key numbers, advice), for the gait, and for a failed adjustment."""
     for stage, model in MODEL_NAMES.items():
         if summary := results.summary(stage):
-            config, outcome = results.config, summary["outcome"]
+            config = results.config
+            outcome = summary["outcome"]
             tau = math.sqrt(config.walker.leg_length_m / config.gravity_m_s2)
             text = words("verdict.walk", summary, 2 * config.strides, tau, *walk_end(results, stage))
             yield Statement(model, text, outcome, tone(outcome))
@@ -62,7 +64,8 @@ def outcome_statements(results: Results) -> Iterator[Statement]:
 
 def walk_end(results: Results, stage: str) -> tuple[float | None, float | None]:
     """Return a walk's end time (s) and the hip's height at that time (m), or None for values that are not stored."""
-    summary, trajectory = results.summary(stage), results.group(stage, "trajectory")
+    summary = results.summary(stage)
+    trajectory = results.group(stage, "trajectory")
     if trajectory is None or not trajectory["time"].size:
         return summary.get("end_time_s"), None
     height = float(trajectory["hip_height_m"][-1]) if "hip_height_m" in trajectory.variables else None

@@ -38,7 +38,8 @@ def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
 
 
 def contact_rows(summary: Mapping[str, Any]) -> list[tuple[str, str | Cell, str]]:
-    get, lost = summary.get, summary.get("dissipated_J") or {}
+    get = summary.get
+    lost = summary.get("dissipated_J") or {}
     work = get("work_per_step_J") or {}
     values: dict[str, str | Cell] = {
         "outcome": Cell(summary["outcome"], tone(summary["outcome"])),
@@ -66,7 +67,9 @@ def joules(value: float, digits: int = 4) -> str:
     return f"{number(value, digits) if abs(value) >= 1e-3 or value == 0 else power_of_ten(value, 2)} J"
 
 
-HOLDS, FAILS, NOTED = Cell("holds", "good"), Cell("does not hold", "bad"), Cell("does not hold (ignored)", "fair")
+HOLDS = Cell("holds", "good")
+FAILS = Cell("does not hold", "bad")
+NOTED = Cell("does not hold (ignored)", "fair")
 RELATIVE_ROUNDING = 1e-6
 """Largest relative energy drift, and largest scuffing depth in leg lengths, that count as zero."""
 ASSUMPTION_COLUMNS = (
@@ -80,7 +83,8 @@ ASSUMPTION_COLUMNS = (
 def assumptions(results: Results) -> Section | None:
     """Check the rigid model's assumptions against its own walk."""
     summary = results.summary(RIGID_STAGE)
-    judged, hip = [], results.config.walker.hip
+    judged = []
+    hip = results.config.walker.hip
     works = hip.torque_N_m != 0.0 or hip.damping_N_m_s_per_rad != 0.0
     for key, text in words.terms("walks.assumed").items():
         if summary.get(key) is not None and not (key == "energy_drift_J" and works):
@@ -94,7 +98,8 @@ def assumptions(results: Results) -> Section | None:
 
 def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[str, Cell]:
     """Return the value by which an assumption is judged, and the verdict."""
-    value, ground = summary[key], results.config.contact
+    value = summary[key]
+    ground = results.config.contact
     if key == "min_normal_force_N":
         return quantity(value, "N", 4), HOLDS if value > 0 else FAILS
     if key == "max_friction_ratio":
@@ -107,7 +112,8 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
     return joules(value, 3), HOLDS if value <= RELATIVE_ROUNDING * abs(summary.get("mean_energy_J") or 1.0) else FAILS
 
 
-HEAD_STEPS, TAIL_STEPS = 20, 4
+HEAD_STEPS = 20
+TAIL_STEPS = 4
 """Number of steps listed from the beginning and from the end of a longer walk."""
 SERIES = {
     (RIGID_STAGE, "step_periods_s"): "rigid T (s)",
@@ -140,7 +146,9 @@ def steps(results: Results) -> Section | None:
 
 def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
     """Format a quantity of step `place`, from 0, with the decimals that its numerical error allows. Slips are in mm."""
-    value, factor = summary[key][place], 1e3 if key == "slips_m" else 1.0
-    errors, name = summary.get("numerical_error") or {}, ERROR_OF_EACH_STEP[key]
+    value = summary[key][place]
+    factor = 1e3 if key == "slips_m" else 1.0
+    errors = summary.get("numerical_error") or {}
+    name = ERROR_OF_EACH_STEP[key]
     error = errors["of_steps"][name][place] if name in errors.get("of_steps", ()) else errors.get(name)
     return fixed(value and factor * value, decimals_left(error and factor * error))
