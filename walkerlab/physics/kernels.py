@@ -128,7 +128,7 @@ def dispatch_by_type(declaration: Callable[..., Any]) -> ByType:
 
 
 def dispatch_by_type_or_default(declaration: Callable[..., Any]) -> ByType:
-    """Declare a function as `dispatch_by_type` does. Types without a registered body use the body of the declaration."""
+    """Declare a function as `dispatch_by_type` does. Other types use the body of the declaration."""
     chosen = dispatch_by_type(declaration)
     chosen.default = declaration
     return chosen
