@@ -83,7 +83,7 @@ def sweep_page(runs: Path) -> str:
         walkers=(walker("Gait", tracks["simulate"], ()),),
         slope_rad=slope,
         leg_m=1.0,
-        foot_radius_m=0.0,
+        foot_radii_m=(0.0, 0.0),
         torso_m=0.0,
         ordinary_force=weight(tracks),
         closeup_m=STILL_VIEW_OF_RIGID,

@@ -1,11 +1,12 @@
-"""Write docs/published.md from the configs in configs/published, and the table of mistakes in docs/howto.md.
+"""Write docs/published.md from the configs in configs/published, with a table of mistakes that are known from programs.
 
-python scripts/published.py            writes both
-python scripts/published.py --check    exits 1 if they are not what the code gives
+python scripts/published.py            writes the page
+python scripts/published.py --check    exits 1 if it is not what the code gives
 """
 
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from walkerlab.config.check import Check
@@ -20,23 +21,42 @@ from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 
 ROOT = Path(__file__).parent.parent
-PAGE, HOW_TO = ROOT / "docs" / "published.md", ROOT / "docs" / "howto.md"
+PAGE = ROOT / "docs" / "published.md"
+ORDER = ("explained", "partly explained", "different, unexplained", "reproduced")
 TYPICAL = 1e-3  # size of mistakes that have one, rad or s
 FOLDER = ROOT / "configs" / "published"
 HEAD = """# Published gaits, checked
 
-This page sets gaits that papers and programs print beside the right ones. Right means that two independent models
-agree on a value: the compiled one that all of walkerlab uses, and a plain one that shares no equations with it. To
-check a gait of your own, write its config with `walkerlab init my-gait.yaml --check` and type `walkerlab check
-my-gait.yaml` ([how to](howto.md#find-out-whose-third-digit-is-right)).
+Papers and programs print gaits. This page compares them with the right ones. Three stories first:
 
-A value is *reproduced* if the right one rounds to it or is cut off to it, in all of its digits or in at least three
-and half of them. Otherwise it is *different*. If values differ, the program looks for one cause that gives all of
-them: a convention, a mistake that is known from programs, or a misprint.
+- A script that many programs have copied prints 15 digits of a gait with round feet. They are wrong from the fourth
+  on, because its heel strike subtracts one term with the legs' inertia too often
+  ([passivewalker-2009](#passivewalker-2009)). A later script of the same hand has the right strike
+  ([passivewalker-sim](#passivewalker-sim)).
+- A much-quoted state of a walker with knees is not periodic ([hsu-chen-2007](#hsu-chen-2007)). The cause is unknown.
+- The paper that this project reproduces has a wrong sign in its equations, and its own fixed point shows it
+  ([adams-compass](#adams-compass)).
+
+*Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
+one that shares no equations with it. A value is *reproduced* if the right value, rounded or cut off, has its digits:
+all of them, or at least three that are also at least half. Otherwise it is *different*. If values differ, the program
+looks for one cause that gives all of them: a convention, a mistake that is known from programs, or a misprint. It is
+*explained* if there is one, and *partly explained* if a cause gives some of the values to their last digit.
+
+To check a gait of your own, write its config with `walkerlab init my-gait.yaml --check` and type `walkerlab check
+my-gait.yaml` ([how to](howto.md#find-out-whose-third-digit-is-right)). The last section lists
+[mistakes that are known](#known-mistakes), and how each changes a gait.
 
 <!-- made by scripts/published.py from configs/published -->
 """
-TAIL = """## The longest case
+TAIL = """## Known mistakes
+
+A mistake changes the gait of the compass at 3 degrees (config `slope-3deg`) or of a walker with round feet
+(`passivewalker-2009`) by this much. `I` is the inertia of a leg.
+
+{mistakes}
+
+## The longest case
 
 The study that this project reproduces prints 38 values; [the study](study.md) judges each with its evidence. Its
 words are the same: *reproduced* and *explained* mean what they mean here. *Contradicted* is a different value that
@@ -60,7 +80,7 @@ def entry(file: Path, checks: dict) -> list[str]:
     summary = check_gait(load(file).config)
     source = summary["source"]
     title = ", ".join(str(source[key]) for key in ("authors", "year") if source[key]) or source["title"]
-    checks[file.stem] = (title, summary["finding"])
+    checks[file.stem] = (title, finding_of(summary))
     heads = [column.title for column in COLUMNS]
     table = [f"| {' | '.join(heads)} |", f"|{' --- |' * len(heads)}"]
     rows = ([column.cell(row).text for column in COLUMNS] for row in summary["values"])
@@ -71,12 +91,20 @@ def entry(file: Path, checks: dict) -> list[str]:
     return [*parts, *told, command]
 
 
+def finding_of(summary: Mapping) -> str:
+    """Return what was found; partly explained if a cause gives some of the values that differ."""
+    unexplained = summary["finding"] not in ("explained", "reproduced")
+    return "partly explained" if unexplained and summary["explanations"] else summary["finding"]
+
+
 def page() -> str:
     checks: dict[str, tuple[str, str]] = {}
-    entries = [entry(file, checks) for file in sorted(FOLDER.glob("*.yaml"))]
-    rows = [f"| [{name}](#{name}) | {title} | {finding} |" for name, (title, finding) in checks.items()]
+    entries = {file.stem: entry(file, checks) for file in sorted(FOLDER.glob("*.yaml"))}
+    names = sorted(checks, key=lambda name: (ORDER.index(checks[name][1]), name))
+    rows = [f"| [{name}](#{name}) | {checks[name][0]} | {checks[name][1]} |" for name in names]
     overview = ["| gait | source | finding |\n| --- | --- | --- |\n" + "\n".join(rows)]
-    return HEAD + "\n" + "\n\n".join([*overview, *(part for each in entries for part in each if part), TAIL])
+    parts = [part for name in names for part in entries[name] if part]
+    return HEAD + "\n" + "\n\n".join([*overview, *parts, TAIL.format(mistakes=mistakes())])
 
 
 def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, PlainWalker]]]:
@@ -109,15 +137,10 @@ def mistakes() -> str:
 
 
 def main() -> int:
-    block = re.compile(r"(<!-- made by scripts/published.py: mistakes -->\n).*?(<!-- end -->)", re.DOTALL)
-    texts = {
-        PAGE: re.sub(r"[ \t]+\n", "\n", page()),
-        HOW_TO: block.sub(lambda match: f"{match[1]}{mistakes()}\n{match[2]}", HOW_TO.read_text(encoding="utf-8")),
-    }
+    text = re.sub(r"[ \t]+\n", "\n", page())
     if "--check" in sys.argv[1:]:
-        return int(any(text != path.read_text(encoding="utf-8") for path, text in texts.items()))
-    for path, text in texts.items():
-        path.write_text(text, encoding="utf-8")
+        return int(text != PAGE.read_text(encoding="utf-8"))
+    PAGE.write_text(text, encoding="utf-8")
     return 0
 
 
