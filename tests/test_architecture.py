@@ -55,7 +55,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 DOORS = {"__init__.py", "__main__.py", *(f"{wing}/__init__.py" for wing in WINGS)}
 KERNEL_LAYERS = {f"physics.{home}" for home in KERNEL_HOMES}
 COMPILER = {"physics.kernels", "physics.compiler", "physics.kernel_cache"}
-COMPILING = {"kernel", "kernel_part", "forced_inline", "by_type", "by_type_or_default"}
+COMPILING = {"kernel", "kernel_part", "forced_inline", "dispatch_by_type", "dispatch_by_type_or_default"}
 
 
 def layer_of_module(name):

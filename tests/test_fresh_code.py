@@ -120,8 +120,8 @@ def test_unwritable_cache_is_reported_once_and_workers_share_a_substitute(copy, 
 
 IN_WORKERS = """
 from walkerlab.physics.kernel_cache import cache_root
-from walkerlab.pipeline.run.workers import in_order
-print(cache_root(), *in_order([cache_root] * 4, jobs=2))
+from walkerlab.pipeline.run.workers import map_in_order
+print(cache_root(), *map_in_order([cache_root] * 4, jobs=2))
 """
 IMPORT_ALL = """
 import walkerlab, walkerlab.physics.kernels, walkerlab.physics.orbits.trial_of_code
@@ -310,7 +310,7 @@ SYSTEM = '''"""Systems of several types."""
 
 from typing import Any, NamedTuple
 
-from walkerlab.physics.kernels import by_type
+from walkerlab.physics.kernels import dispatch_by_type
 
 
 class Own(NamedTuple):
@@ -319,7 +319,7 @@ class Own(NamedTuple):
     number: float
 
 
-@by_type
+@dispatch_by_type
 def value(system: Any) -> float:
     """A number."""
 

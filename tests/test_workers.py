@@ -181,8 +181,8 @@ import sys
 print("the script runs")
 from functools import partial
 import worker_calls as calls
-from walkerlab.pipeline.run.workers import in_order
-print(list(in_order([partial(calls.square, n) for n in range(4)], 2)))
+from walkerlab.pipeline.run.workers import map_in_order
+print(list(map_in_order([partial(calls.square, n) for n in range(4)], 2)))
 """
 
 

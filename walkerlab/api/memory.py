@@ -57,6 +57,7 @@ class CompassKeys(TypedDict, total=False):
     foot_radius_m: float
     torso: Mapping[str, Setting]
     hip: Mapping[str, Setting]
+    leg_2: Mapping[str, Setting]  # keys of the second leg that differ from the first's
 
 
 class KneedKeys(TypedDict, total=False):
@@ -70,6 +71,7 @@ class KneedKeys(TypedDict, total=False):
     knee: Mapping[str, Setting]
     torso: Mapping[str, Setting]
     hip: Mapping[str, Setting]
+    leg_2: Mapping[str, Setting]  # keys of the second leg that differ from the first's
 
 
 class ContactKeys(TypedDict, total=False):

@@ -56,13 +56,15 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
 """Headline quantities of each stage; a name that ends in a dot covers all quantities below it."""
 MAX_HEADLINES: Final = 13
 OF_WALKS: Final = (
-    "work_per_step_J.", "asymmetry.", "numerical_error.", "end_time_s", "rhs_evaluations", "accepted_steps",
+    "work_per_step_J.", "asymmetry.", "gait_steps.", "step_period_s", "step_length_m", "numerical_error.",
+    "end_time_s", "rhs_evaluations", "accepted_steps",
     "rejected_steps", "energy_balance_residual_J", "slope_rad", "repeats_after", "leaves_gait_at",
 )  # fmt: skip
 QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
     "fixedpoint": (
         *HEADLINES["fixedpoint"], "residual", "energy_drift_J", "min_normal_impulse_N_s", "max_impulse_ratio",
-        "work_per_step_J.", "asymmetry.", "random_starts", "slope_rad", "gaits.", "equation_sets.",
+        "work_per_step_J.", "asymmetry.", "gait_steps.", "step_period_s", "random_starts", "slope_rad",
+        "gaits.", "equation_sets.",
     ),
     "simulate": (*HEADLINES["simulate"], *OF_WALKS, "lost_in_strikes_J"),
     "contact-sim": (

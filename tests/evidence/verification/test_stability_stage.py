@@ -83,11 +83,7 @@ def test_expected_failure_is_counted_separately_and_not_green():
 
 
 def test_page_lists_what_no_case_covers():
-    gaps = [
-        item.momentum_about
-        for block in report_of(summarise([GOOD], [], [])).blocks
-        for item in getattr(block, "items", ())
-    ]
+    gaps = [item.about for block in report_of(summarise([GOOD], [], [])).blocks for item in getattr(block, "items", ())]
     assert {"Very stiff linear springs:", "The loosest tolerances:", "ADAMS:"} <= {*gaps}
 
 

@@ -33,7 +33,7 @@ def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **cont
     ground, parts = Contact(**(law | contact)), kneed_legs(*limbs, HIP_MASS, Arc(scale * radius))
     walker = contact_walker(parts, normal_law(ground), friction_law(ground), GRAVITY, slope, rules)
     frame = Frame(scale, np.sqrt(scale / GRAVITY), locate_switching=True)
-    laid = JudgedGround(TERRAINS[ground.terrain](scale * STEP), frame)
+    laid = JudgedGround(TERRAINS[ground.terrain](scale * STEP, 0.0), frame)
     return ContactScene(walker, laid, False, scale * STEP, parts)
 
 

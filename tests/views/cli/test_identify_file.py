@@ -54,7 +54,7 @@ def test_exported_steps_are_identified_and_written_as_a_config(walker):
 def test_exported_steps_are_read_back_unchanged(walker, config, model):
     assert walker(model, "-c", config, "--set", "strides=4", "--name", "walk").returncode == 0
     assert walker("export", "walk", "steps", "--model", model, "--to", "csv", "-o", "steps.csv").returncode == 0
-    measured = read_steps(walker.folder / "steps.csv", Identify())
+    measured = read_steps(walker.folder / "steps.csv", Identify(), 0.0)
     with h5py.File(walker.folder / "runs" / "walk" / f"{model}.h5") as file:
         steps, angle = file["steps"], file["trajectory/angle"][:]
         assert measured.periods_s.tolist() == steps["period_s"][:].tolist()
@@ -79,7 +79,7 @@ def test_exported_steps_are_read_back_unchanged(walker, config, model):
 def test_table_of_steps_from_a_spreadsheet_is_read(tmp_path, text):
     path = tmp_path / "steps.csv"
     path.write_text(text)
-    measured = read_steps(path, Identify())
+    measured = read_steps(path, Identify(), 0.0)
     assert measured.periods_s.tolist() == [0.7036, 0.704]
     assert measured.lengths_m.tolist() == [0.3714, 0.3716]
 
@@ -88,11 +88,11 @@ def test_step_columns_may_have_a_unit_suffix(tmp_path):
     path = tmp_path / "steps.csv"
     path.write_text("duration (ms),step [mm]\n703.6,371.4\n704.0,371.6\n")
     columns = {"period_s": "duration", "length_m": "step [mm]"}
-    assert read_steps(path, Identify(columns=columns)).lengths_m == pytest.approx([0.3714, 0.3716])
+    assert read_steps(path, Identify(columns=columns), 0.0).lengths_m == pytest.approx([0.3714, 0.3716])
     with pytest.raises(ConfigError, match="is in mm, but --units that it is in m"):
-        read_steps(path, Identify(columns=columns, units={"length": "m"}))
+        read_steps(path, Identify(columns=columns, units={"length": "m"}), 0.0)
     with pytest.raises(ConfigError, match="'lenght' is neither a kind, a quantity nor a column"):
-        read_steps(path, Identify(columns=columns, units={"lenght": "mm"}))
+        read_steps(path, Identify(columns=columns, units={"lenght": "mm"}), 0.0)
 
 
 def test_missing_file_is_quoted_as_typed(walker):

@@ -102,6 +102,7 @@ ON_DEMAND = (
     "families",
     "basin",
     "engines.section",
+    "check.section",
     "robustness",
     "identification",
     "sections.plan",

@@ -28,8 +28,10 @@ from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING
 from walkerlab.evidence.check.printed import (
     DIFFERENT,
     EXACT_ERROR,
+    EXPLAINED,
     NOT_COMPARABLE,
     REPRODUCED,
+    UNEXPLAINED,
     Item,
     Judgement,
     items_of,
@@ -45,8 +47,6 @@ SAME_GAIT: Final = 1e-6
 CHOSEN: Final = "chosen"
 PREFERENCE: Final = 0.5  # factor on the distance of the gait that `fixedpoint` chooses
 SMALL_VALUE: Final = 1e-3  # of a printed value, below which differences count absolutely
-EXPLAINED = "explained"
-UNEXPLAINED = "different, unexplained"
 OF_GAITS: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
     "energy_J", "energy_drift_J", "cost_of_transport", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m",

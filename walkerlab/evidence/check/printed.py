@@ -12,6 +12,8 @@ from walkerlab.config.check import Digits, PrintedValue, parse_printed
 REPRODUCED = "reproduced"
 DIFFERENT = "different"
 NOT_COMPARABLE = "not-comparable"
+EXPLAINED = "explained"
+UNEXPLAINED = "different, unexplained"
 FEWEST_DIGITS = 3  # that must agree if not all do; also at least half of them
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
 """Numerical error of right values (relative to 1 or to the value) by quantity; of all others `EXACT_ERROR`."""

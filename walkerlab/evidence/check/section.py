@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from walkerlab.evidence.check.answer import EXPLAINED, UNEXPLAINED
-from walkerlab.evidence.check.printed import DIFFERENT, NOT_COMPARABLE, REPRODUCED
+from walkerlab.evidence.check.printed import DIFFERENT, EXPLAINED, NOT_COMPARABLE, REPRODUCED, UNEXPLAINED
 from walkerlab.labels import join_words
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
 from walkerlab.views.report.numbers import count, number

@@ -10,7 +10,6 @@ from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult
 from walkerlab.physics.hybrid.walk_record import Array
 from walkerlab.physics.kernels import kernel
 from walkerlab.physics.mechanics import rigid_model
-from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.rigid_model import (
     BENT,
     STANCE,
@@ -75,7 +74,7 @@ def footholds_of(walk: RigidWalkResult) -> FootholdsOfWalk:
 
 def places(
     walker: RigidModel,
-    knees_m: tuple[Position, ...],
+    knees_m: tuple[tuple[float, float], ...],
     footholds: FootholdsOfWalk,
     angle: Array,
     step: NDArray[np.int64],

@@ -77,12 +77,16 @@ STAGES = tuple(by_name.values())
 
 
 def complete(drawing: Stage) -> Stage:
-    """Add the stages to a drawing that say that it needs or shows their results."""
-    needed = tuple(stage.name for stage in STAGES if drawing.name in stage.needed_by)
+    """Add the stages to a drawing that say that it needs or shows their results.
+
+    A stage whose block has its own name is needed only by configs with that block.
+    """
+    needed = tuple(stage for stage in STAGES if drawing.name in stage.needed_by)
     shown = tuple(stage.name for stage in STAGES if drawing.name in stage.shown_by)
 
     def inputs(config: Config) -> tuple[str, ...]:
-        return (*drawing.inputs(config), *needed)
+        own = (stage.name for stage in needed if stage.name not in stage.requires or getattr(config, stage.name))
+        return (*drawing.inputs(config), *own)
 
     return replace(drawing, inputs=inputs, if_current=(*drawing.if_current, *shown))
 

@@ -109,6 +109,8 @@ def execute(
     if changes and options.dry:
         refuse_another_config(folder, config)
     if changes and not options.dry:
+        for stage in (step.stage for step in steps if step.action == "run"):
+            stage.checks(config)
         reused = "" if options.force else "; its results will be reused"
         with folder.locked(options.wait, lambda message: run.reporter.note(message + reused)):
             claim(folder, config)

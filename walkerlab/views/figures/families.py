@@ -281,7 +281,7 @@ FARTHEST: Final = 1.6
 def draw_multipliers(results: Results) -> Drawn:
     """Plot multipliers in the complex plane (left) and their magnitudes over the parameter (right)."""
     (figure, (left, right)), largest = panels(3.6, 1, 2), 0.0
-    branches = branches_of(results)
+    branches = list(branches_of(results))
     shortest = min((branch.period for branch in branches), default=1)  # 2 steps for legs that differ
     drawn = [branch for branch in branches if branch.period == shortest]
     looks = {model: cycle(zip(colours, DASHES, strict=False)) for model, colours in GAITS.items()}
