@@ -80,7 +80,7 @@ def test_stages_do_not_depend_on_the_python_interface():
     assert "walkerlab.api" not in names
 
 
-def test_python_refuses_a_case_name_of_the_catalogue_as_commands_do(tmp_path):
+def test_python_rejects_a_case_name_that_the_catalogue_uses(tmp_path):
     case = {"name": "moon", "expected": ["walked"], "reason": "a name that is taken"}
     with pytest.raises(ConfigError, match="The catalogue already has cases named moon"):
         walkerlab.run("fixedpoint", set={"stability.cases": [case]}, runs=tmp_path)

@@ -18,7 +18,7 @@ def loaded_by(code, *arguments):
     return done.stderr.splitlines()[-1].split()
 
 
-def test_bare_process_walks_and_loads_no_heavy_package(tmp_path):
+def test_walking_from_a_bare_script_imports_no_heavy_package(tmp_path):
     assert loaded_by(SCRIPT["BARE"], str(tmp_path / "bare.h5")) == []
     assert (tmp_path / "bare.h5").stat().st_size > 0
 

@@ -276,7 +276,7 @@ def read_scans(file: Path) -> dict[str, Any]:
 
 
 def write_scans(file: Path, scans: Mapping[str, Any]) -> None:
-    """Store the latest scans, of folders that have settled. If that fails, the next process scans again."""
+    """Store the latest scans of folders that have not just changed. If this fails, the next process scans again."""
     now = time.time_ns()
     settled = {folder: entry for folder, entry in scans.items() if now - entry[0] > SETTLED_NS}
     temporary = file.with_name(f"{file.name}.{os.getpid()}")

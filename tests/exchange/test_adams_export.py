@@ -84,7 +84,7 @@ def random_states(export, count=5):
 
 
 @pytest.mark.parametrize("seed", range(len(WALKERS)), ids=WALKERS)
-def test_exported_masses_and_gravity_equal_the_models(seed):
+def test_exported_masses_and_gravity_match_the_model(seed):
     walker = random_walker(seed)
     dataset, export = without_forces(dataset_of("functions", *walker)), export_of(*walker)
     for q, _ in random_states(export):

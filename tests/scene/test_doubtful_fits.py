@@ -210,7 +210,7 @@ def test_bound_without_influence_raises_no_doubt():
     ("key", "value"),
     [(LEG, 1.0), ("walker.foot_to_mass_m", 0.5), ("walker.leg_mass_kg", 5.0), ("walker.leg_inertia_kg_m2", 0.0)],
 )
-def test_sensitivities_are_what_a_fit_with_another_fixed_value_changes(key, value):
+def test_sensitivities_predict_how_estimates_change_with_a_fixed_value(key, value):
     fit = {"slope_deg": None, HIP: None}
     (before, entries), share = fitted_with_sensitivities(key), 0.01
     changed = value + share * entries["slope_deg"].change

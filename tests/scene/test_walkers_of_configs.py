@@ -94,7 +94,7 @@ def test_kneed_walker_with_feet_ahead_equals_its_description_by_parts(radius_m):
             np.testing.assert_allclose(number, same, rtol=1e-14, atol=1e-16)
 
 
-def test_kneed_walker_with_feet_ahead_has_the_published_gait():
+def test_gait_of_a_kneed_walker_with_feet_ahead_agrees_with_independent_code():
     """The numbers are those of independent code for the walker put together from its parts."""
     gait = find_gaits(rigid_walker(kneed_with_feet_ahead(0.2))).gait
     assert gait.period == pytest.approx(0.8295992430, abs=1e-9)

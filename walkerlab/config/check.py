@@ -117,8 +117,8 @@ class PrintedAngles(_From):
     second: Literal["absolute", "relative", "stance-minus-swing"] = key(
         "absolute",
         "",
-        "angle of the second leg: like the first one, or relative: swing leg minus stance leg (a shank's: minus its "
-        "thigh's); stance-minus-swing is the opposite",
+        "angle of the second leg: absolute, like the first one; relative, swing leg minus stance leg (a shank's: minus "
+        "its thigh's); or stance-minus-swing, with the opposite sign",
     )
     unit: Literal["rad", "deg"] = key("rad", "", "unit of the angles, and of the rates per second")
     positive: Literal["counter-clockwise", "clockwise"] = key(

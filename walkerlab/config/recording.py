@@ -88,7 +88,7 @@ class RecordedFile(Recorded):
         "",
         "",
         "file with the walk: CSV, ADAMS, OpenSim, markers, or a stored walk of a run",
-        bounds="a path, from the current folder",
+        bounds="a path, relative to the current folder",
         default_in_words="none",
     )
     name: Text = key(

@@ -228,7 +228,10 @@ def with_likely_places(recording: Recording, lines: Sequence[str], least: float 
 
 
 def without_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
-    """Return a recording with gaps where angles stand still for some samples and then leap, as fillers of gaps do."""
+    """Return the recording with gaps in place of angles that stand still for some samples and then leap.
+
+    Software that fills gaps leaves such angles.
+    """
     for name in names:
         if name in recording.problems:
             continue
@@ -541,7 +544,7 @@ def missing(recording: Recording, name: str) -> ConfigError:
 
 
 def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Collection[str]) -> None:
-    """Raise ConfigError for a unit of something that is neither a kind, a quantity nor a column, or of another kind."""
+    """Raise ConfigError if a unit is stated for something unknown, or is of another kind."""
     for name, unit in units.items():
         if name not in (*UNIT_VALUES, *quantities, *recording.columns):
             near = get_close_matches(name, (*UNIT_VALUES, *quantities, *recording.columns), 1)

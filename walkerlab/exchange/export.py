@@ -67,7 +67,9 @@ def export_model(
         script = {f"{stem}.py": mjcf.script_text()} if mjcf.parts_of_script(export) else {}
         return ExportedFiles({f"{stem}.xml": mjcf.walker_text(export, head, slope)} | script, left_out)
     if slope == "geometry":
-        raise ConfigError("--slope geometry: models for ADAMS have tilted gravity.", "Leave it out for ADAMS.")
+        raise ConfigError(
+            "--slope geometry is for MuJoCo: models for ADAMS have tilted gravity.", "Leave it out for ADAMS."
+        )
     model = adams_model(export, law)
     pinned_until_s = export.touches_s[0] if export.pinned and export.touches_s else None
     if kind == "cmd":

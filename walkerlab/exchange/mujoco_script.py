@@ -77,7 +77,7 @@ class Walk:
             self.drive(1 - self.stance)
 
     def look_for_touch(self) -> None:
-        """Swap feet if the swing foot is on the ground ahead of the stance foot, its knee locked."""
+        """Swap feet if the swing foot is on the ground ahead of the stance foot and its knee is locked."""
         data = self.data
         swing = 1 - self.stance
         if (self.knees and not data.eq_active[self.locks[swing]]) or self.feet[swing] not in data.contact.geom:

@@ -396,7 +396,9 @@ def seconds_of(cell: str) -> float:
 
 
 def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callable[[], bool]) -> tuple[Array, str]:
-    """Parse the cells of a column, and return the values and '', or incomplete values and the reason.
+    """Parse the cells of a column.
+
+    Returns the values and '', or, if a cell is no number, incomplete values and the reason.
 
     lines       line number of each cell
     has_points  returns whether the file has numbers with a decimal point

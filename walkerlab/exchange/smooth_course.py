@@ -1,9 +1,9 @@
-"""Find samples at which recorded leg angles leave their smooth course, and samples from which they stay beside it.
+"""Find samples at which recorded leg angles leave their smooth course, and samples from which on they stay off it.
 
 Within a step each angle is smooth, and at a heel strike only the rates jump. So polynomials through the step before and
 the step after a strike, which meet there, describe the angles of both legs. A stretch of samples is off that course if
 a constant added to it explains much more of the residuals than scatter does, and more than in typical steps. The strike
-is sought anew with every stretch, because a wrong sample near a strike moves it.
+is located again for every stretch, because a wrong sample near a strike moves it.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class Strike:
         return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
 
     def best_with_strike(self) -> tuple[Stretch, float]:
-        """Return the stretch that, with the strike where it then is, leaves least. And how much it leaves (rad^2)."""
+        """Return the stretch that minimises the squared residuals (rad^2) with the best strike, and the minimum."""
 
         def left(at: float) -> float:
             return float(np.sum(self.fit(at)[1] ** 2)) - self.best_stretch(at).explained

@@ -122,7 +122,8 @@ def merge_repeats(crossings: Sequence[tuple[float, int]], apart_s: float) -> lis
 def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> Touch | None:
     """Return the heel strike with which a recording begins, or None if it begins at another instant.
 
-    The height fitted at the first sample is zero within three of its standard errors, which are small in time.
+    The first sample counts as a heel strike if the height fitted there is zero within three of its standard errors, and
+    if these are short when expressed as a time.
     """
     spread = angle[:, 0] - angle[:, 1]
     begin = float(time[0])

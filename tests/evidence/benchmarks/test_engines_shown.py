@@ -126,7 +126,7 @@ def test_columns_have_the_same_label_in_file_terminal_and_report(results, made):
     assert shown == pytest.approx([1e6 * row.step_s for row in ROWS if row.experiment == "same-law"])
 
 
-def test_every_value_of_a_run_is_stored_and_missing_ones_are_gaps(results):
+def test_values_of_a_run_are_stored_and_missing_values_become_gaps(results):
     group = results["engines"]["rows"]
     for name in labels_of(EngineRow):
         told = [None if value != value else value for value in group[name].tolist()]

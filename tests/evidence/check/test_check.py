@@ -73,7 +73,7 @@ def test_what_is_no_printed_value_is_not_read(text):
 @pytest.mark.parametrize(
     "name", ["paper", "kneed", "kneed-round-feet", "round-feet", "simplest", "torso", "kuo", "level", "kneed-level"]
 )
-def test_both_routes_agree_on_every_built_in_walker(name):
+def test_compiled_and_plain_models_agree_on_built_in_walkers(name):
     config = load(Path(name)).config
     answer = check_gait(config.model_copy(update={"check": Check()}))
     assert answer["routes"]["agree"]
@@ -304,7 +304,7 @@ def test_a_state_is_typed_on_the_command_line():
     assert "Right: 4 printed values reproduced to the last digit." in done.output
 
 
-def test_init_writes_a_printed_gait_to_fill_in(tmp_path):
+def test_init_writes_a_form_for_a_printed_gait(tmp_path):
     file = tmp_path / "my-gait.yaml"
     done = CliRunner().invoke(program(), ["init", str(file), "--check", "--type", "kneed"])
     assert f"walkerlab check {file}" in done.output

@@ -128,7 +128,7 @@ def test_smooth_ground_has_no_tangential_force():
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
-def test_smooth_ground_equals_zero_friction_coefficients(theta, omega, slip, vertical_velocity, depth, foot):
+def test_smooth_ground_acts_like_zero_friction_coefficients(theta, omega, slip, vertical_velocity, depth, foot):
     smooth, none = ground.compass(friction=ground.SMOOTH), ground.compass(friction=Coulomb(0.0, 0.0, 0.1, 1.0))
     state = ground.placed(smooth, foot, depth, theta, omega, slip, vertical_velocity)
     assert rate_of(place_on_ground(smooth, BOTH), state) == rate_of(place_on_ground(none, BOTH), state)

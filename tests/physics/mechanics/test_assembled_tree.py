@@ -91,7 +91,7 @@ def test_pinned_walker_with_torso_and_knee_obeys_lagrange_equations(lagrange, th
 
 
 @given(theta=angles, omega=rates, velocity=speeds)
-def test_integrated_walker_with_four_bodies_obeys_lagrange_equations(lagrange, theta, omega, velocity):
+def test_motion_of_a_four_body_walker_obeys_lagranges_equations(lagrange, theta, omega, velocity):
     M, bias, weight = lagrange(theta, omega, velocity, GRAVITY)
     expected = np.linalg.solve(M, -(bias + weight).ravel())
     rate = rate_of(place_on_ground(flying_walker(), IN_THE_AIR), (0.0, 5.0, *theta, *velocity, *omega))

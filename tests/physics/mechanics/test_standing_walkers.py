@@ -229,7 +229,7 @@ def test_jacobian_equals_the_slope_of_the_rates(phase, numbers):
 
 @pytest.mark.parametrize("phase", [BENT, STRAIGHT])
 @given(numbers=free)
-def test_tangent_columns_change_at_the_rate_of_the_jacobian(phase, numbers):
+def test_tangent_columns_obey_the_linearised_equations(phase, numbers):
     y, directions = np.array(kneed_state(numbers)), np.random.default_rng(0).normal(size=(3, 8))
     J, f = np.zeros((8, 8)), np.full(32, np.nan)
     mode_jacobian(Mode(KNEED, phase), 0.0, y, J)

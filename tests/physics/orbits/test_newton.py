@@ -34,7 +34,7 @@ def test_overshooting_newton_step_is_halved_on_request():
     assert isinstance(newton(flat_arc(), np.array([3.0]), Effort(1e-14)), NotConverged)
 
 
-def test_newton_step_without_a_value_is_halved_or_reported():
+def test_newton_step_out_of_the_domain_is_halved_or_reported():
     def root():
         return Counted(lambda x: np.sqrt(x) - 0.1, lambda x: 0.5 / np.sqrt(x))
 

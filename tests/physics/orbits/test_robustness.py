@@ -144,7 +144,7 @@ def test_hip_push_comes_after_the_release_of_the_trailing_knee():
 # ---- large disturbances --------------------------------------------------------------------------------------------
 
 
-def test_compass_at_three_degrees_survives_the_known_drops():
+def test_largest_drops_at_three_degrees_match_the_known_values():
     at = standpoint("slope-3deg", tolerances=LONG_WALKS)
     down, up = (largest_disturbance(at, "floor-drop", sign, 50) for sign in (1.0, -1.0))
     assert down == pytest.approx(14.37e-3, rel=5e-3)
@@ -194,7 +194,7 @@ def rimless_wheel(deviation_deg, walks, most, seed=0):
 
 
 @pytest.mark.parametrize(("deviation", "mean"), [(2.5, 412.0), (3.0, 114.0)])
-def test_mean_steps_of_the_rimless_wheel_are_as_published(deviation, mean):
+def test_rimless_wheel_takes_the_published_mean_number_of_steps(deviation, mean):
     """Byl and Tedrake, Metastable walking machines, IJRR 28 (2009), by the recomputed map."""
     for most, method in ((20_000, "all-failed"), (round(mean), "censored")):
         seen = rough_walks(rimless_wheel(deviation, 4000, most), most)

@@ -118,7 +118,7 @@ def stepped(scene, z, tolerance):
 
 
 @pytest.mark.parametrize("z", [NEAR_THE_GAIT, NEAR_THE_GAIT + ASIDE], ids=["at the gait", "off it"])
-def test_contact_step_derivative_equals_its_slope(scene, z):
+def test_contact_step_derivative_equals_finite_differences(scene, z):
     """Through touches, releases and every other switching point of the force law, where the Jacobian jumps."""
     slope = slope_of(lambda z: stepped(scene, z, 1e-12).z, z, STEPS)
     np.testing.assert_allclose(stepped(scene, z, 1e-12).DP, slope, rtol=0.0, atol=AGREEMENT)

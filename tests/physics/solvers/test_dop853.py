@@ -63,7 +63,7 @@ def test_solution_meets_every_order_condition_up_to_8(order):
     assert defects(B, order) == pytest.approx([0.0] * len(rooted_trees.trees(order)), abs=1e-14)
 
 
-def test_solution_fails_an_order_condition_of_order_9():
+def test_dop853_is_not_of_order_9():
     assert max(map(abs, defects(B, 9))) > 1e-9
 
 

@@ -271,7 +271,7 @@ def test_step_without_a_foot_lift_has_no_slip_value(monkeypatch):
     assert np.isfinite(cut["steps"]["touch_time_s"]).all()
 
 
-def test_pinned_walk_that_scuffs_touches_the_ground_and_balances_energy():
+def test_energy_balances_when_a_pinned_walker_scuffs_and_falls():
     """The rigid gait on 3 degrees: pulled down by its scuffing foot it falls before its first step."""
     gait = Content({}, {"state": [-0.3233886, 0.2186688, -0.3773739, -1.0923836], "step_length_m": 0.5354454})
     scuffing = ("contact.stance=pinned", "contact.terrain=plane", "slope_deg=3")

@@ -81,7 +81,7 @@ def test_both_models_survive_similar_disturbances(both):
     assert pushes[1]["forward_N_s"] == pytest.approx(pushes[0]["forward_N_s"], rel=0.2)
 
 
-def test_derivative_by_a_slope_in_degrees_is_per_degree(rigid):
+def test_sensitivity_to_slope_deg_is_per_degree(rigid):
     found = {(row["of"], row["to"]): row for row in rigid.summary["sensitivity"]}
     one = found["step_length_m", "slope_deg"]
     assert one["unit"] == "m per deg"

@@ -487,7 +487,7 @@ def test_gaits_have_no_heading_with_one_set_of_equations():
     ]
 
 
-def test_required_friction_is_stated_once_without_contact():
+def test_config_without_contact_states_the_required_friction_once():
     walk = simulate()
     walk = stored("simulate", walk.groups, walk.summary | {"max_friction_ratio": 0.203})
     made = assumptions(Results(config("contact=null"), {"simulate": walk}))

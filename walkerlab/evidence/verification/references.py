@@ -72,8 +72,9 @@ def wheel_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0)
 
 
 def wheel_upright_speed(spokes: int, slope: float, gravity: float, inertia: float = 0.0) -> float:
-    """Return the angular speed (rad/s) when a spoke is normal to the slope, since energy is conserved after
-    the impact.
+    """Return the angular speed (rad/s) at which a spoke passes the normal of the slope.
+
+    It follows from the speed after the impact, because energy is conserved until the next one.
     """
     half = math.pi / spokes
     climbed = 2.0 * gravity * (math.cos(slope) - math.cos(half - slope)) / (1.0 + inertia)

@@ -228,7 +228,7 @@ def most_likely(reduced: Floats) -> tuple[Floats, Floats, Any, Any]:
 
 
 def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Floats:
-    """Return the most probable heights (m) and kicks (heights + kicks,) at a step (unknowns,) of the unknowns."""
+    """Return the most probable heights (m) and kicks (heights + kicks,) after the unknowns change by `move`."""
     scale = 1.0 / noise.measurement[rows.quantity]
     left = scale * (rows.fixed @ np.append(1.0, -move))
     spread = noise.spread(rows.G.shape[1], rows.kicks)

@@ -73,8 +73,9 @@ def sample_feet(walker: ContactWalker, samples: ContactSamples) -> Floats:
 
 @kernel
 def fill_energies(system: OnGround, samples: ContactSamples, energies: Any) -> None:
-    """Write the energies of all samples into `energies`. This overwrites ground and knees of `system`, the
-    free walker.
+    """Write the energies of all samples into `energies`.
+
+    This overwrites the ground and knee states of `system`, which must be the free walker.
     """
     for i in range(samples.states.shape[0]):
         for k in range(2):

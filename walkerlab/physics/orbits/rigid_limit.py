@@ -1,7 +1,7 @@
 """Convergence of the contact model to the rigid one as parameters of its contact approach the rigid limit.
 
 The parameters are stiffness k, damping c and stiction velocity v_s. The full-damping penetration d_max shrinks with the
-static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if all three vary.
+static penetration as k grows, and the friction velocity v_d with v_s. A push-off is shortened if they vary together.
 """
 
 import math
@@ -93,7 +93,7 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
 
 @dataclass(frozen=True)
 class Distance:
-    """Differences of a setting's gait and walk from the rigid ones, with their numerical errors."""
+    """How far gait and walk at one contact setting are from the rigid ones, with numerical errors."""
 
     # Quantities of the walk are None if no walk is compared.
 

@@ -34,7 +34,7 @@ from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds, and a function that returns a config's step map over the parameter."""
-SHORTEST_REACH = 1e-9  # part of the span over which a branch must lead
+SHORTEST_REACH = 1e-9  # fraction of the span; a branch that covers less counts as a single gait
 LOOKED_AT = 5  # number of values in the span, ends included, at which the search looks for gaits
 TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
 OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured

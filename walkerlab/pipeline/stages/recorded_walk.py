@@ -63,7 +63,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
 
 
 def with_found_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
-    """Return a walk whose angles are from the vertical, by the tilt at which rates of legs jump at heel strikes."""
+    """Return the walk without the camera's tilt, for which the legs' rates jump at the heel strikes."""
     tilt = find_tilt(walk, model)
     upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
     doubt = f"The camera's tilt is {math.degrees(tilt):.2f} degrees, found where the rates of the legs jump."

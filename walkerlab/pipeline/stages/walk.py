@@ -36,7 +36,7 @@ MAX_BETWEEN = 50_000
 """Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
 MIN_REPEATED = 4
 MAX_REPEATED = 32
-"""Numbers of steps at the end of a walk that may repeat: minimum, and maximum unless a quarter of the walk is more."""
+"""Minimum and maximum number of last steps tested for repetition, or a quarter of the walk if that is more."""
 FEWEST_SETTLED = 8
 """Fewest last steps in which a walk that has just settled may repeat."""
 REPEATED = 1e-5

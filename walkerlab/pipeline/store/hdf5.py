@@ -250,7 +250,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
 
 
 def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
-    """Read strings a few at a time, so that the budget stops many references to one long string."""
+    """Read strings a few at a time, so that the budget also catches many references to one long string."""
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
     values = np.empty(dataset.shape, dtype=object)

@@ -23,7 +23,7 @@ RECORD_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Record:
-    """Record of a folder's run and config, since results taken over from another run hold the config of that run."""
+    """Name and config of a folder's run. Results that were taken over from another run hold that run's config."""
 
     run: str  # name of the folder when the record was written
     source: str  # origin of the config, as in `RunFolder`
