@@ -47,7 +47,7 @@ def test_ci_runs_the_report_command_in_an_empty_folder():
 
 def test_ci_runs_the_test_command_verbatim():
     assert f'readme_test="{BLOCKS[1].strip()}"' in CHECK
-    assert 'part 1800 "README: test" bash -euc "$readme_test"' in CHECK
+    assert 'part 2700 "README: test" bash -euc "$readme_test"' in CHECK
 
 
 def test_ci_names_no_package_index():
