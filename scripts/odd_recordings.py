@@ -173,7 +173,7 @@ def main() -> None:
                 ends["read"] += 1
             except (ConfigError, NoAnswer):
                 ends["refused"] += 1
-            except Exception:
+            except Exception:  # a traceback is what is looked for
                 ends["traceback"] += 1
                 print(number, name, change.__name__, options, columns, flush=True)
                 print("".join(traceback.format_exc().splitlines(keepends=True)[-5:]), flush=True)

@@ -201,7 +201,7 @@ def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> An
 
 
 def second_leg_in_words(walker: Any) -> str:
-    """List the keys of leg 2 that a config states, with their values. The list is empty if it states none."""
+    """Describe the keys of leg 2 that a config states, with their values, or return '' if it states none."""
     leg = getattr(walker, "leg_2", None)
     keys = {} if leg is None else leg.model_dump(exclude_none=True)
     stated = []

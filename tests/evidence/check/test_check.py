@@ -212,8 +212,8 @@ def test_a_misprinted_parameter_is_found():
 def test_a_lost_sign_and_transposed_digits_are_misprints():
     lost = walkerlab.check("paper", {"state": ["-0.204200", "0.169400", "0.605819", "-0.861041"]})
     swapped = walkerlab.check("paper", {"state": ["-0.204200", "0.169400", "-0.605819", "-0.816041"]})
-    assert lost.explanations[0]["what"] == "the sign of the printed state, swing rate is wrong"
-    assert swapped.explanations[0]["what"] == "two digits of the printed state, stance rate are transposed"
+    assert lost.explanations[0]["what"] == "the sign of the printed swing rate is wrong"
+    assert swapped.explanations[0]["what"] == "two digits of the printed stance rate are transposed"
 
 
 def test_one_value_is_never_explained():

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from operator import itemgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -77,9 +78,10 @@ class Question:
         return len(self.reproduced(walk, convention)) == len(self.items)
 
     def explained_by(self, attempt: Attempt) -> Explanation | None:
-        """Return the explanation that a gait is, None if it is none.
+        """Return what the gait of an attempt explains, or None if it explains too little.
 
-        It must have every digit of all numbers, or at least of all states, of three or more numbers that are not right.
+        The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
+        right.
         """
         reproduced = self.reproduced(attempt.gait)
         others = [item for item in self.items if item not in reproduced]
@@ -167,20 +169,18 @@ def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | Non
 
 
 def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
-    """Return the cause that brings a gait much closer to the printed values, None if no cause does."""
+    """Return the cause that brings a gait much closer to the printed values, or None if no cause does."""
     if not question.quick_items:
         return None
     without = question.miss(question.right)
-    miss, attempt = min(((question.miss(each.gait), each) for each in attempts), default=(math.inf, None), key=first)
+    miss, attempt = min(
+        ((question.miss(each.gait), each) for each in attempts), default=(math.inf, None), key=itemgetter(0)
+    )
     if attempt is None or miss * MUCH_CLOSER > without:
         return None
     kind = attempt.candidate.kind
     what = attempt.candidate.what
     return {"kind": kind, "what": what, "miss_in_units": miss, "without_in_units": without}
-
-
-def first(pair: tuple[float, Any]) -> float:
-    return pair[0]
 
 
 def candidates(question: Question) -> Iterator[Candidate]:
@@ -324,7 +324,7 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     if right is None:
         return
     item = wrong[0]
-    name = wrong[0].name.replace("_", " ").replace(".", ", ")
+    name = item.name.removeprefix("state.").replace("_", " ").replace(".", ", ")
     printed = item.printed.real.value
     reproduced = [each for each in question.items if each in question.right_items or each is item]
     if item.fits(-right):

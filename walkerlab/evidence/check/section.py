@@ -72,12 +72,14 @@ def headline(summary: Row) -> str:
     if finding == EXPLAINED and len(explanations) == 1:
         return f"Explained: {follow(explanations[0], rows)} if {explanations[0]['what']}."
     if finding == EXPLAINED:
-        return f"Explained, but not by one cause alone: {count(len(explanations), 'cause')} fit the printed digits."
+        return f"Explained, but by more than one cause: each of {len(explanations)} fits the printed digits."
     assert finding == UNEXPLAINED
-    many = len(rows) > 1
-    why_not = "no known convention, mistake or misprint reproduces them all" if many else "one value does not tell why"
-    what = f"{len(wrong)} of {len(rows)} printed values differ" if many else "the printed value differs"
-    return f"Different, unexplained: {what}, and {why_not}."
+    if len(rows) == 1:
+        return "Different, unexplained: the printed value differs, and one value does not tell why."
+    what = f"{len(wrong)} of {len(rows)} printed values differ"
+    if explanations:
+        return f"Different, partly explained: {what}, and no cause found reproduces more than some of them."
+    return f"Different, unexplained: {what}, and no known convention, mistake or misprint reproduces them all."
 
 
 def follow(explanation: Row, rows: Sequence[Row]) -> str:
