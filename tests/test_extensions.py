@@ -146,6 +146,63 @@ def test_editing_a_law_invalidates_results_but_editing_a_figure_does_not(walked)
     assert stale(site) == set()
 
 
+HUNT_CROSSLEY = """
+from typing import NamedTuple
+from walkerlab.physics.ground.normal_force import NormalForce, elastic_energy, normal_force, release_function
+from walkerlab.physics.ground.resting import resting_foot
+
+class HuntCrossley(NamedTuple):
+    k: float
+    exponent: float
+    a: float
+
+    @classmethod
+    def of(cls, contact):
+        return cls(contact.stiffness, contact.exponent, 1e-3 * contact.damping)
+
+    def resting_foot(self, weight, mass):
+        depth = (weight / self.k) ** (1.0 / self.exponent)
+        return resting_foot(weight, mass, self.k, self.exponent, self.a * self.k * depth**self.exponent)
+
+    def stiffen(self, stiffness, damping, penetration):
+        return self._replace(k=self.k * stiffness, a=self.a * damping / stiffness)
+
+@normal_force.case(HuntCrossley)
+def force(law, d, rate):
+    spring, factor = law.k * d**law.exponent, 1.0 + law.a * rate
+    if factor <= 0.0:
+        return NormalForce(0.0, spring, 0.0, 0.0)
+    return NormalForce(spring * factor, spring, law.exponent * spring / d * factor, law.a * spring)
+
+@release_function.case(HuntCrossley)
+def release(law, d, rate):
+    return 1.0 + law.a * rate
+
+@elastic_energy.case(HuntCrossley)
+def energy(law, d):
+    return law.k * max(d, 0.0) ** (law.exponent + 1.0) / (law.exponent + 1.0)
+"""
+
+
+def test_walk_on_the_normal_force_of_an_extension_balances_its_energy(site):
+    declaration = "Extension(1, normal_force={'hunt-crossley': 'hunt_crossley_law:HuntCrossley'})"
+    add(site.packages, "hunt-crossley", f"from walkerlab.extensions import Extension\nEXTENSION = {declaration}\n")
+    (site.packages / "hunt_crossley_law.py").write_text(HUNT_CROSSLEY)
+    walk = ("contact-sim", "-c", "slope-3deg", "--strides", "1", "--jobs", "1", "--json", "--set")
+    method = ("--set", "solver.contact.method=scipy-lsoda")
+    done = site(*walk, "contact.normal_force=hunt-crossley", *method)
+    assert done.returncode == 0, done.stderr
+    own = json.loads(done.stdout)
+    assert own["outcome"] == "walked"
+    assert abs(own["energy_balance_residual_J"]) < 1e-4 * own["dissipated_J"]["damping"]
+    adams = json.loads(site(*walk, "contact.normal_force=impact", *method).stdout)
+    assert own["step_period_s"] == pytest.approx(adams["step_period_s"], rel=0.02)
+    assert own["step_period_s"] != adams["step_period_s"]
+    done = site("export", "paper", "model", "--to", "adm", "--set", "contact.normal_force=hunt-crossley")
+    assert done.returncode == 3
+    assert "The normal-force law HuntCrossley cannot be exported." in done.stderr
+
+
 KERNEL = """
 import math
 from types import SimpleNamespace

@@ -29,7 +29,11 @@ BUILT_IN: Final = walkerlab.__name__
 GROUP: Final = "walkerlab.extensions"
 INTERFACE: Final = 1
 """Version of the interface, that is, of the fields of `Extension` and `Study`."""
-WORDS: Final[Mapping[str, tuple[str, ...]]] = {"equations": ("corrected",), "friction": ("coulomb", "none")}
+WORDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "equations": ("corrected",),
+    "normal_force": ("impact",),
+    "friction": ("coulomb", "none"),
+}
 """The package's own words of config keys to which extensions add words, by the last part of the key."""
 SLOTS: Final = ("task", "walks", "evidence", "benchmarks")
 """Places of the page where extensions add sections: after the task, the walks, the models, and the accuracy."""
@@ -55,6 +59,7 @@ class Extension:
     sections: Mapping[str, Sequence[str]] = field(default_factory=dict)  # makers of sections, by `SLOTS` of the page
     answers: Mapping[str, str] = field(default_factory=dict)  # what a stage's command prints, by stage
     tables: Mapping[str, str] = field(default_factory=dict)  # tables of a stage's summary for export, by stage
+    normal_force: Mapping[str, str] = field(default_factory=dict)  # classes of normal-force laws, by word
     friction: Mapping[str, str] = field(default_factory=dict)  # classes of friction laws, by word
     studies: Sequence[Study] = ()
 

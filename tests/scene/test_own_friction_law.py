@@ -22,7 +22,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages.contact_sim import tell_unresolved_slip
 from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.scene.contact import contact_scene, friction_law, scene_measures, start_state
+from walkerlab.scene.contact import contact_scene, ground_laws, scene_measures, start_state
 
 START = (-0.2042, 0.1694, -0.605819, -0.861041)
 
@@ -108,12 +108,12 @@ def test_compiled_walk_rejects_a_friction_law_without_a_formula_by_name(own):
 def test_every_friction_option_of_the_config_has_a_law():
     assert set(FRICTION_LAWS) == set(get_args(Contact.model_fields["friction"].annotation))
     for word in FRICTION_LAWS:
-        assert Contact(friction=word).has_friction == (friction_law(Contact(friction=word)).largest > 0.0)
+        assert Contact(friction=word).has_friction == (ground_laws(Contact(friction=word))[1].largest > 0.0)
 
 
 @pytest.mark.parametrize("word", FRICTION_LAWS)
 def test_stated_properties_of_a_law_match_its_coefficient(word):
-    law = friction_law(Contact(friction=word))
+    law = ground_laws(Contact(friction=word))[1]
     slips = np.linspace(0.0, 3.0, 3001)
     found = [-friction_coefficient(law, slip)[0] for slip in slips]
     assert max(found) == pytest.approx(law.largest, rel=1e-5)
@@ -127,7 +127,7 @@ def test_stated_properties_of_a_law_match_its_coefficient(word):
 
 
 def test_friction_laws_have_different_descriptions():
-    said = [friction_law(Contact(friction=word)).in_words() for word in FRICTION_LAWS]
+    said = [ground_laws(Contact(friction=word))[1].in_words() for word in FRICTION_LAWS]
     assert len(set(said)) == len(said)
     assert said[0] == (
         "ADAMS's Coulomb friction, with a coefficient of 0.9 at a slip velocity of 0.1 m/s and 0.7 above 1 m/s"

@@ -46,6 +46,9 @@ class Contact(Block):
         "adams: values of this block in N, mm, s as in ADAMS dialogs; si: in N, m, s",
         _SECTION_4,
     )
+    normal_force: Literal[words("normal_force")] = key(  # type: ignore[valid-type]
+        "impact", "", "impact: the IMPACT law of ADAMS; extensions add others", _ADAMS
+    )
     stiffness: float = key(1.0e5, "N/mm^e or N/m^e", "k of the normal force k d^e + c(d) d'", _FIG_4B, ge=1e-6, le=1e20)
     exponent: float = key(2.2, "1", "e of the normal force, 1 is a linear spring", _ADAMS, ge=1.0, le=3.0)
     damping: float = key(90.0, "N s/mm or N s/m", "c, reached at full_damping_penetration", _FIG_4B, ge=0.0, le=1e12)

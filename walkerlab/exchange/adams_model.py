@@ -17,7 +17,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.exchange.exported import Exported, finite
 from walkerlab.physics.ground.friction import Coulomb, Frictionless
 from walkerlab.physics.ground.knees import FLEXED
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.walkers import TORSO
@@ -355,14 +355,18 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
         model.shapes[f"pad_{number + 1}"] = Shape("BOX", marker, size)
 
 
-def laws(export: Exported) -> tuple[NormalLaw, Coulomb | None]:
+def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
     """Return normal-force law and Coulomb friction (None: no friction) in N, mm, s.
 
-    Raises ConfigError for other friction.
+    Raises ConfigError for other laws.
     """
     normal = export.scene.ours.normal
     friction = export.scene.ours.friction
-    in_mm = NormalLaw(
+    if not isinstance(normal, Impact):
+        raise ConfigError(
+            f"The normal-force law {type(normal).__name__} cannot be exported.", "Set contact.normal_force=impact."
+        )
+    in_mm = Impact(
         normal.stiffness / MM**normal.exponent,
         normal.exponent,
         normal.damping / MM,
@@ -494,7 +498,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     the order of walkerlab's walk; other sensors halt it if the walker falls or comes down on a bent knee.
     """
     law = knee_rules(export.config.walker).stop
-    assert isinstance(law, NormalLaw), "the export has a compliant stop"
+    assert isinstance(law, Impact), "the export has a compliant stop"
     stop = ",".join(finite(value) for value in (1.0, MM * law.stiffness, *law[1:2], MM * law.damping, law[3]))
     for number, leg in enumerate(LEGS):
         shank = export.names[export.knee_links[number]]

@@ -12,7 +12,6 @@ from walkerlab.config.reads import ContactConfig
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
-from walkerlab.physics.ground.resting import resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
 from walkerlab.physics.hybrid.contact_events import JudgedGround
@@ -147,13 +146,12 @@ def creep_velocity(friction: FrictionLaw, load: float) -> float:
 def contact_target(scene: EngineScene) -> EngineContact | None:
     """Linearise the walker's contact under its weight on one foot, or None on frictionless ground."""
     walker = scene.ours
-    law = walker.normal
     friction = walker.friction
     if friction.largest == 0.0:
         return None
     mass = walker.mass
     g = walker.gravity_down
-    foot = resting_foot(mass * g, mass, law.stiffness, law.exponent, law.damping)
+    foot = walker.normal.resting_foot(mass * g, mass)
     creep = creep_velocity(friction, CREEP_LOAD)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
-    return EngineContact(mass, g, foot.depth, law.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
+    return EngineContact(mass, g, foot.depth, walker.normal.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)

@@ -31,7 +31,7 @@ from walkerlab.exchange.engine_scene import EngineContact, contact_target
 from walkerlab.exchange.exported import Exported, Pad
 from walkerlab.exchange.planar import UPRIGHT, Ball, PlanarModel
 from walkerlab.physics.ground.knees import FLEXED
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.solvers.system import Floats
@@ -283,7 +283,7 @@ def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
     weights = inverse_weights(export.model)
     stop = export.scene.ours.stop
     rates = [contact["damping_N_s_m"] * weights.bodies[ball.link] for ball in export.model.balls]
-    if isinstance(stop, NormalLaw):
+    if isinstance(stop, Impact):
         shanks = [weights.joints[link] for link in export.knee_links]
         rates += [max(stop.damping * weight, math.sqrt(stop.stiffness * weight)) for weight in shanks]
     return min(STEP_S, float(f"{DAMPED_STEP / max(rates):.0e}"))
@@ -299,7 +299,7 @@ def hinge_names(export: Exported) -> dict[int, Hinge]:
     for leg, link in enumerate(export.knee_links):
         acts = ""
         d = IMPEDANCE
-        if isinstance(stop, NormalLaw):
+        if isinstance(stop, Impact):
             stiffness, damping = ((1.0 - d) * weights[link] * x for x in (stop.stiffness, stop.damping))
             acts = f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
         hinges[link] = Hinge(f"knee_{leg + 1}", acts)

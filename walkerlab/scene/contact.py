@@ -13,9 +13,9 @@ from walkerlab.config.walkers import Kneed, PartsWalker
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.extensions import declared, load
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
-from walkerlab.physics.ground.friction import FRICTION_LAWS, FrictionLaw, create_law
-from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.resting import RestingFoot, resting_foot
+from walkerlab.physics.ground.laws import LAW_KINDS, create_law
+from walkerlab.physics.ground.normal_force import Impact
+from walkerlab.physics.ground.resting import RestingFoot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, plane
 from walkerlab.physics.ground.walker import ContactWalker, changed_forms, floating_state
 from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
@@ -77,7 +77,7 @@ def contact_scene(
     assembly = assembly_of(config.walker)
     leg = config.walker.leg_length_m
     gravity = config.gravity_m_s2
-    laws = (normal_law(contact), friction_law(contact))
+    laws = ground_laws(contact)
     rules = knee_rules(config.walker)
     walker = apply_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
@@ -140,7 +140,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
-    return KneeRules(NormalLaw(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
+    return KneeRules(Impact(knee.stop_stiffness, 1.0, knee.stop_damping, FULL_STOP_DAMPING), at_touch)
 
 
 # Terrains by pitch and asymmetry of the steps. Leg 1 starts as far behind leg 2 as the second step is long.
@@ -191,22 +191,22 @@ def pads_pitch(contact: Contact, rigid_step_length_m: float, own_pitch_m: float 
     return float(contact.pad_pitch)
 
 
-def normal_law(contact: Contact) -> NormalLaw:
-    si = contact.in_si()
-    return NormalLaw(si.stiffness, si.exponent, si.damping, si.full_damping_penetration)
-
-
-def friction_law(contact: Contact) -> FrictionLaw:
-    """Return the friction law in SI. Frictionless contact is a law of its own, not a zero coefficient.
+def ground_laws(contact: Contact) -> tuple[Any, Any]:
+    """Return the laws of the normal force and of friction in SI. Frictionless contact is a law, not a zero coefficient.
 
     Raises ConfigError if a law that an extension added is incomplete.
     """
-    word = contact.friction
-    added = declared("friction")
+    si = contact.in_si()
+    normal, friction = (ground_law(key, getattr(contact, key), si) for key in LAW_KINDS)
+    return normal, friction
+
+
+def ground_law(key: str, word: str, si: Any) -> Any:
+    added = declared(key)
     try:
         if word in added:
-            FRICTION_LAWS[word] = load(added[word])
-        return create_law(word, contact.in_si())
+            LAW_KINDS[key].laws[word] = load(added[word])
+        return create_law(key, word, si)
     except (TypeError, ImportError, AttributeError) as error:
         raise ConfigError(f"{error}.", "docs/adding.md lists the parts of a law.") from error
 
@@ -235,8 +235,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker = scene.walker
-    law = scene.walker.normal
-    return resting_foot(walker.mass * walker.gravity, walker.mass, law.stiffness, law.exponent, law.damping)
+    return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
 
 
 def scene_measures(scene: ContactScene) -> dict[str, Any]:

@@ -8,10 +8,10 @@ from compass_parts import CompassParts, compass_assembly
 import walkerlab.physics.ground.motion  # noqa: F401, the equations, which are found by the system's type
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Coulomb, Frictionless
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body
 
-ADAMS = NormalLaw(1e5 * 1000.0**2.2, 2.2, 9e4, 1e-4)
+ADAMS = Impact(1e5 * 1000.0**2.2, 2.2, 9e4, 1e-4)
 COULOMB = Coulomb(0.9, 0.7, 0.1, 1.0)
 SMOOTH = Frictionless()
 SLOPE, GRAVITY = 0.0174, 9.81

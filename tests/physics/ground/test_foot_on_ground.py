@@ -10,7 +10,7 @@ from system_rates import gradient_of, rate_of
 
 from walkerlab.physics.ground.energy import dissipated_power, kinetic_energy, potential_energy, total_energy
 from walkerlab.physics.ground.friction import Coulomb
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import foot_force, one_foot_motion, place_on_ground
 
 BOTH = (True, True)
@@ -20,7 +20,7 @@ slips = st.floats(-1.5, 1.5)
 climbs = st.floats(-0.2, 0.2)
 depths = st.floats(1e-6, 3e-4)
 feet = st.sampled_from([0, 1])
-SOFT = NormalLaw(1e5, 1.7, 2e3, 5e-3)
+SOFT = Impact(1e5, 1.7, 2e3, 5e-3)
 BALL = 0.05
 
 

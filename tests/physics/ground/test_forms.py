@@ -8,7 +8,7 @@ import walkerlab.physics.ground.motion  # noqa: F401, the equations, which are f
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.ground.energy import total_energy
 from walkerlab.physics.ground.friction import Coulomb
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import (
     LOCKED,
     RELEASED,
@@ -21,7 +21,7 @@ from walkerlab.physics.ground.walker import (
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Revolute
 from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs
 
-LAW, FRICTION = NormalLaw(4e5, 1.8, 300.0, 1e-3), Coulomb(0.9, 0.7, 0.01, 0.1)
+LAW, FRICTION = Impact(4e5, 1.8, 300.0, 1e-3), Coulomb(0.9, 0.7, 0.01, 0.1)
 LEGS = kneed_legs(Limb(0.5, 0.8, 0.3, 0.02, 0.01), Limb(0.5, 0.3, 0.2, -0.03, 0.004), 0.7, Arc(0.2, 0.05))
 WITH_TORSO = add_torso(LEGS, 0.6, 0.25, 0.02)
 BOTH = (True, True)

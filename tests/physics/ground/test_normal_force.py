@@ -8,11 +8,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 
-from walkerlab.physics.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
+from walkerlab.physics.ground.normal_force import Impact, elastic_energy, normal_force
 from walkerlab.physics.ground.smooth_step import smooth_step
 
 laws = st.builds(
-    NormalLaw,
+    Impact,
     stiffness=st.floats(1e2, 1e12),
     exponent=st.floats(1.0, 3.0),
     damping=st.floats(0.0, 1e6),
@@ -52,44 +52,42 @@ def test_step_function_is_the_cubic_with_those_ends():
 
 @given(law=laws, depth=depths, rate=rates)
 def test_normal_force_is_never_adhesive(law, depth, rate):
-    assert impact_normal_force(depth, rate, law).force >= 0.0
+    assert normal_force(law, depth, rate).force >= 0.0
 
 
 @given(law=laws, depth=depths, rate=rates)
 def test_damping_only_dissipates_energy(law, depth, rate):
     """(F - k d^e) d' >= 0, also where the clip at zero cuts the damping short."""
-    normal = impact_normal_force(depth, rate, law)
+    normal = normal_force(law, depth, rate)
     assert (normal.force - normal.spring) * rate >= -1e-12 * normal.spring * abs(rate)
 
 
 @given(law=laws, depth=depths, rate=rates)
 def test_without_damping_the_ground_is_a_spring(law, depth, rate):
     spring = law.stiffness * depth**law.exponent
-    normal = impact_normal_force(depth, rate, law._replace(damping=0.0))
+    normal = normal_force(law._replace(damping=0.0), depth, rate)
     assert normal.force == pytest.approx(spring)
     assert normal.by_rate == 0.0
-    assert impact_normal_force(depth, 0.0, law).force == pytest.approx(spring)
+    assert normal_force(law, depth, 0.0).force == pytest.approx(spring)
 
 
 def test_elastic_energy_is_the_work_of_the_spring():
-    law = NormalLaw(3e8, 2.2, 0.0, 1e-4)
+    law = Impact(3e8, 2.2, 0.0, 1e-4)
     depth = np.linspace(0.0, 2e-3, 20001)
-    force = np.array([0.0, *(impact_normal_force(d, 0.0, law).force for d in depth[1:])])
+    force = np.array([0.0, *(normal_force(law, d, 0.0).force for d in depth[1:])])
     work = trapezoid(force, depth)
-    assert elastic_energy(2e-3, law) == pytest.approx(work, rel=1e-7)
-    assert elastic_energy(-1e-3, law) == 0.0
+    assert elastic_energy(law, 2e-3) == pytest.approx(work, rel=1e-7)
+    assert elastic_energy(law, -1e-3) == 0.0
 
 
 @given(law=laws, fraction=st.floats(0.01, 3.0), rate=rates)
 def test_derivatives_of_the_normal_force_equal_finite_differences(law, fraction, rate):
     depth = fraction * law.full_damping_penetration
-    normal = impact_normal_force(depth, rate, law)
+    normal = normal_force(law, depth, rate)
     h = 1e-5 * depth
-    pulled = [impact_normal_force(depth + step, rate, law).force == 0.0 for step in (-h, h)]
+    pulled = [normal_force(law, depth + step, rate).force == 0.0 for step in (-h, h)]
     assume(not any(pulled) and abs(fraction - 1.0) > 1e-3)  # no join of the law between
-    by_depth = (impact_normal_force(depth + h, rate, law).force - impact_normal_force(depth - h, rate, law).force) / (
-        2 * h
-    )
+    by_depth = (normal_force(law, depth + h, rate).force - normal_force(law, depth - h, rate).force) / (2 * h)
     size = (normal.spring + law.damping * abs(rate)) / depth
     assert normal.by_penetration == pytest.approx(by_depth, rel=1e-6, abs=1e-7 * size)
     c = law.damping * min(fraction, 1.0) ** 2 * (3.0 - 2.0 * min(fraction, 1.0))
@@ -99,8 +97,8 @@ def test_derivatives_of_the_normal_force_equal_finite_differences(law, fraction,
 
 @pytest.mark.parametrize("rate", [-0.3, 0.0, 0.3])
 def test_normal_force_and_its_derivative_are_continuous_at_full_damping(rate):
-    law = NormalLaw(4e11, 2.2, 9e4, 1e-4)
-    below, above = (impact_normal_force(law.full_damping_penetration * (1.0 + s), rate, law) for s in (-1e-9, 1e-9))
+    law = Impact(4e11, 2.2, 9e4, 1e-4)
+    below, above = (normal_force(law, law.full_damping_penetration * (1.0 + s), rate) for s in (-1e-9, 1e-9))
     for one, other in zip(below, above, strict=True):
         assert one == pytest.approx(other, rel=1e-6, abs=1e-6)
 
@@ -108,8 +106,8 @@ def test_normal_force_and_its_derivative_are_continuous_at_full_damping(rate):
 @pytest.mark.parametrize("rate", [-1.0, 1.0])
 def test_force_starts_at_zero_at_first_touch(rate):
     """No force, no spring and no damping at zero penetration: a touch is no jump, whatever the speed."""
-    law = NormalLaw(4e11, 2.2, 9e4, 1e-4)
-    forces = [impact_normal_force(d, rate, law).force for d in (1e-7, 1e-8, 1e-9)]
+    law = Impact(4e11, 2.2, 9e4, 1e-4)
+    forces = [normal_force(law, d, rate).force for d in (1e-7, 1e-8, 1e-9)]
     assert forces == sorted(forces, reverse=True)
     assert forces[-1] < 1e-4 * law.damping * abs(rate)
 
@@ -117,9 +115,9 @@ def test_force_starts_at_zero_at_first_touch(rate):
 def test_normal_law_is_consistent_in_its_units():
     """N/mm^e and mm against N/m^e and m."""
     k, e, c, d_max = 1e5, 2.2, 90.0, 0.1
-    law = NormalLaw(k * 1000.0**e, e, c * 1000.0, d_max / 1000.0)
+    law = Impact(k * 1000.0**e, e, c * 1000.0, d_max / 1000.0)
     depth_mm, rate_mm_s = 0.06, 12.0
     s = depth_mm / d_max
     by_hand = k * depth_mm**e + c * s * s * (3 - 2 * s) * rate_mm_s
-    assert impact_normal_force(depth_mm / 1000.0, rate_mm_s / 1000.0, law).force == pytest.approx(by_hand, rel=1e-12)
+    assert normal_force(law, depth_mm / 1000.0, rate_mm_s / 1000.0).force == pytest.approx(by_hand, rel=1e-12)
     assert math.isfinite(by_hand)

@@ -9,7 +9,7 @@ from walkerlab.config.contact import Contact
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
 from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs
-from walkerlab.scene.contact import TERRAINS, ContactScene, friction_law, normal_law, start_state
+from walkerlab.scene.contact import TERRAINS, ContactScene, ground_laws, start_state
 
 THIGH, SHANK, HIP_MASS = Limb(0.5, 0.5, 0.325), Limb(0.5, 0.05, 0.125), 0.5
 MASS, PAPER_MASS, GRAVITY, SLOPE = 1.6, 20.0, 9.81, 0.0504
@@ -31,7 +31,7 @@ def scene_of(rules=None, radius=0.0, shank=SHANK, slope=SLOPE, scale=1.0, **cont
         "stiction_velocity": 0.1 * scale**0.5, "friction_velocity": 1.0 * scale**0.5, "terrain": "plane",
     }  # fmt: skip
     ground, parts = Contact(**(law | contact)), kneed_legs(*limbs, HIP_MASS, Arc(scale * radius))
-    walker = contact_walker(parts, normal_law(ground), friction_law(ground), GRAVITY, slope, rules)
+    walker = contact_walker(parts, *ground_laws(ground), GRAVITY, slope, rules)
     frame = Frame(scale, np.sqrt(scale / GRAVITY), locate_switching=True)
     laid = JudgedGround(TERRAINS[ground.terrain](scale * STEP, 0.0), frame)
     return ContactScene(walker, laid, False, scale * STEP, parts)

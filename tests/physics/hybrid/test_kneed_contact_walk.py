@@ -28,7 +28,7 @@ from system_rates import gradient_of, rate_of
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
 from walkerlab.physics.ground.knees import lock_knee
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import LOCKED, RELEASED, STOPPING, feet_motion, place_on_ground
 from walkerlab.physics.hybrid.contact_loop import walk_in_form
 from walkerlab.physics.hybrid.contact_result import losses_by_channel
@@ -154,7 +154,7 @@ def test_equations_of_a_locked_knee_equal_those_of_one_leg():
         Assembly(legs.bodies, legs.joints, (*legs.particles, *shanks), legs.feet, legs=legs.legs),
         scene.walker.normal, scene.walker.friction, GRAVITY, SLOPE,
     )  # fmt: skip
-    two = place_on_ground(scene_of(KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))).walker, (True, True), (LOCKED, LOCKED))
+    two = place_on_ground(scene_of(KneeRules(Impact(1e3, 1.5, 5.0, 1e-2))).walker, (True, True), (LOCKED, LOCKED))
     y = (0.1, 0.7, -0.3, 0.2, 0.3, -0.1, -0.5, -0.9)
     straight = (*y[:4], *y[2:4], *y[4:], *y[6:])
     expected = rate_of(place_on_ground(one, (True, True)), y)
@@ -168,7 +168,7 @@ def test_equations_of_a_locked_knee_equal_those_of_one_leg():
     [(RELEASED, RELEASED), (STOPPING, RELEASED), (RELEASED, LOCKED), (STOPPING, LOCKED), (LOCKED, LOCKED)],
 )
 def test_exact_derivatives_equal_finite_differences(knee):
-    rules = KneeRules(NormalLaw(1e3, 1.5, 5.0, 1e-2))
+    rules = KneeRules(Impact(1e3, 1.5, 5.0, 1e-2))
     scene = scene_of(rules)
     y = np.array(BENT_STATE)
     y[4] = y[2] + 5e-3
@@ -209,7 +209,7 @@ def test_library_method_walks_with_the_same_reduced_bodies():
 
 def test_stiff_knee_stop_walks_like_the_ideal_lock():
     ideal = walked(steps=3)
-    stopped = [walked(steps=3, rules=KneeRules(NormalLaw(k, 1.0, 1e-3 * k, 1e-5))) for k in (1e3, 1e5)]
+    stopped = [walked(steps=3, rules=KneeRules(Impact(k, 1.0, 1e-3 * k, 1e-5))) for k in (1e3, 1e5)]
     for walk in stopped:
         assert walk.outcome is Outcome.WALKED
         assert walk.energy_balance_residual_J < 1e-6 * exchanged(walk)
@@ -222,7 +222,7 @@ def test_stiff_knee_stop_walks_like_the_ideal_lock():
 def test_knee_stop_converges_to_the_ideal_lock_with_the_root_of_stiffness():
     """At one damping ratio, fully developed far below the compression; when the knees lock, and the steps' ends."""
     ideal, stiffnesses = walked(steps=3), (1e3, 1e5, 1e7)
-    laws = [NormalLaw(k, 1.0, 0.3 * k**0.5, 1e-7) for k in stiffnesses]
+    laws = [Impact(k, 1.0, 0.3 * k**0.5, 1e-7) for k in stiffnesses]
     stopped = [walked(steps=3, rules=KneeRules(law)) for law in laws]
     for times in ("knee_strike_time_s", "touch_time_s"):
         apart = [np.abs(getattr(walk, times) - getattr(ideal, times)).max() for walk in stopped]

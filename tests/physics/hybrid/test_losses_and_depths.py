@@ -14,11 +14,11 @@ from walkerlab.evidence.verification.known import (
     run_until,
 )
 from walkerlab.physics.ground.friction import Coulomb
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.hybrid.contact_result import sample_feet
 
 MASS, DROP = 2.0, 0.1
-DAMPED = NormalLaw(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
+DAMPED = Impact(2e5, 1.5, 40.0, 1e-4)  # lets go on the way out
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])

@@ -13,13 +13,13 @@ from tree_equations import mass_matrix_and_bias
 
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Frictionless
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.mechanics.assembly import Anchor
 
 ROUNDING = 1e-12  # a few dozen roundings of terms of the size of the largest entry
 STANCE = 1  # of the bodies (leg 1 swings, leg 2 stands)
-LAW = NormalLaw(1e5, 1.5, 1e3, 1e-4)
+LAW = Impact(1e5, 1.5, 1e3, 1e-4)
 
 angle = st.floats(-3.0, 3.0)
 rate = st.floats(-10.0, 10.0)

@@ -12,7 +12,7 @@ from tree_equations import mass_matrix_and_bias
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.energy import kinetic_energy, potential_energy
 from walkerlab.physics.ground.friction import Frictionless
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.walker import place_on_ground
 from walkerlab.physics.mechanics.assembly import Anchor, levers, total_mass, tree_about_centre
 from walkerlab.physics.mechanics.parts import Assembly, Body, Revolute
@@ -52,7 +52,7 @@ def measured():
 
 
 def flying_walker(slope=0.0):
-    return contact_walker(kneed.KNEED, NormalLaw(1e5, 1.5, 1e3, 1e-4), Frictionless(), GRAVITY, slope)
+    return contact_walker(kneed.KNEED, Impact(1e5, 1.5, 1e3, 1e-4), Frictionless(), GRAVITY, slope)
 
 
 def flight(theta, omega, velocity, duration):
@@ -194,7 +194,7 @@ def test_closed_loop_is_rejected():
 def test_walker_without_two_feet_is_rejected():
     one_legged = Assembly(kneed.KNEED.bodies, kneed.KNEED.joints, feet=kneed.KNEED.feet[:1])
     with pytest.raises(ValueError, match="two feet"):
-        contact_walker(one_legged, NormalLaw(1.0, 1.0, 0.0, 1.0), Frictionless(), 9.81, 0.0)
+        contact_walker(one_legged, Impact(1.0, 1.0, 0.0, 1.0), Frictionless(), 9.81, 0.0)
 
 
 def test_foot_of_zero_length_has_no_lever_at_the_root():

@@ -20,8 +20,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import LOSS_ENTRIES
 from walkerlab.physics.ground.compliant import contact_walker
 from walkerlab.physics.ground.friction import Coulomb
-from walkerlab.physics.ground.normal_force import NormalLaw
-from walkerlab.physics.ground.resting import resting_foot
+from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import checkerboard
 from walkerlab.physics.ground.walker import ContactWalker, one_foot_motion
 from walkerlab.physics.hybrid.contact_events import Frame, JudgedGround
@@ -31,7 +30,6 @@ from walkerlab.physics.hybrid.contact_state import new_walk_state
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Position, Revolute
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.contact import normal_law
 
 # pad length, so that no edge is in reach; its negative serves as leg length, so that no hip is low enough for a fall
 UNBOUNDED_M = 1e7
@@ -41,7 +39,7 @@ SAMPLE_COUNT = 4000
 BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # indices of the first body in the state
 GRAVITY: Final = 9.81
 CENTRE: Final = (0.0, 0.0)
-PAPER_LAW: Final = normal_law(Contact())
+PAPER_LAW: Final = Impact.of(Contact().in_si())
 PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 
 
@@ -58,7 +56,7 @@ class ParticleRun:
 def rig(
     mass: float,
     inertia: float,
-    normal: NormalLaw,
+    normal: Impact,
     friction: Coulomb = PAPER_FRICTION,
     feet: tuple[Position, Position] = (CENTRE, OUT_OF_REACH),
     slope: float = 0.0,
@@ -144,7 +142,7 @@ def solve_problem(
     return Known(name, quantity, value, reference, source, limit, why, time.perf_counter() - started)
 
 
-SPRING: Final = NormalLaw(1.0e6, 1.0, 0.0, 1.0e-4)
+SPRING: Final = Impact(1.0e6, 1.0, 0.0, 1.0e-4)
 LIGHT_LAW: Final = PAPER_LAW._replace(damping=9.0e2)
 THICK_LAW: Final = PAPER_LAW._replace(damping=9.0e3)
 DROP = 0.1
@@ -163,7 +161,7 @@ def bouncing_ball_period() -> float:
     return (float(run.times[-1] + in_flight) - first) / BOUNCES
 
 
-def restitution(law: NormalLaw, speed: float) -> float:
+def restitution(law: Impact, speed: float) -> float:
     """Return the coefficient of restitution of a ball as heavy as the walker that lands at `speed` (m/s)."""
     ball = rig(BLOCK_MASS, 1.0, law)
     height = 1e-3
@@ -178,7 +176,7 @@ def restitution(law: NormalLaw, speed: float) -> float:
 def block_speed(slope: float, start_speed: float) -> float:
     """Return the speed (m/s) of a block on a slope (rad), one second after it had `start_speed` (m/s)."""
     law = PAPER_LAW
-    foot = resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS, law.stiffness, law.exponent, law.damping)
+    foot = law.resting_foot(BLOCK_MASS * GRAVITY * math.cos(slope), BLOCK_MASS)
     block = rig(BLOCK_MASS, 1.0, law, slope=slope)
     return float(run_until(block, rig_state((0.0, -foot.depth), (start_speed, 0.0)), 1.0).end[ALONG_RATE])
 
@@ -186,7 +184,7 @@ def block_speed(slope: float, start_speed: float) -> float:
 SPOKES = 8
 WHEEL_SLOPE = 0.08
 HUB_INERTIA = 1e-3
-STIFF: Final = NormalLaw(1.0e9, 1.0, 3.0e5, 1.0e-7)
+STIFF: Final = Impact(1.0e9, 1.0, 3.0e5, 1.0e-7)
 STICKY: Final = Coulomb(2.0, 2.0, 1.0e-4, 1.0e-3)
 ROUNDS = 14
 
@@ -220,7 +218,7 @@ def painleve_growth_rate() -> float:
     For d = a + b cosh(s t), the differences D of d over a time tau obey D(t + tau) + D(t - tau) = 2 cosh(s tau) D(t).
     """
     end = (math.cos(ROD_ANGLE), -math.sin(ROD_ANGLE))
-    ground = NormalLaw(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4)
+    ground = Impact(ROD_STIFFNESS, 1.0, 0.0, 1.0e-4)
     friction = Coulomb(ROD_FRICTION, ROD_FRICTION, 0.1, 1.0)
     rod = rig(1.0, 1.0 / 3.0, ground, friction, (end, OUT_OF_REACH))
     rate = references.painleve_growth_rate(ROD_ANGLE, ROD_FRICTION, 1.0, ROD_STIFFNESS)

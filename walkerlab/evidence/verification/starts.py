@@ -14,6 +14,7 @@ from walkerlab.evidence.verification.momentum import MEASURE, momentum_finding
 from walkerlab.evidence.verification.scaling import pendulum_time
 from walkerlab.evidence.verification.verdict import Measure, NotMeasured, finite
 from walkerlab.outcome import Outcome
+from walkerlab.physics.ground.normal_force import elastic_energy
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, as_state, take_walk
 from walkerlab.physics.mechanics.rigid_model import RigidModel, swing_foot
@@ -182,8 +183,7 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
     y = (*y[:CENTRE_HEIGHT], y[CENTRE_HEIGHT] - case.lowered_m, *y[CENTRE_HEIGHT + 1 :])
     leg = config.walker.leg_length_m
     rates = y[len(y) // 2 :]
-    law = scene.walker.normal
     speed = float(np.max(np.abs([*rates[:2], *(leg * rate for rate in rates[2:])])))
-    stored = 2.0 * law.stiffness * max(0.0, case.lowered_m) ** (law.exponent + 1.0) / (law.exponent + 1.0)
+    stored = 2.0 * elastic_energy(scene.walker.normal, case.lowered_m)
     energy = scene.walker.mass * (config.gravity_m_s2 * leg + 0.5 * speed**2) + stored
     return ContactStart(config, y, energy, scene)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import walkerlab.physics.ground.motion  # noqa: F401 (registers the equations of motion)
 from walkerlab.physics.ground.friction import FrictionLaw
 from walkerlab.physics.ground.knees import IdealLock
-from walkerlab.physics.ground.normal_force import NormalLaw
+from walkerlab.physics.ground.normal_force import Impact, NormalLaw
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import FIRST_KNEE, FORM, MAX_BODIES, NO_FOOT, ContactWalker
 from walkerlab.physics.mechanics.assembly import (
@@ -33,7 +33,7 @@ class KneeRules:
 
     # With a compliant stop, thigh and shank of a locked knee stay separate bodies at the angle at which it latched.
 
-    stop: NormalLaw | IdealLock = IdealLock()  # noqa: RUF009 (immutable); a compliant stop's law is in rad and N m
+    stop: Impact | IdealLock = IdealLock()  # noqa: RUF009 (immutable); a compliant stop's law is in rad and N m
     release_at_touch: bool = False  # release the trailing knee at the touch, not when the leading foot stops sinking in
 
 

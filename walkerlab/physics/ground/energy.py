@@ -48,9 +48,8 @@ def potential_energy(form: GroundModel, y: Any) -> float:
 
 @kernel_part
 def foot_elastic_energy(system: OnGround, foot: int, y: Any) -> float:
-    return elastic_energy(
-        -relative_to_ground(system, foot, one_foot_motion(system.form, foot, y)).height, system.normal
-    )
+    motion = relative_to_ground(system, foot, one_foot_motion(system.form, foot, y))
+    return elastic_energy(system.normal, -motion.height)
 
 
 @kernel_part

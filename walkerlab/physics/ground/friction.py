@@ -160,28 +160,6 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 """Friction laws by their names in `contact.friction` of a config."""
 
 
-def create_law(word: str, contact: Any) -> FrictionLaw:
-    """Create the law named `word` from a contact block in SI.
-
-    Raises TypeError if its class is incomplete.
-    """
-    law = FRICTION_LAWS[word]
-    missing = missing_members(law)
-    if missing:
-        raise TypeError(f"the friction law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}")
-    return law.of(contact)
-
-
-def missing_members(law: type) -> list[str]:
-    """List what a law's class lacks: members of `FrictionLaw`, and registered cases of the functions that need one."""
-    asked = [name for name in vars(FrictionLaw) if not name.startswith("_")]
-    missing = [name for name in asked if not hasattr(law, name)]
-    switching = (switching_count, sample_switching)
-    needed = (friction_coefficient, *(switching if any(law in function for function in switching) else ()))
-    cases = [f"a case @{function.__name__}.case({law.__name__})" for function in needed if law not in function]
-    return missing + cases
-
-
 def steepest_change(law: FrictionLaw, slip: float) -> float:
     """Return an upper bound on the coefficient's change over a range `slip` (m/s), from its slope at zero slip."""
     return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))

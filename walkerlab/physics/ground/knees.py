@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.ground.normal_force import NormalLaw, elastic_energy, impact_normal_force
+from walkerlab.physics.ground.normal_force import Impact, elastic_energy, normal_force
 from walkerlab.physics.ground.walker import FIRST_KNEE, GroundModel, half_size
 from walkerlab.physics.kernels import kernel_part
 from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_torque
@@ -35,19 +35,19 @@ def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
     return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
 
-@hinge_torque.case(NormalLaw)
-def stop_torque(law: NormalLaw, angle: float, rate: float) -> HingeTorque:
+@hinge_torque.case(Impact)
+def stop_torque(law: Impact, angle: float, rate: float) -> HingeTorque:
     """Compute the torque of a compliant stop, which pushes a knee back when it extends beyond straight."""
     # a stop's law is in rad and N m instead of m and N
     if angle <= 0.0:
         return HingeTorque(0.0, 0.0, 0.0, 0.0)
-    torque = impact_normal_force(angle, rate, law)
+    torque = normal_force(law, angle, rate)
     return HingeTorque(torque.force, torque.spring, torque.by_penetration, torque.by_rate)
 
 
-@hinge_energy.case(NormalLaw)
-def stop_energy(law: NormalLaw, angle: float) -> float:
-    return elastic_energy(angle, law)
+@hinge_energy.case(Impact)
+def stop_energy(law: Impact, angle: float) -> float:
+    return elastic_energy(law, angle)
 
 
 class Locked(NamedTuple):

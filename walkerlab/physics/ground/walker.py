@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkerlab.physics.ground.friction import friction_coefficient
-from walkerlab.physics.ground.normal_force import NormalForce, NormalLaw, impact_normal_force
+from walkerlab.physics.ground.normal_force import NormalForce, NormalLaw, normal_force
 from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.mechanics import tree
 from walkerlab.physics.mechanics.hinges import HIP_ROW
@@ -79,7 +79,7 @@ class ContactWalker(NamedTuple):
     forms: Any  # (2, 4) records of FORM: row 0 with both feet free, row 1 with a foot pinned; columns by `locked_knees`
     normal: NormalLaw
     friction: Any  # a FrictionLaw
-    stop: Any  # stop of both knees: IdealLock, or the NormalLaw (rad, N m) of a compliant stop
+    stop: Any  # stop of both knees: IdealLock, or the Impact law (rad, N m) of a compliant stop
     legs: Integers  # (2, bodies of a leg) indices of each leg's bodies from the hip down
 
     @property
@@ -253,7 +253,7 @@ class FootForce(NamedTuple):
 @kernel_part
 def foot_force(laws: Any, motion: FootMotion) -> FootForce:
     """Compute the force of the ground on a penetrating foot. `laws` is a ContactWalker or an OnGround."""
-    normal = impact_normal_force(-motion.height, -motion.vertical_velocity, laws.normal)
+    normal = normal_force(laws.normal, -motion.height, -motion.vertical_velocity)
     mu, mu_slope = friction_coefficient(laws.friction, motion.slip)
     return FootForce(mu * normal.force, normal, mu_slope * normal.force, mu)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from walkerlab.physics.ground.friction import sample_switching, switching_count
 from walkerlab.physics.ground.knees import extension, extension_rate
-from walkerlab.physics.ground.normal_force import grip
+from walkerlab.physics.ground.normal_force import release_function, switching_penetration
 from walkerlab.physics.ground.terrain import cell_edges
 from walkerlab.physics.ground.walker import (
     BENT,
@@ -91,8 +91,8 @@ def sample_foot(
     values[first + VERTICAL_VELOCITY, j] = motion.vertical_velocity
     values[first + LEFT_EDGE, j] = motion.along - edges[0]
     values[first + RIGHT_EDGE, j] = edges[1] - motion.along
-    values[first + RELEASE, j] = grip(-motion.height, -motion.vertical_velocity, system.normal)
-    values[first + FULL_DAMPING, j] = motion.height + system.normal.full_damping_penetration
+    values[first + RELEASE, j] = release_function(system.normal, -motion.height, -motion.vertical_velocity)
+    values[first + FULL_DAMPING, j] = motion.height + switching_penetration(system.normal)
     sample_switching(system.friction, motion.slip, values, first + FRICTION_SWITCHES, j)
 
 

@@ -116,13 +116,8 @@ def solve_gait_on(pads: OwnPads, z: Floats, steps: int, rigidity: float = 0.0) -
 def scale_laws(walker: ContactWalker, stiffness: float, damping: float, creep: float) -> ContactWalker:
     """Return the walker with the ground's stiffness, damping and friction velocities multiplied by these factors."""
     # The full-damping penetration shrinks like the static penetration, so that the damping ratio is unchanged.
-    normal = walker.normal
-    changed = normal._replace(
-        stiffness=normal.stiffness * stiffness,
-        damping=normal.damping * damping,
-        full_damping_penetration=normal.full_damping_penetration * stiffness ** (-1.0 / normal.exponent),
-    )
-    return walker._replace(normal=changed, friction=walker.friction.with_creep(creep))
+    normal = walker.normal.stiffen(stiffness, damping, stiffness ** (-1.0 / walker.normal.exponent))
+    return walker._replace(normal=normal, friction=walker.friction.with_creep(creep))
 
 
 def set_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from walkerlab.outcome import Outcome
 from walkerlab.physics.energy_channels import LOSS_ENTRIES
 from walkerlab.physics.ground.knees import IdealLock
-from walkerlab.physics.ground.resting import resting_foot
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain, after_mid_swing, checkerboard, has_ground_in_air
 from walkerlab.physics.ground.walker import (
     ContactWalker,
@@ -139,9 +138,7 @@ def state_on_section(walker: ContactWalker, z: Floats, stance: int) -> State:
 def stand(walker: ContactWalker, z: Floats, stance: int) -> Floats:
     """Return section coordinates moved so that the stance foot rests on the ground at its static penetration."""
     foot = feet_motion(walker.whole, state_on_section(walker, z, stance))[stance]
-    law = walker.normal
-    weight = walker.mass * walker.gravity_down
-    depth = resting_foot(weight, walker.mass, law.stiffness, law.exponent, law.damping).depth
+    depth = walker.normal.resting_foot(walker.mass * walker.gravity_down, walker.mass).depth
     along_rate = 1 + len(angled_bodies(walker, stance))
     moved = z.copy()
     moved[0] -= foot.height + depth

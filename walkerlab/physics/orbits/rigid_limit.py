@@ -83,10 +83,9 @@ def apply_setting(walker: ContactWalker, setting: ContactFactors) -> ContactWalk
     """Return the walker on the ground of a setting, with a shortened push-off if the series varies all parameters."""
     # A longer push-off lifts the leading foot again, however rigid the ground, and leads to another limit.
     changed = scale_laws(walker, *setting[2:])
-    law = walker.normal
     if setting.series not in (ALL_SERIES, ALL_POINT_SERIES) or setting.rigidity == 1.0:
         return changed
-    static = (walker.mass * walker.gravity / law.stiffness) ** (1.0 / law.exponent)
+    static = walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass).depth
     brief = PUSH_OFF_FACTOR * math.sqrt(static / (walker.gravity * setting.stiffness))
     return changed_forms(changed, push_off_duration=min(brief, float(walker.whole.push_off_duration)))
 

@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from walkerlab.config.schema import Config
 
 
-def check_friction(config: Config) -> None:
-    """Raise ConfigError for an incomplete law of friction of another package, before anything is compiled."""
-    if config.contact is not None and config.contact.friction not in WORDS["friction"]:
-        load("walkerlab.scene.contact:friction_law")(config.contact)
+def check_laws(config: Config) -> None:
+    """Raise ConfigError for an incomplete law of another package, before anything is compiled."""
+    contact = config.contact
+    if contact is not None and any(getattr(contact, key) not in WORDS[key] for key in ("normal_force", "friction")):
+        load("walkerlab.scene.contact:ground_laws")(contact)
 
 
 MODEL_HELP = "Model whose gaits to study."
@@ -62,7 +63,7 @@ WALKS = (
         "contact-sim", "walkerlab.pipeline.stages.contact_sim",
         "Simulate a walk of the contact model, with contact forces as in ADAMS.",
         reads.ContactSimConfig, gait_for_start_or_pads, options=(STRIDES,), requires=("contact",),
-        does_without=contact_walk_omissions, checks=check_friction,
+        does_without=contact_walk_omissions, checks=check_laws,
     ),
 )  # fmt: skip
 QUESTIONS = (
