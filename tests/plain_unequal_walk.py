@@ -168,13 +168,16 @@ class Walker:
         damping = self.knee_damping[k]
         return Swing(self.legs[k], self.legs[1 - k], self.hip_mass, self.slope, self.gravity, free_shank, damping)
 
-    def step(self, k, q, w):
-        """Return duration, length, angles and rates after a step of leg k, from those of swing and stance leg."""
+    def step(self, k, q, w, rise=0.0):
+        """Return duration, length, angles and rates after a step of leg k, from those of swing and stance leg.
+
+        The foot lands on a foothold `rise` (m) above the stance foot's.
+        """
         bent_s, start = 0.0, q[1]
         if len(self.legs[k].segments) == 2:
             bent_s, q, w = self.straighten(k, np.array([*q, q[0]]), np.array([*w, w[0]]))
         system = self.swing(k)
-        run = integrate(system, np.append(q, w), system.foot_height, -1.0)
+        run = integrate(system, np.append(q, w), lambda t, y: system.foot_height(t, y) - rise, -1.0)
         (landing,) = (place for place, y in enumerate(run.y_events[0]) if system.foot_ahead(y) > 0.0)
         y = run.y_events[0][landing]
         length = system.foot_ahead(y) + system.standing.radius * (start - y[1])
@@ -209,12 +212,15 @@ class Walker:
 
         return linear_solve(balance, 2)
 
-    def stride(self, state):
-        """Return both steps' (duration, length) and the state after them, from a state just after a heel strike."""
+    def stride(self, state, rises=(0.0, 0.0), first=0):
+        """Return both steps' (duration, length) and the state after them, from a state just after a heel strike.
+
+        Leg `first` swings first, and the footholds rise by `rises` (m).
+        """
         n, steps = len(state) // 2, []
         q, w = np.array(state[:2]) + self.slope, np.array(state[n : n + 2])
-        for k in range(2):
-            duration, length, q, w = self.step(k, q, w)
+        for k, rise in enumerate(rises, first):
+            duration, length, q, w = self.step(k % 2, q, w, rise)
             steps.append((duration, length))
         return np.array(steps), np.append(q - self.slope, w)
 

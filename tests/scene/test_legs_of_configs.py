@@ -150,7 +150,7 @@ def test_a_damped_knee_takes_the_same_work_from_both_models():
 
 
 @pytest.mark.parametrize("stage", [
-    "tune", "accuracy", "stability", "basin", "robustness", "design", "identify", "plan", "engines",
+    "tune", "accuracy", "stability", "basin", "identify", "plan", "engines",
 ])  # fmt: skip
 def test_a_stage_that_needs_equal_legs_says_so(stage):
     config = config_of("paper", HEAVY)

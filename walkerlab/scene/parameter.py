@@ -119,8 +119,8 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    # only families know legs that differ, so only they vary keys that the config leaves to the first leg
-    left_out = SECOND_LEG in key.split(".") and asker[:1] == ("continuation",)
+    # `identify` does not know legs that differ; all others may vary a key that the config leaves to the first leg
+    left_out = SECOND_LEG in key.split(".") and asker[:1] != ("identify",)
     why = why_no_parameter(key, config, own, stated_value if left_out else value_at)
     if why:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {why}", _KEY_ADVICE, asker)

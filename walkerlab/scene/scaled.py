@@ -6,6 +6,8 @@ from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.physics.orbits import scaled_starts
 from walkerlab.physics.orbits.contact_gait import GaitAnswer
+from walkerlab.physics.orbits.contact_map import lengths_between_touches
+from walkerlab.physics.orbits.step_map import Cycle
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.contact import ContactScene, start_state
@@ -22,13 +24,20 @@ def starts_of(
     """Build a scene's starts from a rigid start with scaled velocities. Walks must settle on the gait if it
     is known.
     """
-    own = None if answer.gait is None else (answer.gait.step.period_s, answer.gait.step.length_m)
+    own = None if answer.gait is None else steps_to_settle_on(answer.gait)
 
     def start(swing: float, stance: float) -> State:
         return start_state(scene, scale_rates(rigid, state, swing, stance))
 
     starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, own)
     return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
+
+
+def steps_to_settle_on(gait: Cycle) -> tuple[tuple[float, float], ...]:
+    """Return period (s) and length (m) of each step of a gait, which is a single step for equal legs."""
+    if len(gait.steps) == 1:
+        return ((gait.period_s, gait.step.length_m),)
+    return tuple(zip(gait.periods_s.tolist(), lengths_between_touches(gait).tolist(), strict=True))
 
 
 def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scaled_starts.ScaledStarts:

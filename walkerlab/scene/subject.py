@@ -14,12 +14,12 @@ from walkerlab.physics.orbits.gradients import Gradient, gradients
 from walkerlab.physics.orbits.rigid_map import coordinates_of
 from walkerlab.physics.orbits.robustness import GaitOnMap
 from walkerlab.physics.orbits.similarity import Units, unit_walker
-from walkerlab.physics.orbits.step_map import StepMap
+from walkerlab.physics.orbits.step_map import StepMap, walk_steps
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.families import contact_map, rigid_map
 from walkerlab.scene.parameter import SLOPE, Parameter
-from walkerlab.scene.rigid import refuse_different_legs, rigid_walker
+from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
     from walkerlab.config.reads import ContactConfig
@@ -40,15 +40,19 @@ class ModelUnderTest:
     z: Floats  # (d,) coordinates of the gait on the section
     length_m: float  # step length
 
-    def at(self, parameter: Parameter = SLOPE, exact: bool = True) -> GaitOnMap:
+    def at(self, parameter: Parameter = SLOPE) -> GaitOnMap:
         p = parameter.value_in(self.config)
         step_map: StepMap = (
             rigid_map(self.config, parameter, 1.0)
             if self.model == RIGID
             else contact_map(self.config, parameter, 1.0, self.length_m)
         )
-        step_map = step_map if exact else step_map.at(QUICK_WALKS[self.model])
-        return GaitOnMap(step_map, p, self.z, step_map.step(self.z, p).DP, self.units)
+        return GaitOnMap(step_map, p, self.z, walk_steps(step_map, self.z, p, step_map.stride).DP, self.units)
+
+    def quick_by_leg(self) -> list[GaitOnMap]:
+        """Return the gait from the start of each leg's step (once for equal legs), on a map of quick walks."""
+        quick = QUICK_WALKS[self.model]
+        return [gait._replace(step_map=gait.step_map.at(quick)) for gait in self.at().by_leg()]
 
     @property
     def units(self) -> Units:
@@ -76,7 +80,6 @@ def find_model_gait(
 
     Raises NoAnswer if it has no gait.
     """
-    refuse_different_legs(config, "A disturbed gait")
     length = float(gait["step_length_m"])
     if model == RIGID:
         z = section_coordinates(rigid_walker(config), gait["state"])
@@ -91,6 +94,6 @@ def find_model_gait(
         raise NoAnswer(f"no gait of the contact model: {answer.reason}", answer.advice)
     if require_contact(config).terrain == "checkerboard":
         note("the contact model walks on after-mid-swing ground, as pads would end disturbed walks")
-    length = answer.gait.step.length_m
+    length = float(answer.gait.lengths_m.mean())
     z = contact_map(config, SLOPE, 1.0, length).scale_section(answer.gait.z)
     return ModelUnderTest(CONTACT, config, z, length)

@@ -9,11 +9,23 @@ from plain_unequal_walk import Leg, Segment, Walker
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.mechanics.hinges import HIP_ROW
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
-from walkerlab.physics.mechanics.rigid_model import pair, with_fields
+from walkerlab.physics.mechanics.rigid_model import change_slope, pair, with_fields
 from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_second_leg
 from walkerlab.physics.orbits.fixed_point import SearchSettings, find_gaits, with_mean_legs
-from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, RigidMap
-from walkerlab.physics.orbits.step_map import walk_steps
+from walkerlab.physics.orbits.gradients import gait_quantities, gradients
+from walkerlab.physics.orbits.newton import Effort
+from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, RigidMap, states_on_section
+from walkerlab.physics.orbits.robustness import (
+    DISTURBANCES,
+    LARGEST,
+    GaitOnMap,
+    indicators,
+    largest_disturbance,
+    sensitivity,
+    walk_disturbed,
+)
+from walkerlab.physics.orbits.similarity import unit_walker
+from walkerlab.physics.orbits.step_map import gait_near, walk_steps
 
 FEW_STARTS = SearchSettings(20, 100)
 KINDS = ("masses", "straight", "round", "kneed", "kneed and round", "one knee")
@@ -173,3 +185,86 @@ def test_one_kneed_and_one_straight_leg_walk_stably_on_the_published_slopes(damp
     plain = Walker((kneed, straight), 37.08, slope, knee_damping=(damping, 0.0))
     search = find_gaits(model_of(plain))
     assert (search.gait is not None and search.gait.stable) is walks
+
+
+# ---- disturbances ----------------------------------------------------------------------------------------------------
+
+
+def gait_on_map(walker):
+    """The gait of a walker on its own step map, whose parameter is the slope."""
+    gait = best(walker)
+    unit, units = unit_walker(walker)
+    step_map = RigidMap(lambda slope: change_slope(walker, slope), 1.0, walker)
+    step_map.stride = 2
+    z = np.array(gait.z)
+    slope = float(unit.slope)
+    return GaitOnMap(step_map, slope, z, walk_steps(step_map, z, slope, 2).DP, units)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_legs_disturbed_steps_are_those_of_plain_integration(kind):
+    plain = draw_walker(kind, 8)
+    for gait in gait_on_map(model_of(plain)).by_leg():
+        model = model_of(plain) if gait.leg == 1 else model_of(plain).exchanged
+        start = states_on_section(model, np.array(gait.z) / [1.0, *[gait.units.time] * 2])
+        rises = (2e-3 * gait.units.length, -5e-4 * gait.units.length)
+        walk = gait.step_map.disturbed(gait.z, gait.p, np.append(0.0, np.cumsum(rises)), swing=gait.swing)
+        steps, end = plain.stride(start, rises, gait.leg - 1)
+        np.testing.assert_allclose(np.transpose([walk.durations_s, walk.lengths_m]), steps, rtol=1e-9)
+        np.testing.assert_allclose(walk.z / [1.0, *[gait.units.time] * 2], end[1:], atol=1e-9)
+
+
+@pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
+@pytest.mark.parametrize(("kind", "seed"), [("masses", 1), ("round", 1), ("kneed", 1), ("one knee", 2)])
+def test_each_legs_sensitivity_norm_equals_a_brute_force_sum(kind, seed, disturbance):
+    for gait in gait_on_map(model_of(draw_walker(kind, seed))).by_leg():
+        unit = gait.unit_of(disturbance)
+        walks = {k: walk_disturbed(gait, disturbance, k * 1e-5 * unit, 90) for k in (-2, -1, 1, 2)}
+        seen = {k: indicators(walk) for k, walk in walks.items()}
+        changes = (8.0 * (seen[1] - seen[-1]) - (seen[2] - seen[-2])) / (12e-5 * unit)
+        answer = sensitivity(gait, disturbance)
+        np.testing.assert_allclose(answer.norm, np.sqrt((changes**2).sum(axis=0)), rtol=1e-5)
+        np.testing.assert_allclose(answer.direct, changes[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["masses", "kneed"])
+def test_exchanged_labels_exchange_what_each_leg_withstands(kind):
+    plain = draw_walker(kind, 3)
+    gaits = gait_on_map(model_of(plain)).by_leg()
+    exchanged = gait_on_map(model_of(replace(plain, legs=plain.legs[::-1]))).by_leg()
+    assert [gait.leg for gait in gaits] == [gait.leg for gait in exchanged] == [1, 2]
+    for one, other in zip(gaits, exchanged[::-1], strict=True):
+        for disturbance in DISTURBANCES:
+            answer = sensitivity(one, disturbance)
+            np.testing.assert_allclose(answer.norm, sensitivity(other, disturbance).norm, rtol=1e-6)
+        for disturbance, sign in LARGEST.values():
+            size = largest_disturbance(one, disturbance, sign, 4)
+            assert size == pytest.approx(largest_disturbance(other, disturbance, sign, 4), rel=1e-3)
+    first, second = (sensitivity(gait, "floor-drop").norm[0] for gait in gaits)
+    assert first != pytest.approx(second, rel=1e-2)
+    both = gait_quantities(gaits[0])["gait_sensitivity_norm"]
+    assert both == pytest.approx(np.sqrt(0.5 * (first**2 + second**2)))
+
+
+@pytest.mark.parametrize("kind", ["masses", "round", "one knee"])
+def test_gradients_of_a_limping_gait_are_those_of_its_neighbours(kind):
+    walker = model_of(draw_walker(kind, 1))
+    gait = gait_on_map(walker)
+    quantities = ("spectral_radius", "cost_of_transport", "gait_sensitivity_norm")
+    exact = gradients(gait, gait.p, quantities)
+    h = 1e-4 * gait.p
+
+    def beside(change):
+        p = gait.p + change
+        cycle = gait_near(gait.step_map, gait.z, p, Effort(1e-12), 2)
+        return gait_quantities(gait._replace(p=p, z=cycle.z, A=cycle.DP), quantities)
+
+    further, nearer = ((beside(k * h), beside(-k * h)) for k in (2.0, 1.0))
+    for name, gradient in exact.items():
+        far, near = ((ends[0][name] - ends[1][name]) / (2.0 * h * k) for ends, k in ((further, 2.0), (nearer, 1.0)))
+        assert gradient.value == pytest.approx((4.0 * near - far) / 3.0, rel=1e-4), name
+    own = best(walker)
+    numbers = gait_quantities(gait)
+    assert numbers["period_s"] == pytest.approx(own.period, rel=1e-12)
+    assert numbers["spectral_radius"] == pytest.approx(own.spectral_radius, rel=1e-9)
+    assert numbers["cost_of_transport"] == pytest.approx(own.cost_of_transport, rel=1e-9)

@@ -12,7 +12,7 @@ from walkerlab.outcome import Outcome
 from walkerlab.physics.orbits.basin import ATOL, RTOL
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.stages import basin
+from walkerlab.pipeline.stages import basin, fixedpoint
 from walkerlab.pipeline.stages.basin import RigidQuestion
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content
@@ -188,3 +188,34 @@ def test_other_results_are_current_without_it():
     assert all("basin" not in stage.inputs(load(None, ()).config) for stage in PIPELINE.stages)
     assert "basin" in PIPELINE["plot"].if_current
     assert "basin" in PIPELINE["report"].if_current
+
+
+NEARLY_EQUAL = "walker.leg_2={leg_mass_kg: 5.000001}"
+
+
+def test_basin_of_nearly_equal_legs_is_that_of_equal_legs(whole, tmp_path):
+    content = run(tmp_path, *SMALL, NEARLY_EQUAL)
+    (row,), (equal,) = content.summary["attractors"], whole.summary["attractors"]
+    assert (row["period"], equal["period"]) == (2, 1)
+    np.testing.assert_allclose(row["state"], equal["state"], atol=1e-6)
+    assert row["cells"] == equal["cells"]
+    assert content.summary["outcomes"] == whole.summary["outcomes"]
+    assert content.summary["numerical_error"]["ended_otherwise"] == 0
+    # settling is looked for once a stride
+    steps, steps_of_equal = (each.groups["basin"]["steps_to_settle"] for each in (content, whole))
+    assert np.isin(steps - steps_of_equal, [0, 1]).all()
+
+
+def test_starts_of_a_limping_walker_reach_the_gait_that_fixedpoint_finds(tmp_path):
+    config = load(Path("prosthesis"), ()).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    asked = only(load(Path("prosthesis"), ("basin.cells=[8,8]", "basin.refine=1")).config, PIPELINE["basin"].takes)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(basin, "SEARCHED_STARTS", 100)
+        content = basin.run(
+            asked, {"fixedpoint": Content({}, gait)}, Silent(), checkpoint=Checkpoint(tmp_path / "parts", "key"), jobs=1
+        )
+    (row,) = content.summary["attractors"]
+    assert row["period"] == 2
+    assert row["cells"] > 0
+    np.testing.assert_allclose(row["state"], gait["state"], atol=1e-9)

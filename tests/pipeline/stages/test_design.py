@@ -195,7 +195,7 @@ def largest_at(slope_deg):
     config = load(Path("slope-3deg"), [f"slope_deg={slope_deg!r}"]).config
     gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
     subject = find_model_gait("rigid", config, gait, lambda _: None)
-    return {name: largest_disturbance(subject.at(exact=False), *LARGEST[name], 50) for name in LARGEST}
+    return {name: largest_disturbance(*subject.quick_by_leg(), *LARGEST[name], 50) for name in LARGEST}
 
 
 def test_largest_step_up_is_maximised_and_compared_with_the_start():
@@ -236,3 +236,29 @@ def test_loss_of_robustness_at_the_optimum_is_reported():
     said = " ".join(" ".join(answer("design", found)).split())
     assert "less robust than the start: largest_step_up_m and largest_push_forward_N_s are worse" in said
     assert "largest_step_up_m 0.0114 0.0073" in said
+
+
+def test_mass_of_one_leg_is_found_from_equal_legs_and_without_a_block():
+    """The longest mean step on a grid of 17 walkers, whose legs are equal in the middle."""
+    key = "walker.leg_2.leg_mass_kg"
+    found = run("slope-3deg", "design.maximise=period_s", f"design.over={{{key}: [4.8, 5.2]}}", "design.starts=1")
+    masses = np.linspace(4.8, 5.2, 17)
+    periods = [gait_at("slope-3deg", f"{key}={mass!r}").period for mass in masses.tolist()]
+    best = found["best"][key]
+    assert found["start_value"] == pytest.approx(gait_at("slope-3deg").period, rel=1e-9)
+    assert found["value"] >= max(periods) - 1e-9
+    assert abs(best - masses[int(np.argmax(periods))]) <= 0.025
+    assert found["value"] == pytest.approx(gait_at("slope-3deg", f"{key}={best!r}").period, rel=1e-8)
+
+
+def test_largest_step_of_a_limping_walker_is_that_of_its_weaker_leg():
+    over = "design.over={walker.leg_2.leg_mass_kg: [4.95, 5.05]}"
+    found = run("prosthesis", "design.maximise=largest_step_down_m", over, "robustness.steps=3", "design.starts=1")
+    best = f"walker.leg_2.leg_mass_kg={found['best']['walker.leg_2.leg_mass_kg']!r}"
+    config = load(Path("prosthesis"), (best,)).config
+    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    legs = find_model_gait("rigid", config, gait, print).quick_by_leg()
+    assert len(legs) == 2
+    sizes = [largest_disturbance(leg, *LARGEST["largest_step_down_m"], 3) for leg in legs]
+    assert found["value"] == pytest.approx(min(sizes), rel=1e-3)
+    assert max(sizes) > 1.1 * min(sizes)

@@ -247,3 +247,46 @@ def test_empty_list_of_parameters_omits_the_derivatives():
     assert summary["sensitivity"] == []
     assert summary["gait_sensitivity_norm"]
     assert "Most effective change" not in " ".join(answer("robustness", summary))
+
+
+@pytest.fixture(scope="module")
+def limping():
+    few = ("robustness.walks=2", "robustness.roughness_m=[0.001]", "robustness.steps=3", "robustness.max_steps=4")
+    return run("paper", "walker.leg_2={leg_mass_kg: 5.3}", "robustness.to=[]", *few)
+
+
+def test_each_legs_disturbances_are_reported_and_alike_in_both_models(limping):
+    summary = limping.summary
+    json.dumps(summary, allow_nan=False)
+    for name in ("largest_step", "largest_push"):
+        assert [(row["model"], row["leg"]) for row in summary[name]] == [
+            ("rigid", 1), ("rigid", 2), ("contact", 1), ("contact", 2),
+        ]  # fmt: skip
+        assert limping.groups[name]["leg"].tolist() == [1, 2, 1, 2]
+    rigid, contact = summary["largest_push"][:2], summary["largest_push"][2:]
+    for one, other in zip(rigid, contact, strict=True):
+        assert other["forward_N_s"] == pytest.approx(one["forward_N_s"], rel=0.1)
+    # leg 2 is pushed further forward before the walker falls: both models say so, by more than they differ
+    assert rigid[1]["forward_N_s"] > 1.2 * rigid[0]["forward_N_s"]
+    norms = {(row["model"], row["leg"]): row["value"] for row in summary["gait_sensitivity_norm"][::6]}
+    assert norms["contact", 1] / norms["contact", 2] == pytest.approx(norms["rigid", 1] / norms["rigid", 2], rel=0.05)
+
+
+def test_report_says_which_leg_is_disturbed(limping, rigid):
+    said = said_of(limping.summary)
+    assert "after a step of leg 1 down of" in said
+    assert "as leg 2 begins to swing" in said
+    assert "leg" not in said_of(rigid.summary).replace("leg_", "").replace("leg length", "")
+    first, *_ = tables(limping.summary)
+    assert [column.title for column in first.columns][:2] == ["model", "swing leg"]
+
+
+def test_half_of_the_effect_of_both_legs_is_that_of_one():
+    few = ("robustness.model=rigid", "robustness.roughness_m=[]", "robustness.steps=1")
+    keys = "robustness.to=[walker.leg_mass_kg, walker.leg_2.leg_mass_kg]"
+    content = run("slope-3deg", *few, keys)
+    values = {(row["of"], row["to"]): row["value"] for row in content.summary["sensitivity"]}
+    assert len(values) == 12
+    for of in ("period_s", "step_length_m", "speed_m_s", "gait_sensitivity_norm"):
+        both, one = (values[of, key] for key in ("walker.leg_mass_kg", "walker.leg_2.leg_mass_kg"))
+        assert one == pytest.approx(0.5 * both, rel=1e-5), of

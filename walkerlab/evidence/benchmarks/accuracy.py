@@ -25,7 +25,7 @@ from walkerlab.evidence.paper.walker import compass_or_none
 from walkerlab.labels import labels_of
 from walkerlab.physics.hybrid.recorded_walk import scale_rates
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content
@@ -102,7 +102,8 @@ def trials_of_scene(config: SceneConfig, inputs: Mapping[str, Content]) -> Itera
     from walkerlab.evidence.benchmarks.contact_trials import contact_trial, stiff_ground_trial
 
     compass = is_passive_compass(config)
-    yield contact_trial(config, state, length, CONTACT_STEPS if compass else SLOW_CONTACT_STEPS)
+    steps = CONTACT_STEPS if compass else SLOW_CONTACT_STEPS
+    yield contact_trial(config, state, length, steps, step_asymmetry(config, inputs))
     if compass:
         yield stiff_ground_trial(config, state, length, NEAR_RIGID_STEPS)
 

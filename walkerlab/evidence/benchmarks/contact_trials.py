@@ -12,9 +12,11 @@ STIFFNESS_FACTOR = 100.0
 CREEP_FACTOR = 0.01
 
 
-def contact_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
-    """Set up the walk with the config's contact, on pads of length `length_m`."""
-    scene = contact_scene(config, length_m, own_pitch_m=length_m)
+def contact_trial(
+    config: ContactConfig, state: State, length_m: float, steps: int, asymmetry: float = 0.0
+) -> ContactTrial:
+    """Set up the walk with the config's contact, on pads of length `length_m`. `asymmetry` as in `contact_scene`."""
+    scene = contact_scene(config, length_m, length_m, asymmetry)
     return ContactTrial(scene.walker, scene.ground, start_state(scene, state), steps, "contact")
 
 

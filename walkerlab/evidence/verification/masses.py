@@ -1,14 +1,14 @@
 """Momentum and energy of walkers computed from their point masses, independently of the equations of motion."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from walkerlab.evidence.verification.verdict import finite
 from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
 from walkerlab.physics.mechanics.parts import Assembly
-from walkerlab.physics.mechanics.rigid import find_hip, group_bodies
+from walkerlab.physics.mechanics.rigid import find_hip, group_bodies, have_equal_legs
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING
 from walkerlab.physics.solvers.system import Floats
 
@@ -71,8 +71,8 @@ class Moving:
         return float(on_masses @ orbital + on_bodies @ (self.inertia * self.rate))
 
 
-class RigidMasses:
-    """Momenta and energy of a walker in states of the rigid model, computed from its point masses."""
+class SwingMasses:
+    """Momenta and energy of a walker in the rigid model while its first leg swings, computed from its point masses."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
         """Measure levers from the centre of the stance foot's arc. The slope is in rad."""
@@ -83,6 +83,7 @@ class RigidMasses:
         self.assembly = assembly
         self.slope = slope
         self.radius = foot.radius_m
+        self.raised = np.array([0.0, foot.radius_m - trailing.radius_m])
         self.members = group_bodies(assembly).members
         self.masses = Masses(assembly, root)
         self.owner = [assembly.index(anchor.body) for _, anchor in masses(assembly)]
@@ -99,14 +100,10 @@ class RigidMasses:
         rolling = np.array([-self.radius * state[n + STANCE], 0.0])
         place, velocity = self.masses.moving(psi, rate)
         hip = centre + rotate(self.to_hip, psi).sum(axis=0)
-        contact = rotate(self.to_foot, psi).sum(axis=0)
+        contact = rotate(self.to_foot, psi).sum(axis=0) + self.raised
         mass = self.masses.mass
         inertia = self.masses.inertia
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
-
-    def poses(self, states: Floats) -> list[Moving]:
-        """Return the masses in each of the states (strikes, 2 n)."""
-        return [self.pose(state) for state in states]
 
     def share_of(self, leg: int) -> Floats:
         """Return the share (bodies,) of each body that belongs to a leg. Coupled bodies belong to it in part."""
@@ -131,13 +128,26 @@ class RigidMasses:
         walker_momentum = moving.momentum_about(foothold, np.ones(len(self.owner)), np.ones(share.size))
         return walker_momentum, moving.momentum_about(moving.hip, share[self.owner], share)
 
+
+class RigidMasses:
+    """Heel strikes of a walk computed from its point masses: those of both legs, which swing in turn."""
+
+    def __init__(self, assembly: Assembly, slope: float) -> None:
+        exchanged = replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1])
+        own = SwingMasses(assembly, slope)
+        self.turns = (own, own if have_equal_legs(assembly) else SwingMasses(exchanged, slope))
+
+    def poses(self, states: Floats, first: int = 0) -> list[Moving]:
+        """Return the masses in each of the states (strikes, 2 n). In the first of them leg `first` (0 or 1) swings."""
+        return [self.turns[(first + k) % 2].pose(state) for k, state in enumerate(states)]
+
     def momentum_change(self, before: Sequence[Moving], after: Sequence[Moving], push_off: float = 0.0) -> float:
         """Return the largest relative change of the conserved momenta over heel strikes. `push_off` is in N s."""
         change = 0.0
         size = 1e-300
-        for old, new in zip(before, after, strict=True):
-            at_start = np.array(self.momenta(old, new=False))
-            at_end = np.array(self.momenta(new, new=True))
+        for k, (old, new) in enumerate(zip(before, after, strict=True)):
+            at_start = np.array(self.turns[k % 2].momenta(old, new=False))
+            at_end = np.array(self.turns[(k + 1) % 2].momenta(new, new=True))
             at_start[0] += moment_of(push_off, old)
             change = max(change, *np.abs(at_end - at_start))
             size = max(size, *np.abs(at_start), *np.abs(at_end))

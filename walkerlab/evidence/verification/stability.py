@@ -13,7 +13,7 @@ from walkerlab.evidence.verification.ordinary import FINE_ERROR, MAX_ORDINARY_EV
 from walkerlab.evidence.verification.verdict import CaseResult
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress, track
-from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.contact import scene_on_pads
@@ -61,7 +61,7 @@ def resolve_scene(config: WalksConfig, inputs: Mapping[str, Content]) -> Config:
     contact = config.contact
     if contact is None or contact.terrain != "checkerboard":
         return scene
-    pitch = scene_on_pads(config, step, start).pitch_m
+    pitch = scene_on_pads(config, step, start, asymmetry=step_asymmetry(config, inputs)).pitch_m
     return scene.model_copy(update={"contact": contact.model_copy(update={"pad_pitch": pitch})})
 
 

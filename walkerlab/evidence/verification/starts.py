@@ -91,7 +91,7 @@ class RigidStart(CaseStart):
             return []
         strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
         before = strikes.poses(record.before)
-        after = strikes.poses(record.after)
+        after = strikes.poses(record.after, first=1)
         push = float(self.walker.push_off)
         distance = feet_off_the_slope(before) / self.walker.leg_length
         momentum_change = strikes.momentum_change(before, after, push)
@@ -177,8 +177,10 @@ def prepare_start(config: WalksConfig, case: Case) -> Start | None:
         contact = contact_gait(config, length, state).gait
         if contact is None:
             return None
-        pitch = contact.step.length_m
-    scene = contact_scene(config, length, pitch)
+        pitch = float(contact.lengths_m.mean())
+    behind = abs(float(swing_foot(walker, state)[1]))
+    asymmetry = 2.0 * (behind / pitch - 1.0) if walker.legs_differ and not isinstance(config.start, MidStep) else 0.0
+    scene = contact_scene(config, length, pitch, asymmetry)
     y = start_state(scene, state)
     y = (*y[:CENTRE_HEIGHT], y[CENTRE_HEIGHT] - case.lowered_m, *y[CENTRE_HEIGHT + 1 :])
     leg = config.walker.leg_length_m

@@ -72,8 +72,8 @@ class TwoLegs(NamedTuple):
 
 
 def two_legs(model: RigidModel) -> TwoLegs | None:
-    """Convert a model of two straight legs for lanes, or return None if the model has knees or more bodies."""
-    if len(model.arm_x) != 2 or model.kneed:
+    """Convert a model of two equal straight legs for lanes, or return None for any other model."""
+    if len(model.arm_x) != 2 or model.kneed or model.legs_differ:
         return None
     x, y = model.hip_x, model.hip_y
     lowest = (endings.FALLEN_HIP * model.leg_length - model.radius) / math.hypot(x, y)

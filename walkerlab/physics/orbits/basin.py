@@ -1,7 +1,8 @@
 """Basins of attraction of the rigid walker: which attractor each start reaches, in how many steps, or how it fails.
 
 All walks use the unit walker and start on the section just after heel strike, z = (theta_2, dtheta_1, dtheta_2). A walk
-counts as having reached an attractor once it is within a distance from which every test walk returned to it.
+counts as having reached an attractor once it is within a distance from which every test walk returned to it. If the
+legs differ, points of attractors lie on the section from which leg 1 swings, a stride apart.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ STARTS_PER_POINT = 24  # test walks started around each point of an attractor; a
 STEPS_PER_LOOK = 16
 BATCH_BUDGET = 4_000_000
 
-# Unit walker. Walkers with two straight legs walk from many starts simultaneously, in lanes; others from one at a time.
+# Unit walker. Two equal straight legs walk from many starts simultaneously, in lanes; others from one at a time.
 Walker = TwoLegs | RigidModel
 
 
@@ -68,7 +69,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicAttractor:
-    points: Floats  # (period, 3) section points in walking order, starting with the smallest angle
+    points: Floats  # (period, 3) section points in walking order, a stride apart, starting with the smallest angle
     reach: float  # distance from which all test walks return to it; zero if not all return from any distance tried
 
     @property
@@ -129,6 +130,7 @@ def walk_one_by_one(
     """Walk from one start after another with any walker, and check for capture after each batch of steps."""
     shooting = RigidStepper(walker, Tolerances("dop853", *tolerances, BATCH_BUDGET))
     section = strike_section(walker)
+    stride = stride_of(walker)
     for number, start in enumerate(starts):
         z = start
         steps = 0
@@ -139,6 +141,7 @@ def walk_one_by_one(
             points = part.z
             steps_taken = part.time.size
             near = ((points[:, None] - capture.points) ** 2).sum(axis=2) < capture.reach
+            near[np.arange(1, len(near) + 1) % stride != 0] = False
             if near.any():
                 steps_taken = int(np.argmax(near.any(axis=1))) + 1
                 capture.attractor[number] = capture.owner[np.argmax(near[steps_taken - 1])]
@@ -149,6 +152,11 @@ def walk_one_by_one(
             if near.any():
                 break
         fates.outcome[number], fates.steps[number] = outcome, steps
+
+
+def stride_of(walker: Walker) -> int:
+    """Return the number of steps after which a walker returns to its first section."""
+    return 2 if isinstance(walker, RigidModel) and walker.legs_differ else 1
 
 
 def find_attractors(walker: Walker, starts: Floats, seed: int) -> Attractors:
@@ -196,10 +204,11 @@ def cycle_through(walker: Walker, point: Floats) -> Floats | None:
     """Return the cycle (period, 3) through a point (3,), smallest angle first, or None if the walk does not return."""
     orbit = [point]
     for _ in range(MAX_CYCLE_PERIOD):
-        step = walk_to_attractor(walker, Attractors(), orbit[-1][None, :], 1, tolerances=(CYCLE_RTOL, CYCLE_ATOL))
-        if step.outcome[0] != Outcome.WALKED:
+        start = orbit[-1][None, :]
+        ahead = walk_to_attractor(walker, Attractors(), start, stride_of(walker), tolerances=(CYCLE_RTOL, CYCLE_ATOL))
+        if ahead.outcome[0] != Outcome.WALKED:
             return None
-        orbit.append(step.last[0])
+        orbit.append(ahead.last[0])
         if np.abs(orbit[-1] - point).max() < CYCLE_DISTANCE:
             points = np.array(orbit[:-1])
             return np.roll(points, -int(np.argmin(points[:, 0])), axis=0)

@@ -50,6 +50,7 @@ from walkerlab.physics.orbits.step_map import (
     Stepper,
     failed_step,
     valid,
+    walk_steps,
 )
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
@@ -240,12 +241,18 @@ def step_from_section(
 
 
 def walk_from_section(
-    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, push: float
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    z: Floats,
+    heights: Floats,
+    push: float,
+    stance: int = STANCE_FOOT,
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
-    start = state_on_section(walker, z, STANCE_FOOT)
+    start = state_on_section(walker, z, stance)
     steps = heights.size - 1
-    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1)
+    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1, stance)
 
     def go_on(walk_state: WalkState, state: State, until: int = NO_LIMIT) -> Stopped:
         return walk_on(walker, tolerances, walk_state, new_observer(walker, walk_state, state), state, until)
@@ -357,6 +364,7 @@ class ContactMap(StepMap):
         Monitor("slip_m", "m", "largest net slip of a foot from touch to lift"),
         Monitor("tripped", "1", "whether the swing foot trips on pads spaced by the gait's own step length", 0.5),
     )
+    disturbs_after = 1
     probe = 1e-6  # small compared with the penetration of stiff ground, which is below 0.01 mm
 
     def __init__(
@@ -420,11 +428,12 @@ class ContactMap(StepMap):
                 tripped = float(self._walk(on_pads, z, False).outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 
-    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0) -> DisturbedWalk:
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
         site = valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
-        walk = walk_from_section(site.walker, site.ground, endless, z * self._units, heights_m, push_N_s)
+        scene = (site.walker, site.ground, endless)
+        walk = walk_from_section(*scene, z * self._units, heights_m, push_N_s, stance_of(swing))
         return replace(walk, z=walk.z / self._units)
 
     def settled(self, z: Floats, p: float) -> Floats:
@@ -439,8 +448,13 @@ class ContactMap(StepMap):
         return legs_sampled_from_section(site.walker, site.ground, endless, z * self._units, heights_m, times)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        step = self.step(z, p, derived=False)
-        return step.driven.cost_of_transport(step.length_m) if isinstance(step, SectionStep) else None
+        stride = walk_steps(self, z, p, self.stride, derived=False)
+        if stride.outcome is not Outcome.WALKED:
+            return None
+        works = [step.driven for step in stride.steps if isinstance(step, SectionStep)]
+        # the knees' work, the last field, may be None and does not count
+        sums = (math.fsum(each) for each in zip(*(work[1:-1] for work in works), strict=True))
+        return DrivenWork(works[0].weight, *sums).cost_of_transport(math.fsum(stride.lengths_m))
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         site = valid(self._at(p))

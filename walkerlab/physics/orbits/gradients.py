@@ -18,7 +18,7 @@ import numpy as np
 
 from walkerlab.outcome import Outcome
 from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
-from walkerlab.physics.orbits.step_map import MappedStep, multipliers_of
+from walkerlab.physics.orbits.step_map import Cycle, multipliers_of
 from walkerlab.physics.solvers.system import Floats
 
 # Differentiable quantities with units. The norms describe how the step period responds to a floor drop; the scaled norm
@@ -32,7 +32,7 @@ GAIT_QUANTITIES: Final[Mapping[str, str]] = {
     "gait_sensitivity_norm_scaled": "1",
     "cost_of_transport": "1",
 }
-STEP_QUANTITY_COUNT = 3  # number of quantities, the first ones, that follow from a single step
+STEP_QUANTITY_COUNT = 3  # number of quantities, the first ones, that follow from a single stride
 # multipliers count as equal if their magnitudes differ by less than this, or if the condition number of the eigenvector
 # matrix is above the inverse of this
 MIN_EIGENVECTOR_PRODUCT = 1e-6
@@ -62,28 +62,37 @@ class Gradient:
 def gait_quantities(gait: GaitOnMap, selection: Collection[str] = GAIT_QUANTITIES) -> dict[str, float] | None:
     """Compute the quantities of a gait by name, without norms if it is unstable, or return None if its step fails."""
     # only the quantities in `selection`, because those that need more than a single step are expensive
-    step = gait.step_map.step(gait.z, gait.p)
-    if step.outcome is not Outcome.WALKED:
+    stride = gait.stride(gait.z, gait.p)
+    if stride.outcome is not Outcome.WALKED:
         return None
-    radius = float(np.abs(multipliers_of(step.DP)).max())
-    quantities = dict(zip(GAIT_QUANTITIES, (*step_quantities(step), radius), strict=False))
+    radius = float(np.abs(multipliers_of(stride.DP)).max()) ** (1.0 / gait.step_map.stride)
+    quantities = dict(zip(GAIT_QUANTITIES, (*mean_quantities(stride), radius), strict=False))
     for names, of in WALK_QUANTITIES.items():
-        values = None if set(names).isdisjoint(selection) else of(gait._replace(A=step.DP))
+        values = None if set(names).isdisjoint(selection) else of(gait._replace(A=stride.DP))
         quantities |= {} if values is None else dict(zip(names, values, strict=True))
     return quantities
 
 
-def step_quantities(step: MappedStep) -> tuple[float, float, float]:
-    return step.period_s, step.length_m, step.length_m / step.period_s
+def mean_quantities(stride: Cycle) -> tuple[float, float, float]:
+    """Return mean period (s) and length (m) of a stride's steps, and the speed (m/s)."""
+    steps = len(stride.steps)
+    period = stride.period_s
+    length = math.fsum(stride.lengths_m)
+    return period / steps, length / steps, length / period
 
 
 def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
-    """Return the gait sensitivity norm of the step period for a floor drop, in s/m and scaled, or None if unstable."""
-    answer = response(gait, "floor-drop")
-    if answer is None:
+    """Return the gait sensitivity norm of the step period for a floor drop, in s/m and scaled, or None if unstable.
+
+    If the legs differ, it is the root mean square over the drops under each foot.
+    """
+    answers = [response(each, "floor-drop") for each in gait.by_leg()]
+    norms = [float(answer[0][0]) for answer in answers if answer is not None]
+    if len(norms) < len(answers):
         return None
+    norm = math.hypot(*norms) / math.sqrt(len(norms))
     length, time = gait.step_map.leg_and_pendulum(gait.p)
-    return float(answer[0][0]), float(answer[0][0]) * length / time
+    return norm, norm * length / time
 
 
 def transport_cost(gait: GaitOnMap) -> tuple[float] | None:
@@ -116,7 +125,7 @@ def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_Q
         if fine is not None and coarse is not None:
             better = {
                 name: gradient
-                for name, gradient in combine_steps(gait.A, fine, coarse).items()
+                for name, gradient in combine_steps(gait, fine, coarse).items()
                 if gradient.halves(best.get(name))
             }
             best |= better
@@ -126,13 +135,14 @@ def gradients(gait: GaitOnMap, scale: float, selection: Collection[str] = GAIT_Q
     return best
 
 
-def combine_steps(A: Floats, fine: Derivatives, coarse: Derivatives) -> dict[str, Gradient]:
+def combine_steps(gait: GaitOnMap, fine: Derivatives, coarse: Derivatives) -> dict[str, Gradient]:
     combined = {
         name: make_gradient(value, abs(value - coarse.numbers[name]))
         for name, value in fine.numbers.items()
         if name in coarse.numbers
     }
-    return combined | {"spectral_radius": radius_gradient(A, fine.A, coarse.A - fine.A)}
+    steps = gait.step_map.stride
+    return combined | {"spectral_radius": radius_gradient(gait.A, fine.A, coarse.A - fine.A, steps)}
 
 
 class Derivatives(NamedTuple):
@@ -146,8 +156,8 @@ def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
     # in the air or deep in the ground.
 
     def step_from(off: float) -> Floats | None:
-        step = gait.step_map.step(gait.z + off * guess, gait.p + off, derived=False)
-        return step.z if step.outcome is Outcome.WALKED else None
+        stride = gait.stride(gait.z + off * guess, gait.p + off, derived=False)
+        return stride.steps[-1].z if stride.outcome is Outcome.WALKED else None
 
     moved = derivative(step_from, h)
     return None if moved is None else np.asarray(np.linalg.solve(np.eye(guess.size) - gait.A, moved - gait.A @ guess))
@@ -162,20 +172,20 @@ def differentiate(gait: GaitOnMap, h: float, guess: Floats, selection: Collectio
         return None
 
     @cache
-    def neighbour(off: float) -> tuple[GaitOnMap, MappedStep]:
-        step = gait.step_map.step(gait.z + off * along, gait.p + off)
-        return gait._replace(z=gait.z + off * along, p=gait.p + off, A=step.DP), step
+    def neighbour(off: float) -> tuple[GaitOnMap, Cycle]:
+        stride = gait.stride(gait.z + off * along, gait.p + off)
+        return gait._replace(z=gait.z + off * along, p=gait.p + off, A=stride.DP), stride
 
-    def step_values(off: float) -> Floats | None:
-        _, step = neighbour(off)
-        return np.append(step_quantities(step), step.DP) if step.outcome is Outcome.WALKED else None
+    def stride_values(off: float) -> Floats | None:
+        _, stride = neighbour(off)
+        return np.append(mean_quantities(stride), stride.DP) if stride.outcome is Outcome.WALKED else None
 
     def walk_values(off: float, of: Callable[[GaitOnMap], tuple[float, ...] | None]) -> Floats | None:
-        changed_gait, step = neighbour(off)
-        values = of(changed_gait) if step.outcome is Outcome.WALKED else None
+        changed_gait, stride = neighbour(off)
+        values = of(changed_gait) if stride.outcome is Outcome.WALKED else None
         return None if values is None else np.array(values)
 
-    changed = derivative(step_values, h)
+    changed = derivative(stride_values, h)
     if changed is None:
         return None
     numbers = dict(zip(GAIT_QUANTITIES, changed[:STEP_QUANTITY_COUNT].tolist(), strict=False))
@@ -190,7 +200,8 @@ def make_gradient(value: float, error: float) -> Gradient:
     return Gradient(float(value), float(error), "lost in rounding" if lost else "")
 
 
-def radius_gradient(A: Floats, change: Floats, error: Floats) -> Gradient:
+def radius_gradient(A: Floats, change: Floats, error: Floats, steps: int = 1) -> Gradient:
+    """Differentiate the spectral radius per step, where A (d, d) is the derivative of `steps` steps."""
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right) if np.linalg.cond(right) < 1.0 / MIN_EIGENVECTOR_PRODUCT else None
     largest = int(np.argmax(np.abs(values)))
@@ -200,10 +211,11 @@ def radius_gradient(A: Floats, change: Floats, error: Floats) -> Gradient:
     meets = any(abs(abs(value) - abs(values[largest])) < MIN_EIGENVECTOR_PRODUCT for value in distinct)
     if left is None or meets or values[largest] == 0.0:
         return Gradient(None, None, "multipliers meet")
-    towards = values[largest].conjugate() / abs(values[largest])
+    of_step = float(abs(values[largest])) ** (1.0 / steps - 1.0) / steps
+    towards = of_step * (values[largest].conjugate() / abs(values[largest]))
     slope = (towards * (left[largest] @ change @ right[:, largest])).real
     # absolute values: errors of A's elements may cancel by chance
-    off = np.abs(left[largest]) @ np.abs(error) @ np.abs(right[:, largest])
+    off = of_step * (np.abs(left[largest]) @ np.abs(error) @ np.abs(right[:, largest]))
     return make_gradient(float(slope), float(off))
 
 

@@ -28,6 +28,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     STRAIGHT,
     SWING,
     RigidModel,
+    by_turns,
     feet_on_slope,
     hip_height,
     mass_matrix,
@@ -399,7 +400,7 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return failed_step(None, z.size)
-        section = unit.sections[swing % len(unit.sections)]
+        _, section = unit.swinging(swing)
         step = self._exact.walk(section, z, derived=derived)
         if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
             standing = step.outcome is Outcome.WALKED
@@ -423,16 +424,17 @@ class RigidMap(StepMap):
         extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
         return np.array(extremes) * (units.force, 1.0, units.length)
 
-    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
         unit = valid(self._unit_at(p))
-        walker = unit.walker
+        walker, section = unit.swinging(swing)
         units = unit.units
-        start = np.array(state_on_section(unit.walker, z))
+        start = np.array(state_on_section(walker, z))
         start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
-        walk = self._exact.walk(unit.section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
+        walk = self._exact.walk(section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
         before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
-        lengths = step_lengths(walker, np.vstack((start, after))[:-1], before)
+        starts = np.vstack((start, after))[:-1]
+        lengths = by_turns(walker, np.arange(len(before)), step_lengths, starts, before)
         durations = np.diff(walk.time, prepend=0.0) * units.time
         last = walk.z[-1] if walk.z.size else z
         return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, STANCE], last)
@@ -504,16 +506,19 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return None
-        walk = take_walk(unit.walker, EXACT_STEPS, state_on_section(unit.walker, z), 1)
-        return float(walk.driven.cost_of_transport(walk.lengths_m[0])) if walk.steps else None
+        count = len(unit.sections)
+        walk = take_walk(unit.walker, EXACT_STEPS, state_on_section(unit.walker, z), count)
+        return float(walk.driven.cost_of_transport(walk.lengths_m.sum())) if walk.steps == count else None
 
-    def ground_after_push(self, z: Floats, p: float, push_N_s: float, steps: int) -> tuple[float, float]:
+    def ground_after_push(
+        self, z: Floats, p: float, push_N_s: float, steps: int, swing: int = 0
+    ) -> tuple[float, float]:
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
         # Negative values mean that the ground would have to pull.
         unit = valid(self._unit_at(p))
-        walker = unit.walker
+        walker, _ = unit.swinging(swing)
         units = unit.units
-        start = state_on_section(unit.walker, z)
+        start = state_on_section(walker, z)
         pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
         impulse = momentum(walker, pushed)[1] - momentum(walker, start)[1]
         walk = take_walk(walker, MONITORED_STEPS, pushed, steps)
@@ -592,6 +597,11 @@ class SimilarWalker(NamedTuple):
     feet: list[list[float]]
     radius: float
     apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
+
+    def swinging(self, swing: int) -> tuple[RigidModel, StrikeSection]:
+        """Return the model and the section at the start of the step `swing`, as in `Stepper.step`."""
+        leg = swing % len(self.sections)
+        return self.walker.exchanged if leg else self.walker, self.sections[leg]
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
         """Return rises and nearest landing (see HeelStrikes) over foothold heights (m), in units of the walker."""

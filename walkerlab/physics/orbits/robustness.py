@@ -5,6 +5,9 @@ step and an indicator e of the step, both minus the gait's values,
 
     z' = A z + B d,  e' = C z + D d,  norm = sqrt(D^2 + sum over k >= 0 of (C A^k B)^2)
 
+If the legs differ, A is the derivative of a stride, e' holds both its steps, and a disturbance of one leg's step is
+another than that of the other leg's.
+
 A drop takes the state off the section of even ground for two steps, so the first terms of the sum are difference
 quotients of exact walks, and the derivative on even ground gives the rest.
 
@@ -24,7 +27,7 @@ import numpy as np
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.walk_record import rough_heights
 from walkerlab.physics.orbits.similarity import Units
-from walkerlab.physics.orbits.step_map import DisturbedWalk, StepMap, multipliers_of
+from walkerlab.physics.orbits.step_map import Cycle, DisturbedWalk, StepMap, multipliers_of, walk_steps
 from walkerlab.physics.solvers.system import Floats
 
 Disturbance = Literal["floor-drop", "hip-push"]
@@ -37,7 +40,7 @@ LARGEST: Final[Mapping[str, tuple[Disturbance, float]]] = {
 }
 """Disturbance and sign of each largest disturbance that a gait survives."""
 INDICATORS = ("step_period", "step_length", "speed")
-DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks
+DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks: a stride, if the legs differ
 CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
 FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
 # Offsets and weights of fourth-order formulas for a first derivative.
@@ -49,13 +52,31 @@ MAX_DISTURBANCE = 0.5  # largest disturbance tried, as a multiple of `unit_of`
 
 
 class GaitOnMap(NamedTuple):
-    """A period-1 gait on its step map: parameter p, section coordinates z, derivative A, and the walker's units."""
+    """A gait of one stride on its step map, where a stride is a single step for equal legs."""
 
     step_map: StepMap
-    p: float
-    z: Floats  # (d,)
-    A: Floats  # (d, d)
-    units: Units
+    p: float  # value of the parameter
+    z: Floats  # (d,) section coordinates at the start
+    A: Floats  # (d, d) derivative of a stride
+    units: Units  # of the walker
+    swing: int = 0  # number of steps of the gait before z, as in `Stepper.step`
+
+    @property
+    def leg(self) -> int:
+        """The leg, 1 or 2, that swings in the first step that can be disturbed."""
+        return 1 + (self.swing + self.step_map.disturbs_after) % 2
+
+    def stride(self, z: Floats, p: float, derived: bool = True) -> Cycle:
+        """Take the steps of a stride from another start and at another value of the parameter."""
+        return walk_steps(self.step_map, z, p, self.step_map.stride, derived, self.swing)
+
+    def by_leg(self) -> list[GaitOnMap]:
+        """Return the gait from the start of each step of its stride, in the order of `leg`: once for equal legs."""
+        if self.step_map.stride == 1:
+            return [self]
+        first, second = (step for step in self.stride(self.z, self.p).steps)
+        other = self._replace(z=first.z, A=first.DP @ second.DP, swing=self.swing + 1)
+        return sorted((self, other), key=lambda gait: gait.leg)
 
     def unit_of(self, disturbance: Disturbance) -> float:
         """Return the unit of a drop (m) or of a push (N s)."""
@@ -74,14 +95,15 @@ def derivative(function: Callable[[float], Floats | None], step: float) -> Float
 def sensitivity_norm(A: Floats, B: Floats, C: Floats, D: Floats) -> Floats | None:
     """Return norms (indicators,) of e' = C z + D d, z' = A z + B d, or None for an unstable gait.
 
-    A (d, d), B (d,), C (indicators, d); D (steps, indicators) holds the responses of the first steps.
+    A (d, d), B (d,), C (steps of a stride x indicators, d); D (steps, indicators) holds the responses of the first
+    steps.
     """
     if np.abs(multipliers_of(A)).max() >= 1.0:
         return None
     # X, the sum of z z^T over all steps, satisfies X = A X A^T + B B^T
     d = len(B)
     summed = np.linalg.solve(np.eye(d * d) - np.kron(A, A), np.outer(B, B).ravel()).reshape(d, d)
-    later = np.einsum("ij,jk,ik->i", C, summed, C)
+    later = np.einsum("ij,jk,ik->i", C, summed, C).reshape(-1, D.shape[1]).sum(axis=0)
     return np.asarray(np.sqrt((D**2).sum(axis=0) + np.maximum(later, 0.0)))
 
 
@@ -101,8 +123,8 @@ def indicators(walk: DisturbedWalk) -> Floats:
 def walk_disturbed(gait: GaitOnMap, disturbance: Disturbance, size: float, steps: int) -> DisturbedWalk:
     """Walk from the gait with a disturbed first step: a lasting drop (m) of the floor, or a push (N s)."""
     if disturbance == "hip-push":
-        return gait.step_map.disturbed(gait.z, gait.p, np.zeros(steps + 1), size)
-    return gait.step_map.disturbed(gait.z, gait.p, np.append(0.0, np.full(steps, -size)))
+        return gait.step_map.disturbed(gait.z, gait.p, np.zeros(steps + 1), size, gait.swing)
+    return gait.step_map.disturbed(gait.z, gait.p, np.append(0.0, np.full(steps, -size)), swing=gait.swing)
 
 
 def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None:
@@ -121,12 +143,13 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
         walk = walk_disturbed(gait, disturbance, size, DIRECT_STEPS)
         return np.append(indicators(walk), walk.z) if walk.outcome is Outcome.WALKED else None
 
-    def next_step(move: Floats) -> Floats | None:
-        walk = gait.step_map.disturbed(gait.z + move, gait.p, np.zeros(2))
-        return indicators(walk)[0] if walk.outcome is Outcome.WALKED else None
+    def next_stride(move: Floats) -> Floats | None:
+        even = np.zeros(gait.step_map.stride + 1)
+        walk = gait.step_map.disturbed(gait.z + move, gait.p, even, swing=gait.swing)
+        return indicators(walk).ravel() if walk.outcome is Outcome.WALKED else None
 
     changed = derivative(step_after, h * gait.unit_of(disturbance))
-    columns = [derivative(lambda size, unit=unit: next_step(size * unit), h) for unit in np.eye(d)]  # type: ignore[misc]
+    columns = [derivative(lambda size, unit=unit: next_stride(size * unit), h) for unit in np.eye(d)]  # type: ignore[misc]
     if changed is None or any(column is None for column in columns):
         return None
     D = changed[:-d].reshape(DIRECT_STEPS, len(INDICATORS))
@@ -164,7 +187,8 @@ def largest_disturbance(
 
 def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
     """Count the steps of a walk from the gait over normally distributed heights, stopping at `most` steps."""
-    return int(gait.step_map.disturbed(gait.z, gait.p, rough_heights(roughness_m, seed, most)).durations_s.size)
+    heights = rough_heights(roughness_m, seed, most)
+    return int(gait.step_map.disturbed(gait.z, gait.p, heights, swing=gait.swing).durations_s.size)
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,8 @@ class ScaledStarts:
     by_swing: State  # (2 + n) velocities due to the swing leg's angular velocity
     by_stance: State  # (2 + n) velocities due to the stance leg's angular velocity
     steps: int
-    gait: tuple[float, float] | None  # period (s) and step length (m) to settle on; None if not required
+    # periods (s) and lengths (m) of the steps of a gait to settle on, one for equal legs; None if not required
+    gait: tuple[tuple[float, float], ...] | None
     tolerances: Tolerances = START_TOLERANCES
 
     def start(self, swing: float, stance: float) -> State:
@@ -76,10 +77,10 @@ class ScaledStarts:
         """
         if self.gait is None:
             return None
-        period, length = self.gait
+        period, length = np.resize(self.gait, (walk.periods_s.size, 2)).T
         off_period = np.abs(walk.periods_s - period)
         off_length = np.abs(walk.lengths_m - length)
-        off = np.flatnonzero((off_period > SETTLED_SHARE * period) | (off_length > SETTLED_SHARE * abs(length)))
+        off = np.flatnonzero((off_period > SETTLED_SHARE * period) | (off_length > SETTLED_SHARE * np.abs(length)))
         first = int(off[-1]) + 1 if off.size else 0
         return first if first < walk.periods_s.size else None
 
@@ -94,7 +95,7 @@ def scaled_starts(
     ground: JudgedGround,
     start_of: Callable[[float, float], State],
     steps: int,
-    gait: tuple[float, float] | None,
+    gait: tuple[tuple[float, float], ...] | None,
 ) -> ScaledStarts:
     """Build the scaled starts of a scene. `start_of` is linear in the factors on the two angular velocities."""
     still = start_of(0.0, 0.0)

@@ -102,12 +102,16 @@ class StepMap(Stepper, Protocol):
     tolerances: Tolerances  # solver settings of a step
     probe: float  # size of a disturbance with a linear response, in units of the walker
     stride: int = 1  # number of steps after which the map repeats: 2 for legs that differ
+    disturbs_after: int = 0  # heel strikes between a section and the first step that heights and pushes disturb
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
 
-    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0) -> DisturbedWalk:
-        """Walk from z (d,) over heights (steps + 1,) from the present foothold on, after a hip push along the slope."""
+    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0) -> DisturbedWalk:
+        """Walk from z (d,) over heights (steps + 1,) from the present foothold on, after a hip push along the slope.
+
+        swing  as in `Stepper.step`
+        """
 
     def settled(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
         """Return z (d,) with the stance foot at rest on the ground."""
@@ -148,7 +152,7 @@ class StepMap(Stepper, Protocol):
         return VariedWalk(durations, lengths, angles, rates, samples)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
-        """Return work divided by weight times distance for a step from z (d,), or None if the step fails."""
+        """Return work divided by weight times distance for a stride from z (d,), or None if a step fails."""
 
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         """Return leg length (m) and pendulum time (s) of the walker at p."""
@@ -279,16 +283,17 @@ class Cycle:
         return np.array([step.angle for step in self.steps])
 
 
-def walk_steps(step_map: Stepper, z: Floats, p: float, n: int) -> Cycle:
+def walk_steps(step_map: Stepper, z: Floats, p: float, n: int, derived: bool = True, first: int = 0) -> Cycle:
+    """Take n steps from z (d,) at p, with their derivative if `derived`. `first` is `swing` of the first step."""
     steps: list[MappedStep] = []
     position = z
     DP = identity(z.size)
-    for swing in range(n):
-        step = step_map.step(position, p, swing=swing)
+    for swing in range(first, first + n):
+        step = step_map.step(position, p, derived, swing)
         if step.outcome is not Outcome.WALKED:
             return Cycle(step.outcome, p, z, tuple(steps), DP)
         position = step.z
-        DP = step.DP @ DP if steps else step.DP
+        DP = step.DP @ DP if steps and derived else step.DP
         steps.append(step)
     return Cycle(Outcome.WALKED, p, z, tuple(steps), DP)
 

@@ -29,6 +29,7 @@ from walkerlab.physics.orbits.basin import (
     Window,
     edge_cells,
     find_attractors,
+    stride_of,
     subcell_centres,
     walk_to_attractor,
 )
@@ -39,7 +40,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.run.work import WorkUnit, complete
 from walkerlab.pipeline.stages.numerical_error import evenly_spread, tightened
-from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes
+from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes, step_asymmetry
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.contact import (
@@ -160,7 +161,8 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     step_length_m = float(gait["step_length_m"])
     state = as_state(gait["state"])
     answer = contact_gait(config, step_length_m, state)
-    scene = replace(scene_on_pads(config, step_length_m, state, answer), pinned=False)
+    asymmetry = step_asymmetry(config, inputs)
+    scene = replace(scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
     starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
     return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
@@ -258,7 +260,8 @@ class RigidQuestion:
         rows = []
         for cycle in self.attractors.cycles:
             state = state_on_section(self.rigid, tuple((cycle.points[0] / np.array(self.scale)).tolist()))
-            rows.append({"period": cycle.period, "state": list(state), "reached_within": cycle.reach})
+            period = cycle.period * stride_of(self.walker)
+            rows.append({"period": period, "state": list(state), "reached_within": cycle.reach})
         return rows
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
@@ -287,8 +290,11 @@ class ContactQuestion:
 
     def attractor_rows(self) -> list[dict[str, Any]]:
         """Describe the attractor by the period and length of its step, or return nothing if the model has no gait."""
-        own = self.starts.gait
-        return [] if own is None else [{"period": 1, "period_s": own[0], "step_length_m": own[1]}]
+        gait = self.starts.gait
+        if gait is None:
+            return []
+        period_s, length_m = np.mean(gait, axis=0).tolist()
+        return [{"period": len(gait), "period_s": period_s, "step_length_m": length_m}]
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
         """Walk from section coordinates z (n, 3), SI."""

@@ -236,7 +236,8 @@ class Gaits:
         """Find the gait near z (d,) and its quantities, or return None if there is no gait or a quantity is
         undefined.
         """
-        cycle = gait_near(standpoint_before.step_map, z, standpoint_before.p, SOLVED)
+        step_map = standpoint_before.step_map
+        cycle = gait_near(step_map, z, standpoint_before.p, SOLVED, step_map.stride)
         if isinstance(cycle, NotConverged):
             return None
         standpoint = standpoint_before._replace(z=cycle.z, A=cycle.DP)
@@ -244,9 +245,12 @@ class Gaits:
         return None if numbers is None or any(name not in numbers for name in self.wanted) else (standpoint, numbers)
 
     def largest_disturbances(self, subject: ModelUnderTest, names: Collection[str]) -> dict[str, float]:
-        """Find the largest disturbances that a gait survives, by the names of `LARGEST`."""
-        gait = subject.at(exact=False)
-        return {name: largest_disturbance(gait, *LARGEST[name], self.steps, FINE_WIDTH) for name in names}
+        """Find the largest disturbances that a gait survives in either leg's step, by the names of `LARGEST`."""
+        gaits = subject.quick_by_leg()
+        return {
+            name: min(largest_disturbance(gait, *LARGEST[name], self.steps, FINE_WIDTH) for gait in gaits)
+            for name in names
+        }
 
     def differentiate_largest(
         self, subject: ModelUnderTest, numbers: Mapping[str, float], parameter: Parameter, gap: float

@@ -39,7 +39,7 @@ from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.scene.families import model_reads, refuse_unread
-from walkerlab.scene.parameter import SLOPE, parameter_keys, parameter_of
+from walkerlab.scene.parameter import parameter_keys, parameter_of
 from walkerlab.scene.rigid import rigid_scene
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
@@ -54,6 +54,7 @@ PUSH_REACTIONS: Final = ("normal_impulse_N_s", "min_normal_force_N")
 UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 INDICATOR_UNITS: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "model that walks")}
+LEG: Final = {"leg": Label("1", "leg that swings in the disturbed step; absent if both legs are equal")}
 NONE_BESIDE: Final = Gradient(None, None, "neighbouring walks end early, or the config rejects their parameters")
 LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
@@ -127,25 +128,31 @@ def run(
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue
-        answer["gait_sensitivity_norm"] += norms(subject.model, gait)
+        gaits = gait.by_leg()
+        answer["gait_sensitivity_norm"] += [row for each in gaits for row in norms(row_of(subject, each), each)]
         rough_walks = [*rough_ground_units(subject, config)]
         label = f"robustness: {subject.model} model"
-        units = [*single(subject, config), *rough_walks]
+        units = [*single(subject, config, len(gaits)), *rough_walks]
         processes = jobs if rough_walks else jobs_but_for_walks
         # the computation of the gait's quantities has compiled all kernels
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
-        (down,), (up,), (forward, *ahead), (backward, *behind), *walks = done
-        model = {"model": subject.model}
         target = {"steps": config.robustness.steps}
-        answer["largest_step"].append({**model, "down_m": down, "up_m": up, **target})
-        answer["largest_push"].append({**model, "forward_N_s": forward, "backward_N_s": backward, **target})
-        pushes = answer["largest_push"][-1]
-        for way, reactions in (("forward", ahead), ("backward", behind)):
-            pushes |= zip((f"{way}_{name}" for name in PUSH_REACTIONS), reactions or (None, None), strict=True)
-        every = np.array([count for batch in walks for count in batch])
+        for each in gaits:
+            (down,), (up,), (forward, *ahead), (backward, *behind), *done = done
+            row = row_of(subject, each)
+            answer["largest_step"].append({**row, "down_m": down, "up_m": up, **target})
+            pushes = {**row, "forward_N_s": forward, "backward_N_s": backward, **target}
+            for way, reactions in (("forward", ahead), ("backward", behind)):
+                pushes |= zip((f"{way}_{name}" for name in PUSH_REACTIONS), reactions or (None, None), strict=True)
+            answer["largest_push"].append(pushes)
+        every = np.array([count for batch in done for count in batch])
         steps[subject.model] = every.reshape(-1, config.robustness.walks)
         answer["rough_ground"] += rough_rows(subject.model, config, steps[subject.model])
-    groups = {name: rows_group(answer[name], MODEL | labels) for name, labels in LABELS.items() if answer[name]}
+    groups = {
+        name: rows_group(answer[name], MODEL | (LEG if "leg" in answer[name][0] else {}) | labels)
+        for name, labels in LABELS.items()
+        if answer[name]
+    }
     if steps and config.robustness.roughness_m:
         groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
     content = Content(groups, {**answer, "steps": config.robustness.steps})
@@ -186,7 +193,12 @@ def models_of(config: RobustnessConfig) -> tuple[str, ...]:
     return (RIGID, CONTACT) if model == "both" else (model,)
 
 
-def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
+def row_of(subject: ModelUnderTest, gait: GaitOnMap) -> dict[str, Any]:
+    """Return the beginning of a row: the model and, if the legs differ, the leg that swings in the disturbed step."""
+    return {"model": subject.model} | ({"leg": gait.leg} if gait.step_map.stride > 1 else {})
+
+
+def norms(beginning: Mapping[str, Any], gait: GaitOnMap) -> Iterator[dict[str, Any]]:
     """Yield a row with the sensitivity norm for each disturbance and indicator."""
     for disturbance in DISTURBANCES:
         answer = sensitivity(gait, disturbance)
@@ -197,7 +209,7 @@ def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
         to_pure = gait.unit_of(disturbance) / np.array((units.time, units.length, units.length / units.time))
         for k, (indicator, unit) in enumerate(INDICATOR_UNITS.items()):
             yield {
-                "model": model,
+                **beginning,
                 "disturbance": disturbance,
                 "indicator": indicator,
                 "value": float(answer.norm[k]),
@@ -208,20 +220,22 @@ def norms(model: str, gait: GaitOnMap) -> Iterator[dict[str, Any]]:
             }
 
 
-def single(subject: ModelUnderTest, config: RobustnessConfig) -> Iterator[WorkUnit]:
-    """Yield the work units that search for the largest floor drop and hip push, each in both directions."""
-    for disturbance, sign in LARGEST.values():
-        run = partial(single_of, subject, disturbance, sign, config.robustness.steps)
-        yield WorkUnit(f"{subject.model} {disturbance} {sign:g}", 1, run)
+def single(subject: ModelUnderTest, config: RobustnessConfig, legs: int) -> Iterator[WorkUnit]:
+    """Yield the work units that search for the largest floor drop and hip push, each in both directions, by leg."""
+    for leg in range(legs):
+        for disturbance, sign in LARGEST.values():
+            run = partial(single_of, subject, leg, disturbance, sign, config.robustness.steps)
+            yield WorkUnit(f"{subject.model} {disturbance} {sign:g}{f' leg {leg + 1}' * (legs > 1)}", 1, run)
 
 
-def single_of(subject: ModelUnderTest, disturbance: Any, sign: float, steps: int) -> list[float]:
+def single_of(subject: ModelUnderTest, leg: int, disturbance: Any, sign: float, steps: int) -> list[float]:
     """Return the largest survived disturbance of one sign. For a hip push in the rigid model, also return ground
     reactions.
     """
-    size = largest_disturbance(subject.at(exact=False), disturbance, sign, steps)
-    if disturbance == "hip-push" and isinstance(rigid := subject.at().step_map, RigidMap):
-        return [size, *rigid.ground_after_push(subject.z, SLOPE.value_in(subject.config), sign * size, steps)]
+    size = largest_disturbance(subject.quick_by_leg()[leg], disturbance, sign, steps)
+    gait = subject.at().by_leg()[leg]
+    if disturbance == "hip-push" and isinstance(gait.step_map, RigidMap):
+        return [size, *gait.step_map.ground_after_push(gait.z, gait.p, sign * size, steps, gait.swing)]
     return [size]
 
 
@@ -243,7 +257,7 @@ def cap(model: str, config: RobustnessConfig) -> int:
 
 def rough_of(subject: ModelUnderTest, roughness: float, seed: int, walks: range, most: int) -> list[float]:
     """Count the steps of each walk on its own rough ground, which depends only on the seed and the walk's number."""
-    gait = subject.at(exact=False)
+    gait, *_ = subject.quick_by_leg()
     return [float(steps_on_rough_ground(gait, roughness, (seed, walk), most)) for walk in walks]
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from walkerlab.config.reads import SceneConfig, SimulateConfig
+from walkerlab.config.reads import RigidConfig, SceneConfig, SimulateConfig
 from walkerlab.config.schema import MidStep, state_of
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
@@ -27,7 +27,7 @@ from walkerlab.pipeline.stages.numerical_error import numerical_error
 from walkerlab.pipeline.store.columns import labelled, numbered
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.footholds import UNEVEN
-from walkerlab.scene.rigid import first_step_length
+from walkerlab.scene.rigid import first_step_length, have_different_legs
 
 FIRST_STEPS = 200
 LAST_STEPS = 20
@@ -112,6 +112,12 @@ def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Conte
     if isinstance(config.start, MidStep):
         return first_step_length(config, state), state
     return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
+
+
+def step_asymmetry(config: RigidConfig, inputs: Mapping[str, Content]) -> float:
+    """Return the difference between the rigid gait's step lengths over their mean, for the lanes of pads."""
+    limps = "fixedpoint" in inputs and have_different_legs(config)
+    return float(inputs["fixedpoint"].summary["asymmetry"]["step_length"]) if limps else 0.0
 
 
 def content_of_walk(

@@ -42,6 +42,8 @@ ACTUATIONS: Final = {
 }
 """Label, colour and marker of each drive, by its parameter in the sweep."""
 UP: Final = "largest_step.{}.up_m"
+MOST_ROWS: Final = 4
+"""Maximum number of rows of a table at one point: two models, each with two legs."""
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
 BELOW = 1.7
@@ -70,21 +72,31 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
     x = group[parameter].astype(float)
     said = axis_label(parameter)
     unit = group.variables[parameter].units
-    models = {str(group[f"gaits.{k}.model"][0]): k for k in range(2) if f"gaits.{k}.model" in group.variables}
+    models = [str(group[f"gaits.{k}.model"][0]) for k in range(2) if f"gaits.{k}.model" in group.variables]
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
     for panel, (label, name, shown) in zip(axes, PANELS, strict=True):
-        for model, k in models.items():
+        for model in models:
             look: dict[str, Any] = {"color": MODELS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
             for place in (name, UP) if name.startswith("largest_step") else (name,):
-                values = group[place.format(k)].astype(float)
-                panel.plot(x, shown(values) if place == name else 1e3 * values, **look)
+                for values in rows_of(group, place, model):
+                    panel.plot(x, shown(values) if place == name else 1e3 * values, **look)
         panel.set_ylabel(label)
     axes[2].axhline(0.0, color=GREY, linewidth=0.7)
     axes[-1].set_xlabel(label_of(said, unit))
     add_legend(figure, [entry(f"{model} model", color=MODELS[model], **LINES[model]) for model in models])
-    norms = {model: group[PANELS[0][1].format(k)].astype(float) for model, k in models.items()}
+    norms = {model: rows_of(group, PANELS[0][1], model)[0] for model in models}
     best = {model: (x[np.nanargmin(norm)], np.nanmin(norm)) for model, norm in norms.items() if np.isfinite(norm).any()}
     return figure, (said, unit, best)
+
+
+def rows_of(group: Group, name: str, model: str) -> list[Values]:
+    """Return the values (points,) of a model in each row of a table: one for each leg of a pair that differs."""
+    rows = []
+    for row in range(MOST_ROWS):
+        if name.format(row) in group.variables:
+            owned = group[f"{name.partition('.')[0]}.{row}.model"] == model
+            rows += [np.where(owned, group[name.format(row)].astype(float), np.nan)] if owned.any() else []
+    return rows
 
 
 def actuations(group: Group, parameters: Sequence[str]) -> dict[str, NDArray[np.bool_]] | None:

@@ -20,8 +20,8 @@ BUILDER_KEYS = ("walker.", "push_off.")
 NORM = "gait_sensitivity_norm_scaled"
 """Quantity that ranks the parameters; dimensionless, since a norm in s/m depends on the walker's size."""
 MODEL_COLUMN = Column("model", "model")
+LEG_COLUMN = Column("swing leg", "leg")
 NORM_COLUMNS = (
-    MODEL_COLUMN,
     Column("disturbance", "disturbance"),
     Column("indicator", lambda row: row["indicator"].replace("_", " ")),
     Column("norm", "value", lambda value: number(value, 6), numeric=True),
@@ -114,6 +114,9 @@ def filled_tables(summary: Mapping[str, Any]) -> list[Table]:
 
 def tables(summary: Mapping[str, Any]) -> list[Table]:
     rows = summary["sensitivity"]
+    norms = summary["gait_sensitivity_norm"]
+    legs_differ = any("leg" in row for row in norms)
+    columns = (MODEL_COLUMN, *([LEG_COLUMN] if legs_differ else []), *NORM_COLUMNS)
     ranked = sorted((row for row in rows if ranks(row)), key=lambda row: -abs(row["relative"]))  # both models together
     built = [row for row in ranked if row["to"].startswith(BUILDER_KEYS)]
     environment = [row for row in ranked if not row["to"].startswith(BUILDER_KEYS)]
@@ -122,7 +125,7 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
     top = built[:MAX_DERIVATIVES]
     left = len(rows) - len(top) - len(environment[:MAX_DERIVATIVES])
     return [
-        table("Gait sensitivity norms", NORM_COLUMNS, summary["gait_sensitivity_norm"], note=words("robustness.norms")),
+        table("Gait sensitivity norms", columns, norms, note=words("robustness.norms", legs_differ)),
         table("Most effective changes", DERIVATIVE_COLUMNS, first, note=words("robustness.first")),
         table("Steps on rough ground", ROUGH_COLUMNS, summary["rough_ground"], note=words("robustness.rough")),
         table("Effect of the parameters on the gait", DERIVATIVE_COLUMNS, top, note=words("robustness.moves", left)),
