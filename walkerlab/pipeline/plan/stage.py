@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Inputs = Callable[["Config"], tuple[str, ...]]
 WALKED = ("fixedpoint", "simulate", "contact-sim")
 DRAWINGS = ("plot", "report")
-FOR_LEGS_THAT_DIFFER = (*WALKED, "compare", "continuation", *DRAWINGS)
+FOR_LEGS_THAT_DIFFER = (*WALKED, "compare", "continuation", "engines", *DRAWINGS)
 """Stages that know legs that differ; every other stage refuses them."""
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[

@@ -18,6 +18,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import (
     content_of_walk,
+    gait_asymmetry,
     legs,
     numbers_of,
     pace_of,
@@ -39,7 +40,6 @@ from walkerlab.scene.contact import (
 )
 from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.omissions import contact_walk_omissions
-from walkerlab.scene.rigid import have_different_legs
 
 RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
 SCUFFED = (
@@ -56,9 +56,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     Raises NoAnswer if the solver fails.
     """
     rigid_step, rigid_state = rigid_start(config, inputs)
-    limps = "fixedpoint" in inputs and have_different_legs(config)
-    asymmetry = inputs["fixedpoint"].summary["asymmetry"]["step_length"] if limps else 0.0
-    scene = scene_on_pads(config, rigid_step, rigid_state, asymmetry=asymmetry)
+    scene = scene_on_pads(config, rigid_step, rigid_state, asymmetry=gait_asymmetry(config, inputs))
     start = start_state(scene, rigid_state)
     steps = 2 * config.strides
     tolerances = tolerances_of(config, steps)

@@ -27,7 +27,7 @@ from walkerlab.pipeline.stages.numerical_error import numerical_error
 from walkerlab.pipeline.store.columns import labelled, numbered
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.footholds import UNEVEN
-from walkerlab.scene.rigid import first_step_length
+from walkerlab.scene.rigid import first_step_length, have_different_legs
 
 FIRST_STEPS = 200
 LAST_STEPS = 20
@@ -112,6 +112,13 @@ def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Conte
     if isinstance(config.start, MidStep):
         return first_step_length(config, state), state
     return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
+
+
+def gait_asymmetry(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Content]) -> float:
+    """Return the difference between the gait's step lengths over their mean, or 0 for equal legs or without a gait."""
+    if "fixedpoint" not in inputs or not have_different_legs(config):
+        return 0.0
+    return float(inputs["fixedpoint"].summary["asymmetry"]["step_length"])
 
 
 def content_of_walk(
