@@ -3,6 +3,7 @@
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineScene, engine_scene
+from walkerlab.exchange.planar import SMALLEST_BALL_M
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.contact_state import knees_at_start
@@ -28,6 +29,12 @@ def supported_scene(
     if assembly.knees and not isinstance(knee_rules(config.walker).stop, IdealLock):
         raise ConfigError(
             "engines: the engine models do not support a knee's compliant stop.", "Choose walker.knee.lock: ideal."
+        )
+    points = [foot.radius_m < SMALLEST_BALL_M for foot in assembly.feet]
+    if any(points) and not all(points):
+        raise ConfigError(
+            "engines: a point foot becomes a ball on ground that is lower by its radius, and the other foot is round.",
+            f"Set the radius of the point foot to {SMALLEST_BALL_M:g} m, or make both feet points.",
         )
     scene = engine_scene(config, rigid_step_length_m, rigid_state, asymmetry)
     return scene.lock_knees(knees_at_start(scene.ours, STANCE_FOOT, scene.start))
