@@ -445,6 +445,31 @@ def test_mujoco_model_is_built_from_a_run_a_config_or_a_name(mujoco, tmp_path):
         assert data.eq_active.all()
 
 
+def test_mujoco_model_of_a_gait_starts_on_that_gait(mujoco, tmp_path):
+    stored = walkerlab.run("fixedpoint", "kneed", runs=tmp_path)
+    heavy = walkerlab.find_gait(walkerlab.compass(hip_mass_kg=12), slope_deg=2)
+    for gait in (stored, heavy):
+        model, data = walkerlab.mujoco_model(gait)
+        slope = np.arctan2(model.opt.gravity[0], -model.opt.gravity[2])
+        # the base is the leg that stands first
+        assert data.qpos[2] - slope == pytest.approx(gait.state[1], abs=1e-12)
+        last = model.numeric("steps_in_walkerlab").data.reshape(2, -1)[:, -1]
+        assert last == pytest.approx([gait.period_s, gait.step_length_m], rel=0.05)
+    assert mujoco.mj_getTotalmass(model) == pytest.approx(22.0, rel=1e-12)
+
+
+def test_mujoco_model_of_a_gait_finds_the_gait_of_changed_keys(mujoco):
+    gait = walkerlab.find_gait(slope_deg=2)
+    _, data = walkerlab.mujoco_model(gait, slope_deg=3)
+    steeper = walkerlab.find_gait(slope_deg=3)
+    assert data.qpos[2] - np.deg2rad(3) == pytest.approx(steeper.state[1], abs=1e-12)
+
+
+def test_mujoco_model_without_a_gait_raises_no_answer(mujoco):
+    with pytest.raises(NoAnswer, match="no gait"):
+        walkerlab.mujoco_model(walkerlab.find_gait(slope_deg=-1))
+
+
 def test_mujoco_model_accepts_blocks_and_tilt_option(mujoco):
     heavy = walkerlab.compass(hip_mass_kg=20)
     model, _ = walkerlab.mujoco_model("paper", slope="geometry", walker=heavy)

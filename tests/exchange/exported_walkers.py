@@ -17,21 +17,41 @@ PADS = "contact.terrain=checkerboard"
 @cache
 def with_gait(name, *sets):
     """Config, rigid step length and rigid start state."""
-    config = load(Path(name), sets).config
-    gait = in_memory("fixedpoint", config).summary
+    config, gait = gait_of(name, *sets)
     return config, gait["step_length_m"], gait["state"]
 
 
 @cache
+def gait_of(name, *sets):
+    """Config and summary of its rigid gait."""
+    config = load(Path(name), sets).config
+    return config, in_memory("fixedpoint", config).summary
+
+
+def asymmetry_of(name, *sets):
+    return gait_of(name, *sets)[1]["asymmetry"]["step_length"]
+
+
+@cache
 def export_of(name, *sets):
-    return prepare_export(*with_gait(name, *sets))
+    return prepare_export(*with_gait(name, *sets), asymmetry_of(name, *sets))
 
 
 @cache
 def files_of(kind, law, name, *sets):
-    return export_model(*with_gait(name, *sets), kind, law)
+    return export_model(*with_gait(name, *sets), kind, law, asymmetry=asymmetry_of(name, *sets))
 
 
+LIMPING = (
+    ("paper", "walker.leg_2={leg_mass_kg: 5.5}", "strides=2"),
+    ("round-feet", PADS, "walker.leg_2={leg_length_m: 0.4005, foot_radius_m: 0.102}", "strides=2"),
+    ("level", "walker.leg_2={leg_mass_kg: 5.1}", "strides=2"),
+    (
+        "kneed-round-feet", "walker.leg_2={shank: {mass_kg: 0.052}, foot_radius_m: 0.21}",
+        "walker.knee.damping_N_m_s_per_rad=0.004", "strides=1",
+    ),
+)  # fmt: skip
+"""Walkers whose legs differ: one of each kind."""
 PARTS = """
 name: compass-by-parts
 walker:
@@ -102,7 +122,7 @@ def run_kneed(name, *sets):
     touches, locks = (
         np.array([time for sensor, time in events if sensor.endswith(ending)]) for ending in ("touches", "straight")
     )
-    return touches, locks, prepare_export(add_stops(config), length, state).walk
+    return touches, locks, prepare_export(add_stops(config), length, state, asymmetry_of(name, *sets)).walk
 
 
 def touches_of(dataset, export, count):
@@ -121,7 +141,7 @@ def touches_of(dataset, export, count):
         return height
 
     end = export.touches_s[count - 1] + 1e-3
-    solution = dataset.integrate(end, 1e-8, 1e-8, (sinking(0), sinking(1)), "LSODA")
+    solution = dataset.integrate(end, 1e-10, 1e-10, (sinking(0), sinking(1)), "LSODA")
     assert solution.success
     times = []
     for foot, events in enumerate(zip(solution.t_events, solution.y_events, strict=True)):

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from adams_dataset import Dataset, HaltError, rotation
 from exported_walkers import (
+    LIMPING,
     PADS,
     PARTS,
+    asymmetry_of,
     export_of,
     files_of,
     random_kneed_walker,
@@ -129,6 +131,39 @@ def test_exported_model_reproduces_the_walk(seed):
     assert export.walk.steps >= 3
     expected = np.array(export.touches_s[:3])
     assert touches_of(dataset, export, 3)[:3] == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("walker", LIMPING[:3], ids=lambda walker: walker[0])
+def test_exported_model_of_legs_that_differ_reproduces_the_walk(walker):
+    """The fourth kind has knees: see below."""
+    dataset, export = dataset_of("functions", *walker), export_of(*walker)
+    assert export.walk.steps == 4
+    expected = np.array(export.touches_s[:3])
+    assert touches_of(dataset, export, 3)[:3] == pytest.approx(expected, abs=1e-6)
+
+
+def test_pads_of_legs_that_differ_lie_under_their_footholds():
+    """Leg 1 lands ahead of leg 2 by its own step, which is longer than that of leg 2."""
+    dataset, export = dataset_of("contact", *LIMPING[0]), export_of(*LIMPING[0])
+    pitch = export.scene.ground.terrain.pitch
+    boxes = [s for s in dataset.of("GRAPHICS") if "BOX" in s.flags]
+    corners = {s.id: s.numbers("QP", (0.0, 0.0, 0.0)) for s in dataset.of("MARKER")}
+    edges = [corners[box.marker("CORNER")] for box in boxes]
+    lanes = [sorted(x for x, _, z in edges if (z < 0.0) == stands) for stands in (False, True)]
+    gaps = [np.diff(lane) for lane in lanes]
+    assert np.concatenate(gaps) == pytest.approx(2.0 * MM * pitch)
+    share = asymmetry_of(*LIMPING[0])
+    first, second = MM * pitch * np.array([1.0 - 0.5 * share, 1.0 + 0.5 * share])
+    ahead = min(x for x in lanes[0] if x > lanes[1][1]) - lanes[1][1]
+    assert ahead == pytest.approx(first)
+    assert min(x for x in lanes[1] if x > lanes[0][1]) - lanes[0][1] == pytest.approx(second)
+
+
+def test_commands_turn_the_knees_of_legs_that_differ():
+    """Its knees are damped, too."""
+    touches, locks, walk = run_kneed(*LIMPING[3])
+    assert touches == pytest.approx(walk.touch_time_s, abs=1e-6)
+    assert locks == pytest.approx(walk.knee_strike_time_s, abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", [0, 2], ids=["ideal lock", "push-off"])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported_walkers import PADS, PARTS, export_of, files_of, with_gait
+from exported_walkers import LIMPING, PADS, PARTS, asymmetry_of, export_of, files_of, with_gait
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
@@ -30,7 +30,7 @@ KNEED, ROUND_KNEED, LEVEL_KNEED = ("kneed",), ("kneed-round-feet",), ("kneed-lev
 STOPPED = ("kneed", "walker.knee.lock=compliant", "walker.knee.stop_stiffness=1e4", "walker.knee.stop_damping=9")
 AT_TOUCH = ("kneed", "walker.knee.release=touch")
 KNEED_TORSO = ("kneed", "walker.torso.mass_kg=0.2", "walker.torso.above_hip_m=0.2")
-WEIGHED = [*WALKERS, ("level",), HEAVY_LEGS, SPRUNG, BY_PARTS, KNEED, ROUND_KNEED]
+WEIGHED = [*WALKERS, ("level",), HEAVY_LEGS, SPRUNG, BY_PARTS, KNEED, ROUND_KNEED, LIMPING[1], LIMPING[3]]
 
 
 @pytest.fixture(autouse=True)
@@ -201,7 +201,8 @@ def steps_of(walk, steps, until_s=12.0):
 
 
 def walk_of(folder, *walker, slope="gravity"):
-    text = next(iter(export_model(*with_gait(*walker), "mjcf", slope=slope).files.values()))
+    exported = export_model(*with_gait(*walker), "mjcf", slope=slope, asymmetry=asymmetry_of(*walker))
+    text = next(iter(exported.files.values()))
     script = script_in(folder, "walker", {"walker.py": script_text()})
     mujoco.set_mjcb_control(None)
     return script.Walk(mujoco.MjModel.from_xml_string(text))
@@ -240,6 +241,22 @@ def test_kneed_walker_takes_the_same_steps_with_the_exported_script(walker, step
     periods, lengths = steps_of(walk_of(tmp_path, *walker), steps)
     assert periods == pytest.approx(walk.periods_s[:steps], rel=0.01)
     assert lengths == pytest.approx(walk.lengths_m[:steps], rel=0.01)
+
+
+@pytest.mark.parametrize("walker", LIMPING, ids=lambda walker: walker[0])
+def test_walker_whose_legs_differ_takes_the_same_steps_in_mujoco(walker, tmp_path):
+    walk = export_of(*walker).walk
+    periods, lengths = steps_of(walk_of(tmp_path, *walker), walk.steps)
+    assert periods == pytest.approx(walk.periods_s, rel=0.004)
+    assert lengths == pytest.approx(walk.lengths_m, rel=0.004)
+    assert asymmetry_of(*walker) != 0.0
+
+
+def test_damping_of_each_knee_is_a_property_of_its_joint():
+    model = model_of(
+        "kneed", "walker.knee.damping_N_m_s_per_rad=0.02", "walker.leg_2={knee: {damping_N_m_s_per_rad: 0}}"
+    )
+    assert [float(model.joint(f"knee_{leg}").damping[0]) for leg in (1, 2)] == [0.02, 0.0]
 
 
 def test_exported_script_reacts_to_the_state_and_not_to_time(tmp_path):

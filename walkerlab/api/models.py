@@ -1,24 +1,29 @@
 """Walkers as models for other programs, at the start of their gait."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from walkerlab.api.memory import config_of_scene, in_memory, plain, with_blocks
-from walkerlab.api.results import Setting
+from walkerlab.api.results import Gait, Result, Setting
 from walkerlab.api.runs import Run
 from walkerlab.config.contact import Contact
 from walkerlab.config.files import DEFAULT
+from walkerlab.config.overlay import tree_of
 from walkerlab.config.schema import Config
+from walkerlab.config.tree import NOWHERE
+from walkerlab.config.validation import validate_tree
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError, NoAnswer
+from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.results import MemoryResults
+from walkerlab.pipeline.store.artifact import Identified
+from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.runfolder import RunFolder
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
     from walkerlab.exchange.export import Kind
-
-if TYPE_CHECKING:
-    pass
 
 
 def export_model(
@@ -65,14 +70,15 @@ def export_model(
 
 
 def mujoco_model(
-    config: str | Path | Config | Run = DEFAULT, slope: str = "gravity", **blocks: Setting
+    config: str | Path | Config | Run | Gait = DEFAULT, slope: str = "gravity", **blocks: Setting
 ) -> "tuple[MjModel, MjData]":
     """Build a walker as a MuJoCo model with data at the start of its gait. Plain `mujoco.mj_step` makes it walk.
 
     Drives and knees are a control callback, which MuJoCo calls in each step. Callbacks are global: this model walks
     until the next call, and `mujoco.set_mjcb_control(None)` must come before another model is compiled.
 
-    config  a Config, a config file or built-in name, or a run
+    config  a Config, a config file or built-in name, a run, or a gait. A gait that was found in memory has no ground,
+            so the paper's is used, on pads
     slope   what is tilted: `gravity`, or `geometry` for the ground and the walker on it
     blocks  other keys of the config, such as walker, contact, push_off
 
@@ -92,27 +98,48 @@ def mujoco_model(
         raise ConfigError("a MuJoCo model needs MuJoCo, which is not installed.", "pip install mujoco") from error
     from walkerlab.exchange.mujoco_script import Walk
 
+    gait = None
+    if isinstance(config, Gait):
+        gait, config = config, _config_of(config)
     start = config.config if isinstance(config, Run) else config
     scene = with_blocks(start, **{name: plain(value) for name, value in blocks.items()})
-    text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None).values()))
+    if isinstance(start, Config) and _identity_of_gait(start) != _identity_of_gait(scene):
+        gait = None
+    text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None, gait).values()))
     mujoco.set_mjcb_control(None)
     walk = Walk(mujoco.MjModel.from_xml_string(text))
     return walk.model, walk.data
 
 
-def _export_texts(config: Config, kind: "Kind", law: str, slope: str, stem: str | None) -> dict[str, str]:
-    """Return the files of a model, by name, after finding its gait."""
+def _config_of(gait: Gait) -> Config:
+    """Return the config of a gait: of its run or, if it was found in memory, of its walker on the paper's ground."""
+    if gait.artifact is not None:
+        return Run(RunFolder.open_folder(gait.artifact.parent)).config
+    identity = cast(Identified, gait.content).identity
+    read = {name: value for name, value in identity.config_slice.items() if name in Config.model_fields}
+    return validate_tree(tree_of({"name": "memory", "contact": {"terrain": "checkerboard"}, **read}, NOWHERE))
+
+
+def _identity_of_gait(config: Config) -> Identity:
+    return MemoryResults().keys.identity(PIPELINE["fixedpoint"], config, {})
+
+
+def _export_texts(
+    config: Config, kind: "Kind", law: str, slope: str, stem: str | None, gait: Result | None = None
+) -> dict[str, str]:
+    """Return the files of a model, by name, after finding its gait unless it is passed."""
     from walkerlab.exchange import export
-    from walkerlab.pipeline.stages.walk import rigid_start
+    from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
     from walkerlab.pipeline.store.provenance import git_commit
 
     inputs = {}
     if config.start == "fixed-point":
-        gait = in_memory("fixedpoint", config)
+        gait = gait or in_memory("fixedpoint", config)
         if gait.no_answer is not None:
             raise NoAnswer(gait.no_answer)
         inputs["fixedpoint"] = gait.content
     adams_law = export.law_named(law)
     tilted = export.slope_named(slope)
     start = rigid_start(config, inputs)
-    return export.export_model(config, *start, kind, adams_law, git_commit(), stem, tilted).files
+    asymmetry = step_asymmetry(config, inputs)
+    return export.export_model(config, *start, kind, adams_law, git_commit(), stem, tilted, asymmetry).files

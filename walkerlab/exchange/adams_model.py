@@ -22,6 +22,7 @@ from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.scene.contact import knee_rules
+from walkerlab.scene.parts import knee_dampings
 
 MM = 1000.0
 GROUND = "ground"
@@ -338,7 +339,9 @@ class FootTerms:
             return expression
         pitch = MM * terrain.pitch
         lane = round(terrain.lanes[self.foot] / terrain.pitch)
-        wave = f"{'-' if lane % 2 else ''}COS(PI*DX({self.place()})/{finite(pitch)})"
+        shift = MM * self.export.lane_shift_m(self.foot)
+        along = f"(DX({self.place()}){-shift:+.17g})" if shift else f"DX({self.place()})"
+        wave = f"{'-' if lane % 2 else ''}COS(PI*{along}/{finite(pitch)})"
         return f"IF({wave}:{elsewhere},{elsewhere},{expression})"
 
 
@@ -509,6 +512,8 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         rate = f"WZ({{{i}}},{{{j}}},{{{j}}})"
         model.torques[f"stop_{number + 1}"] = Torque(i, j, f"-IMPACT(1-{angle},-{rate},{stop})")
         model.motions[f"lock_{number + 1}"] = f"hinge_of_{shank}"
+        if damping := knee_dampings(export.config.walker)[number]:
+            model.torques[f"knee_damper_{number + 1}"] = Torque(i, j, f"-{finite(MM * damping)}*{rate}")
         place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
         down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
         sinking = f"VY({foot.motion})"

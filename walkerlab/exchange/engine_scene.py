@@ -100,11 +100,15 @@ class EngineScene:
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
 
-def engine_scene(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> EngineScene:
+def engine_scene(
+    config: ContactConfig, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0
+) -> EngineScene:
     """Build the scene of a config, with no foot pinned and no knee locked. `pad_pitch: own` becomes the rigid step
     length.
+
+    asymmetry  difference between the step lengths of the rigid gait over their mean, for the lanes of pads
     """
-    scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m)
+    scene = contact_scene(config, rigid_step_length_m, rigid_step_length_m, asymmetry)
     return scene_for_engines(replace(scene, pinned=False), rigid_state)
 
 

@@ -14,6 +14,7 @@ from walkerlab.exchange.adams_model import adams_model
 from walkerlab.exchange.adams_view import view_text
 from walkerlab.exchange.exported import Exported, prepare_export
 from walkerlab.exchange.mjcf import Slope
+from walkerlab.exchange.planar import SMALLEST_BALL_M
 from walkerlab.physics.solvers.system import State
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def export_model(
     commit: str | None = None,
     stem: str | None = None,
     slope: Slope = "gravity",
+    asymmetry: float = 0.0,
 ) -> ExportedFiles:
     """Export a walker to another program, with the start that `contact-sim` derives from a rigid state.
 
@@ -54,11 +56,13 @@ def export_model(
     commit               commit of walkerlab, for the header of the file
     stem                 stem of the file names; by default the config's name
     slope                in MuJoCo: whether gravity is tilted, or the ground and the walker on it
+    asymmetry            difference between the step lengths of the rigid gait over their mean, for the lanes of pads
 
     Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
     pads depends on a contact gait and none is found.
     """
-    export = prepare_export(config if kind == "mjcf" else add_stops(config), rigid_step_length_m, rigid_state)
+    locked = config if kind == "mjcf" else add_stops(config)
+    export = prepare_export(locked, rigid_step_length_m, rigid_state, asymmetry)
     stem = stem or export.model_name
     left_out = tuple(parts_left_out(export, config, kind, law, f"{stem}.py"))
     tilted = "gravity" if slope == "gravity" else "ground"
@@ -120,7 +124,7 @@ def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, scrip
     if export.scene.ground.terrain.has_pads:
         yield "the end of a walk when a foot hits a pad from the side; here the pad pushes the foot away"
     if not by_functions and any(radius == 0.0 for radius in export.scene.ours.whole.radius):
-        millimetres = 1e3 * export.model.balls[0].radius_m
+        millimetres = 1e3 * SMALLEST_BALL_M
         yield f"point feet, replaced by balls of {millimetres:g} mm on ground lower by the same amount"
     if kind == "mjcf":
         if parts := mjcf.parts_of_script(export):

@@ -22,7 +22,6 @@ from walkerlab.physics.hybrid.contact_result import ContactWalkResult
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import scene_on_pads, tolerances_of
 from walkerlab.scene.footholds import foothold_heights
-from walkerlab.scene.rigid import refuse_different_legs
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -115,8 +114,13 @@ class Exported:
         for number in range(-PADS_BEHIND, last + 1):
             height = 0.0 if self.heights is None else float(foothold_height(uneven, number))
             foot = STANCE_FOOT if number % 2 == 0 else 1 - STANCE_FOOT
-            pads.append(Pad(foot, number * pitch, pitch, height))
+            pads.append(Pad(foot, number * pitch + self.lane_shift_m(foot), pitch, height))
         return tuple(pads)
+
+    def lane_shift_m(self, foot: int) -> float:
+        """Distance (m) along the slope of a foot's pads from those of equal legs, whose steps are equally long."""
+        terrain = self.scene.ground.terrain
+        return terrain.lanes[foot] - round(terrain.lanes[foot] / terrain.pitch) * terrain.pitch
 
     def lane_across_m(self, foot: int) -> float:
         """Signed distance (m) of a foot's lane from the plane of the walk. No ball reaches the other foot's lane."""
@@ -159,13 +163,15 @@ def identifier(name: str) -> str:
     return plain if plain[:1].isalpha() else f"m_{plain}"
 
 
-def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: State) -> Exported:
+def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0) -> Exported:
     """Place the walker of a config on its ground, with the start that `contact-sim` derives from a rigid state.
+
+    asymmetry  difference between the step lengths of the rigid gait over their mean, for the lanes of pads
 
     Raises ConfigError for a walker or a ground that cannot be exported.
     """
     refuse(config)
-    contact_scene = scene_on_pads(config, rigid_step_length_m, rigid_state)
+    contact_scene = scene_on_pads(config, rigid_step_length_m, rigid_state, asymmetry=asymmetry)
     steps = 2 * config.strides
     scene = scene_for_engines(contact_scene, rigid_state)
     heights = foothold_heights(config.ground, steps + 1)
@@ -175,7 +181,6 @@ def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: Stat
 
 def refuse(config: Config) -> None:
     """Raise ConfigError for a ground or a walker that no format can express."""
-    refuse_different_legs(config, "Export")
     if config.contact is None:
         raise contact_required_error("Export", config.walker, "Add a contact block, as in the config paper.")
     if config.contact.terrain == "after-mid-swing":

@@ -35,6 +35,7 @@ from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.solvers.system import Floats
+from walkerlab.scene.parts import knee_dampings
 
 MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
 IMPEDANCE = 1e-3  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
@@ -290,18 +291,18 @@ def time_step_s(export: Exported, contact: Mapping[str, float]) -> float:
 
 
 def hinge_names(export: Exported) -> dict[int, Hinge]:
-    """Name the hip and the knees, with the hip's spring and damper and the stops of compliant knees."""
+    """Name the hip and the knees, with the hip's spring, the dampers and the stops of compliant knees."""
     hip = export.hip
     weights = inverse_weights(export.model).joints
     stop = export.scene.ours.stop
     acts = f'stiffness="{hip.spring_N_m_per_rad!r}" damping="{hip.damping_N_m_s_per_rad!r}"'
     hinges = {export.hip_link: Hinge(HIP, acts)}
     for leg, link in enumerate(export.knee_links):
-        acts = ""
+        acts = f'damping="{knee_dampings(export.config.walker)[leg]!r}" '
         d = IMPEDANCE
         if isinstance(stop, Impact):
             stiffness, damping = ((1.0 - d) * weights[link] * x for x in (stop.stiffness, stop.damping))
-            acts = f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
+            acts += f'range="-3.14 0" solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{d!r} {d!r} 1 0.5 1"'
         hinges[link] = Hinge(f"knee_{leg + 1}", acts)
     return hinges
 

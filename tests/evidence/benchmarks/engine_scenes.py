@@ -12,6 +12,19 @@ KNEED_GAIT = (-0.2889854603, 0.1881854603, -0.2889854603, -0.0571481063, -1.1095
 KNEED_STEP_LENGTH = 0.4726567858
 
 
+HEAVIER_LEG = "walker.leg_2={leg_mass_kg: 5.5}"
+LIMPING_GAIT = (-0.2001364762664855, 0.1653364762664855, -0.598697614198469, -0.8595634480514858)
+LIMPING_STEP_LENGTH = 0.36772658000725655
+LIMPING_ASYMMETRY = -0.023301283643594035
+
+
+@cache
+def limping():
+    """The paper's compass whose leg 2 weighs 5.5 kg, on pads of each foot."""
+    config = load(None, (HEAVIER_LEG,)).config
+    return supported_scene(config, LIMPING_STEP_LENGTH, LIMPING_GAIT, LIMPING_ASYMMETRY)
+
+
 @cache
 def compass(*sets):
     return supported_scene(load(None, sets).config, STEP_LENGTH, GAIT)

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from engine_scenes import compass, kneed
+from engine_scenes import compass, kneed, limping
 
 from walkerlab.evidence.benchmarks.engines.adapter import Stepping
 from walkerlab.evidence.benchmarks.engines.experiments import START_FACTORS, simulate, swing_truth
@@ -117,10 +117,10 @@ DRIVES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("drives", DRIVES)
+@pytest.mark.parametrize("drives", [*DRIVES, "legs that differ"])
 def test_same_contact_law_gives_the_same_walk_in_an_engine(engine, drives):
     """To the first touch and through it: of first order, by a factor that hangs on where in a step the touch falls."""
-    scene = compass(*DRIVES[drives])
+    scene = compass(*DRIVES[drives]) if drives in DRIVES else limping()
     until = 0.8
     truth = simulate(scene, "radau5", 1e-10, 2, until).samples.states[1]
     errors = []
@@ -132,6 +132,17 @@ def test_same_contact_law_gives_the_same_walk_in_an_engine(engine, drives):
         errors.append(float(np.max(np.abs(answer.end - truth))))
     assert errors[1] < 0.5 * errors[0]
     assert errors[1] < 1e-2
+
+
+def test_damped_knees_give_the_same_swing_in_an_engine(engine):
+    scene = kneed("walker.knee.damping_N_m_s_per_rad=0.02")
+    until = 0.2
+    truth, undamped = (simulate(each, "radau5", 1e-10, 1, until).samples.states[1] for each in (scene, kneed()))
+    name, entry = max(engine.adapter().INTEGRATORS.items(), key=lambda one: (one[1].adapts, one[1].order))
+    stepping = Stepping(name, 5e-3 if entry.adapts else 5e-5, 1e-7 if entry.adapts else None)
+    end = WalkTask(engine.name, stepping, scene, 1, until, None, 50_000).run().end
+    assert end == pytest.approx(truth, abs=2e-5)
+    assert np.abs(truth - undamped).max() > 0.01
 
 
 def test_runs_are_reproducible(engine):

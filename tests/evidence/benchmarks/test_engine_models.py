@@ -74,6 +74,22 @@ def test_feet_ahead_of_the_shanks_keep_their_offset_in_an_engine():
     assert {ball.radius_m for ball in (bent, straight)} == {0.2}
 
 
+def test_a_point_foot_beside_a_round_one_is_refused_with_a_radius_that_works():
+    """The engines have one floor, and a point foot needs a lower one."""
+    point = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0}")).config
+    with pytest.raises(ConfigError, match="the other foot is round") as caught:
+        supported_scene(point, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
+    assert "0.0005 m" in caught.value.advice
+    small = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0.0005}")).config
+    scene = supported_scene(small, 0.37, (-0.2042, 0.1694, -0.6058, -0.861))
+    assert [ball.ground_m for ball in scene.model.balls] == [0.0, 0.0]
+
+
+def test_one_knee_beside_a_straight_leg_is_refused():
+    with pytest.raises(ConfigError, match="both with a knee or both without"):
+        supported_scene(load(Path("one-knee"), ("contact={terrain: plane}",)).config, 0.3, (0.0,) * 6)
+
+
 @pytest.mark.parametrize("doing", [(BENT, BENT), (LOCKED, BENT), (LOCKED, LOCKED)])
 def test_engine_coordinates_of_a_kneed_walker_survive_a_round_trip(doing):
     scene = kneed().lock_knees(np.array(doing, np.int8))

@@ -138,6 +138,38 @@ def test_labels_do_not_overlap_or_leave_the_picture(place):
         assert not box.overlaps(other_box), (text, other)
 
 
+LIMPING = (
+    ("prosthesis",),
+    ("one-knee",),
+    ("kneed", "walker.leg_2={shank: {length_m: 0.48, mass_ahead_m: 0.02}, foot_radius_m: 0.1}"),
+)
+
+
+@pytest.mark.parametrize("walker", LIMPING, ids=lambda walker: walker[0])
+def test_legs_that_differ_have_a_panel_each_with_their_own_values(walker):
+    name, *changed = walker
+    config = load(Path(name), changed).config
+    with figure_style():
+        figure = draw_upright(config.walker)
+        settle(figure)
+        words = texts_drawn(figure)
+    assert [axes.get_title("left") for axes in figure.axes] == ["leg 1", "leg 2"]
+    shown = [{text.get_text().strip() for text in axes.texts} for axes in figure.axes]
+    mass = {"prosthesis": "leg_mass_kg: 4", "one-knee": "leg_mass_kg: 11.46", "kneed": "shank.length_m: 0.48"}[name]
+    assert any(mass in text for text in shown[1])
+    assert not any(mass in text for text in shown[0])
+    for (text, box), (other, other_box) in itertools.combinations(words, 2):
+        assert not box.overlaps(other_box), (text, other)
+
+
+def test_bodies_of_both_legs_are_drawn_if_they_differ():
+    walker = parts()
+    first, second = walker.bodies
+    limping = walker.model_copy(update={"bodies": (first.model_copy(update={"mass_kg": 4.0}), second)})
+    assert len(draw_parts(walker).axes) == 1
+    assert [axes.get_title().splitlines()[1] for axes in draw_parts(limping).axes] == ["mass_kg: 4", "mass_kg: 5"]
+
+
 def test_leg_of_parts_ends_on_its_foot_arc():
     (axes,) = draw_parts(parts(0.2)).axes
     sole, leg = (line for line in axes.lines if line.get_linewidth() == 2.0)

@@ -23,7 +23,7 @@ Inputs = Callable[["Config"], tuple[str, ...]]
 WALKED = ("fixedpoint", "simulate", "contact-sim")
 DRAWINGS = ("plot", "report")
 FOR_LEGS_THAT_DIFFER = (
-    *WALKED, "compare", "continuation", "robustness", "design", "basin", "accuracy", "stability", *DRAWINGS,
+    *WALKED, "compare", "continuation", "robustness", "design", "basin", "accuracy", "stability", "engines", *DRAWINGS,
 )  # fmt: skip
 """Stages that know legs that differ; every other stage refuses them."""
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]

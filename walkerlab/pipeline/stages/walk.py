@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from walkerlab.config.reads import RigidConfig, SceneConfig, SimulateConfig
+from walkerlab.config.reads import SceneConfig, SimulateConfig
 from walkerlab.config.schema import MidStep, state_of
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
@@ -114,10 +114,11 @@ def rigid_start(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Conte
     return 2.0 * config.walker.leg_length_m * float(np.sin(0.5 * abs(state[1] - state[0]))), state
 
 
-def step_asymmetry(config: RigidConfig, inputs: Mapping[str, Content]) -> float:
-    """Return the difference between the rigid gait's step lengths over their mean, for the lanes of pads."""
-    limps = "fixedpoint" in inputs and have_different_legs(config)
-    return float(inputs["fixedpoint"].summary["asymmetry"]["step_length"]) if limps else 0.0
+def step_asymmetry(config: SimulateConfig | SceneConfig, inputs: Mapping[str, Content]) -> float:
+    """Return the difference between the gait's step lengths over their mean, or 0 for equal legs or without a gait."""
+    if "fixedpoint" not in inputs or not have_different_legs(config):
+        return 0.0
+    return float(inputs["fixedpoint"].summary["asymmetry"]["step_length"])
 
 
 def content_of_walk(

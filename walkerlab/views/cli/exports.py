@@ -110,13 +110,11 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
     # Imported here: no other export draws a walker.
     from walkerlab.config.files import files_read, find_config
     from walkerlab.config.loader import load
-    from walkerlab.scene.rigid import refuse_different_legs
     from walkerlab.views.figures.measures import draw_measures
 
     loaded = load(config, ())
     for warning in loaded.warnings:
         console.warn(warning)
-    refuse_different_legs(loaded.config, "A drawing of one leg")
     target = replace(target, inputs=tuple(files_read(find_config(config))))
     path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
     return write_file(path, draw_measures(loaded.config.walker, as_text(path.stem), kind), console)

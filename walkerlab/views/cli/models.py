@@ -8,7 +8,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.exchange.export import ENDINGS, export_model, law_named, slope_named
 from walkerlab.pipeline.plan.resolve import resolve, warn_of_edits
 from walkerlab.pipeline.run.runner import Options, execute
-from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.provenance import git_commit
 from walkerlab.views.cli.console import Console
@@ -53,7 +53,9 @@ def write_model(
         assert report.artifact is not None, "a stage with an answer stores it"
         inputs["fixedpoint"] = artifact.read(report.artifact)
     start = rigid_start(config, inputs)
-    exported = export_model(config, *start, kind, adams_law, git_commit(), path.stem, slope_named(slope))
+    asymmetry = step_asymmetry(config, inputs)
+    tilted = slope_named(slope)
+    exported = export_model(config, *start, kind, adams_law, git_commit(), path.stem, tilted, asymmetry)
     for omission in exported.left_out:
         console.note(f"left out: {omission}")
     paths = [path, *(path.with_name(name) for name in list(exported.files)[1:])]

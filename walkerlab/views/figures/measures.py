@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs
+from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, second_of
 from walkerlab.views.figures.canvas import blank, figure_style, files_of
 from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION, WIDTH
 
@@ -37,6 +37,8 @@ LINE = 0.0195
 """Width of a character and height of a line of text, as fractions of the picture's width."""
 CLEAR = 0.05
 """Minimum distance between the centres of labels in a lane, in leg lengths."""
+TITLE = 0.4
+"""Height (in) that the title of a panel takes."""
 PARTS_ROOM = 1.5
 """Height of a body's panel relative to the body."""
 
@@ -65,6 +67,12 @@ class UprightLeg:
     lengths: tuple[Length, ...]
     masses: tuple[tuple[tuple[str, ...], Point], ...]  # labels and position of each mass
     top: float  # height of the torso's end, or of the hip
+
+    @property
+    def line(self) -> list[Point]:
+        """Points of the leg's line from the hip down to where it meets the arc of the sole."""
+        above = math.sqrt(max(0.0, self.radius**2 - self.centre[0] ** 2))
+        return [*self.joints, (0.0, self.centre[1] - above)]
 
 
 def entry(key: str, value: float) -> str:
@@ -135,12 +143,38 @@ def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
 
 
 def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
-    """Draw one upright leg on the ground with its dimensions, and the second leg faintly behind it."""
-    leg = measure_leg(walker)
+    """Draw an upright leg with its dimensions, and the other leg faintly behind it. Legs that differ have a panel
+    each, the first leg above.
+    """
+    legs = [measure_leg(each) for each in dict.fromkeys((walker, second_of(walker)))]
+    views = [frame_leg(leg) for leg in legs]
+    heights = [WIDTH * (view.top - view.bottom) / view.width for view in views]
+    titles = len(legs) > 1
+    figure = blank(sum(heights) + titles * len(legs) * TITLE)
+    panels = figure.subplots(len(legs), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for place, (axes, leg, view) in enumerate(zip(panels, legs, views, strict=True)):
+        draw_panel(axes, leg, legs[-1 - place], view)
+        if titles:
+            axes.set_title(f"leg {place + 1}", fontsize=SMALL)
+    return figure
+
+
+@dataclass(frozen=True)
+class View:
+    """Part of the plane (m) around a leg that shows all its labels, and where they are."""
+
+    labels: list[tuple[str, str, Point]]  # text, colour and position of each label behind the leg
+    heights: list[float]  # of these labels
+    lanes: list[list[Length]]  # vertical dimensions ahead of the leg, by lane
+    ahead: list[int]  # number of characters that fit in each lane
+    left: float
+    width: float
+    bottom: float
+    top: float
+
+
+def frame_leg(leg: UprightLeg) -> View:
     length = leg.joints[0][1]
-    centre = leg.centre
-    # the leg's line ends where it meets the arc of the sole
-    line = [*leg.joints, (0.0, centre[1] - math.sqrt(max(0.0, leg.radius**2 - centre[0] ** 2)))]
     labels, lanes = arrange_labels(leg)
     # text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length
     behind = letters([words for words, *_ in labels])
@@ -150,41 +184,44 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     left = -BESIDE * length - LETTER * behind * width
     sizes = [LINE * width * len(words.split("\n")) for words, *_ in labels]
     heights = spread([spot[1] for *_, spot in labels], sizes, 0.0)
-    bottom = -0.16 * length
     top = max(leg.top, *heights) + 0.1 * length
-    ends = (left, left + width)
-    figure = blank(WIDTH * (top - bottom) / width)
-    axes = figure.add_subplot()
+    return View(labels, heights, lanes, ahead, left, width, -0.16 * length, top)
+
+
+def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> None:
+    """Draw an upright leg on the ground with its dimensions, and the other leg faintly behind it."""
+    length = leg.joints[0][1]
+    line = leg.line
+    ends = (view.left, view.left + view.width)
     axes.set_axis_off()
-    axes.set(aspect="equal", xlim=ends, ylim=(bottom, top))
+    axes.set(aspect="equal", xlim=ends, ylim=(view.bottom, view.top))
     axes.fill_between(ends, -0.02 * length, 0.0, facecolor=PALE, edgecolor=GREY, hatch="////", linewidth=0.0)
     axes.plot(ends, [0.0, 0.0], color=BLACK, linewidth=0.8)
     y = -0.1 * length
     axes.annotate("", xy=(0.25 * length, y), xytext=(-0.25 * length, y), arrowprops={"arrowstyle": "-|>"})
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
-    # the second leg, behind and off the ground, with its knee bent if it has one
+    # the other leg, behind and off the ground, with its knee bent if it has one
     second = [leg.joints[0]]
-    angles = (BEHIND, BENT)[: len(leg.joints)]
-    for angle, above, below in zip(angles, leg.joints, line[1:], strict=True):
+    angles = (BEHIND, BENT)[: len(other.joints)]
+    for angle, above, below in zip(angles, other.joints, other.line[1:], strict=True):
         second.append(rotate(angle, above, below, second[-1]))
-    draw_leg(axes, second, rotate(angles[-1], leg.joints[-1], centre, second[-2]), leg.radius, FAINT)
-    draw_leg(axes, line, centre, leg.radius, BLACK)
+    draw_leg(axes, second, rotate(angles[-1], other.joints[-1], other.centre, second[-2]), other.radius, FAINT)
+    draw_leg(axes, line, leg.centre, leg.radius, BLACK)
     axes.plot([0.0, 0.0], [length, leg.top], color=BLACK, linewidth=2.0)
     x = FIRST_LANE * length
-    for lane, wide in zip(lanes, ahead, strict=True):
+    for lane, wide in zip(view.lanes, view.ahead, strict=True):
         for dimension in lane:
-            draw_length(axes, dimension, x, LETTER * width)
-        x += LETTER * wide * width
+            draw_length(axes, dimension, x, LETTER * view.width)
+        x += LETTER * wide * view.width
     axes.plot(*np.transpose([spot for _, spot in leg.masses]), "o", markersize=8, color=GREEN, zorder=5)
     for dimension in leg.lengths:
         if dimension.start[1] == dimension.end[1]:
             axes.plot(*np.transpose([dimension.start, dimension.end]), color=VERMILLION, linewidth=1.5)
-    for (words, colour, spot), height in zip(labels, heights, strict=True):
+    for (words, colour, spot), height in zip(view.labels, view.heights, strict=True):
         axes.plot([-BESIDE * length, spot[0]], [height, spot[1]], color=colour, linewidth=0.5, zorder=1)
         axes.text(-BESIDE * length, height, f"{words} ", color=colour, fontsize=SMALL, ha="right", va="center")
     if leg.radius > SMALL_ARC * length:
-        axes.plot(*centre, marker="+", markersize=8, color=BLUE, zorder=5)
-    return figure
+        axes.plot(*leg.centre, marker="+", markersize=8, color=BLUE, zorder=5)
 
 
 def arrange_labels(leg: UprightLeg) -> tuple[list[tuple[str, str, Point]], list[list[Length]]]:
@@ -255,8 +292,12 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
 
 
 def draw_parts(walker: PartsWalker) -> Figure:
-    """Draw all bodies except those of the first leg, each in its own frame."""
-    shown = [body for body in walker.bodies if body.name not in walker.legs[0]]
+    """Draw all bodies, each in its own frame. Of two equal legs, only the second is drawn."""
+    # Imported here: only walkers of parts need their mechanics.
+    from walkerlab.scene.rigid import level_walker
+
+    alike = () if level_walker(walker, gravity=1.0).legs_differ else walker.legs[0]
+    shown = [body for body in walker.bodies if body.name not in alike]
     figure = blank(HEIGHT)
     for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         axes.set(aspect="equal", title="\n".join([f"name: {body.name}", *mass_labels(body, "")]), xlabel="ahead (m)")

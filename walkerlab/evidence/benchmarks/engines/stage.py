@@ -25,7 +25,7 @@ from walkerlab.evidence.benchmarks.words import words
 from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import rigid_start
+from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
 from walkerlab.pipeline.store.columns import rows_group
 from walkerlab.pipeline.store.content import Content
 
@@ -57,7 +57,7 @@ def run(config: SceneConfig, inputs: Mapping[str, Content], progress: Progress, 
     if not engines:
         raise NoAnswer("engines: no engine is installed", f"Install them: {EXTRA}")
     rigid = inputs["fixedpoint"].summary if "fixedpoint" in inputs else None
-    scene = supported_scene(config, *rigid_start(config, inputs))
+    scene = supported_scene(config, *rigid_start(config, inputs), step_asymmetry(config, inputs))
     truth = experiments.make_truth(scene)
     if truth is None:
         raise NoAnswer(
