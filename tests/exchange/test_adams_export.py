@@ -241,7 +241,7 @@ def test_contact_statements_have_adams_parameters_and_two_lanes():
 
 
 def test_adams_result_names_match_recording_columns():
-    from walkerlab.exchange.columns import Recording, matches
+    from walkerlab.exchange.columns import Recording, match_columns
 
     text = next(iter(files_of("adm", "contact", "torso", PADS).files.values()))
     names = [
@@ -249,7 +249,7 @@ def test_adams_result_names_match_recording_columns():
         for name, components in re.findall(r"RESULTS_NAME = (\w+)\n, CNAMES = (.*)", text)
         for component in re.findall(r'"(\w+)"', components)
     ]
-    found, ambiguous = matches(Recording("a.res", dict.fromkeys(names, np.zeros(2))), {"time"})
+    found, ambiguous = match_columns(Recording("a.res", dict.fromkeys(names, np.zeros(2))), {"time"})
     assert not ambiguous
     assert set(found.values()) == set(names)
     assert found["angle 1"] == "leg_1.angle"

@@ -243,7 +243,7 @@ def test_opposite_offsets_are_reported_if_step_lengths_alternate(offset, tmp_pat
 def test_gain_error_and_coarse_rounding_are_not_reported_as_tilt_alone(distort, tmp_path):
     time, angle = sampled(noise=2e-4, seed=2)
     (doubt,) = read(tmp_path, time, distort(angle))["doubts"]
-    assert "a wrong gain, a tilt or coarse digits may be behind it" in doubt
+    assert "a wrong gain, a tilt or coarse digits may be the cause" in doubt
 
 
 @pytest.mark.parametrize("noise", [0.1, 0.2, 0.3])

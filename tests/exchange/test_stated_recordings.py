@@ -57,8 +57,8 @@ def test_a_column_may_have_another_sign_and_a_constant(header, change, source, t
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("angle 1+90grad", "in 'grad', which is no unit of angle"),
-        ("angle 1+5mm", "in 'mm', which is no unit of angle"),
+        ("angle 1+90grad", "in 'grad', which is not a unit of angle"),
+        ("angle 1+5mm", "in 'mm', which is not a unit of angle"),
         ("-nothing", "has no column 'nothing'"),
         ("angle 1+90", r"has no column 'angle 1\+90'"),
     ],

@@ -124,7 +124,7 @@ def contact_arguments(contact: AdamsContact, ids: Mapping[str, int]) -> Iterator
 
 
 def command_text(model: AdamsModel, dataset: str, end_s: float, pinned_until_s: float | None) -> str:
-    """Write the commands that simulate walkerlab's walk, as `AdamsModel.commands` has them."""
+    """Write the commands of `AdamsModel.commands`, which simulate walkerlab's walk, with a header."""
     head = [
         dataset,
         dataset.removesuffix(".adm"),

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.exported import Exported, finite
 from walkerlab.physics.ground.friction import Coulomb, Frictionless
-from walkerlab.physics.ground.knees import FLEXED
+from walkerlab.physics.ground.knees import MIN_FLEXION
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
@@ -39,13 +39,13 @@ REFERENCE = re.compile(r"\{([\w.]+)\}")
 """Name of a marker or variable in an expression."""
 OUTPUT_S = 1e-3
 """Time between the outputs of a simulation."""
-SLOWER = 1.05
-"""Longest simulation between events, over the duration of walkerlab's walk."""
+TIME_FACTOR = 1.05
+"""Maximum simulated time between events, as a multiple of the duration of walkerlab's walk."""
 SHORTEST_HIP = 0.5
 """Height of the hip, as a fraction of the leg, below which a walker has fallen."""
 ERROR_RAD = 1e-6
 ERROR_MM = 1e-6
-"""Errors to which sensors are located; ADAMS's default is 1e-3 in the unit of the expression."""
+"""Tolerances of sensors. ADAMS's default is 1e-3 in the unit of the expression."""
 Place = tuple[float, float, float]
 
 
@@ -163,6 +163,7 @@ class AdamsModel:
     def numbers(self) -> dict[str, int]:
         """Number of each object within its kind, from 1."""
         primitives = [name for name, joint in self.joints.items() if joint.kind == "INLINE"]
+        # ADAMS numbers primitives separately from joints.
         joints = [name for name in self.joints if name not in primitives]
         kinds = (
             self.markers, [*self.shapes, *self.outlines], joints, primitives, self.couplers, self.contacts,
@@ -183,7 +184,7 @@ class AdamsModel:
         for event in self.events:
             yield self.switch("activate", event.sensor)
             # a slower walk still reaches its last event
-            yield run.format(finite(SLOWER * end_s))
+            yield run.format(finite(TIME_FACTOR * end_s))
             yield from (self.switch("deactivate", name) for name in (event.sensor, *event.deactivated))
             yield from (self.switch("activate", name) for name in event.activated)
         if not self.events:
@@ -244,7 +245,7 @@ class MovingFrame(NamedTuple):
 
 
 def marker_at(part: str, point_m: Position, across_m: float = 0.0) -> Marker:
-    """Return a marker at a point of a part, `across_m` beside the plane of the walk."""
+    """Return a marker at a point of a part, at the signed distance `across_m` from the plane of the walk."""
     return Marker(part, (MM * point_m[0], MM * point_m[1], MM * across_m))
 
 
@@ -381,7 +382,7 @@ def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
         raise ConfigError(
             f"The friction law {type(friction).__name__} cannot be exported.", "Set contact.friction=coulomb, or none."
         )
-    return in_mm, friction.with_creep(MM)
+    return in_mm, friction.scale_creep(MM)
 
 
 def add_contacts(model: AdamsModel, export: Exported) -> None:
@@ -521,7 +522,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
             # the trailing knee stays locked during the push-off
             sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
         model.sensors |= {
-            f"{leg}_bent": Sensor(f"-{finite(FLEXED)}-{angle}", ERROR_RAD),
+            f"{leg}_bent": Sensor(f"-{finite(MIN_FLEXION)}-{angle}", ERROR_RAD),
             f"{leg}_straight": Sensor(f"IF({angle}:-1,-1,-{rate})", ERROR_RAD),
             f"{leg}_touches": Sensor(down, ERROR_MM),
             f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM),

@@ -30,23 +30,25 @@ from walkerlab.exchange.marker_lines import (
 from walkerlab.exchange.recording import SEGMENTS, TIME, UNIT_IN_NAME, Array, Recording
 from walkerlab.exchange.units import SI, UNIT_VALUES, value_in_si
 
-OF_LEG: Final = {
+LEG_QUANTITIES: Final = {
     "angle": "angle", "velocity": "rate", "shank_angle": "angle", "shank_velocity": "rate", "foot_along_m": "length",
     "foot_height_m": "length", "knee_along_m": "length", "knee_height_m": "length", "normal_force_N": "force",
     "friction_force_N": "force", "penetration_m": "length", "slip_velocity_m_s": "speed",
 }  # fmt: skip
-OF_WALKER: Final = {
+WALKER_QUANTITIES: Final = {
     TIME: "time", "torso_angle": "angle", "torso_velocity": "rate", "hip_along_m": "length", "hip_height_m": "length",
     "kinetic_J": "energy", "potential_J": "energy", "mechanical_J": "energy", "total_energy_J": "energy",
 }  # fmt: skip
-QUANTITY_KINDS: Final = OF_WALKER | {f"{name} {leg}": kind for name, kind in OF_LEG.items() for leg in (1, 2)}
-"""Kind of unit by quantity; names of a leg's quantities end in the leg's number, 1 or 2."""
+QUANTITY_KINDS: Final = WALKER_QUANTITIES | {
+    f"{name} {leg}": kind for name, kind in LEG_QUANTITIES.items() for leg in (1, 2)
+}
+"""Kind of unit by quantity. Names of quantities of a leg end in its number, 1 or 2."""
 NEEDED: Final = (TIME, "angle 1", "angle 2")
 UNIT_AT_END: Final = re.compile(r"_(?:m_s|m|n)$")
 LINE: Final = re.compile(r"(.+?)\s*>\s*(.+)")
 """Pattern for the angle of a line from one marker to another, as in `angle 1=HIP>HEEL`."""
 HIP_OF_LINES: Final = "upper marker along the walk"
-"""Place (m) of the marker at the top of the first line, where angles are those of lines."""
+"""Position (m) along the walk of the upper marker of the first line, if angles are those of lines."""
 SAMPLE: Final = "sample"
 """Number of each sample in the file, from 1."""
 QUOTED: Final = re.compile(r"""["'](.*)["']""")
@@ -56,9 +58,9 @@ FRAME: Final = re.compile(r"(?i:frames?(?:[\s_]?(?:idx|index|number|no\.?))?#?)"
 """Pattern for the name of a column that counts frames."""
 PAIR: Final = re.compile(r"""(?:[^,"]|"[^"]*")+|"[^,]*""")
 FRAME_TIME: Final = "frame / fps"
-SAME_RATE: Final = 0.01  # largest relative difference of two frame rates that are the same
+SAME_RATE: Final = 0.01  # frame rates that differ by less than this (relative) count as equal
 LIKELIHOOD: Final = r"(?i:[\s._:]+(?:likelihood|confidence|score))"
-UNLIKELY: Final = 0.5  # likelihood below which a marker's place is doubtful
+UNLIKELY: Final = 0.5  # likelihood below which the position of a marker is doubtful
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +70,15 @@ class RecordedWalk:
     time_s: Array
     quantities: dict[str, Array]
     sources: dict[str, str] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)  # reason by quantity that a column has but the walk lacks
-    walks: str = ""  # stated direction, '' if it is to be found
-    unit_is_stated: bool = True  # whether the file states the unit of a leg's angle for itself, or the user
+    left_out: dict[str, str] = field(default_factory=dict)  # reason, by quantity, why its column is not used
+    walks: str = ""  # stated direction of the walk; '' to find it
+    unit_is_stated: bool = True  # whether the file or the user states the unit of the leg angles explicitly
     lines: tuple[str, ...] = ()  # quantities that are angles of lines between markers
-    doubts: tuple[str, ...] = ()  # what is odd about the recording, and what was done about it
-    gaps: str = ""  # samples within the walk that are left out because they have gaps, in words
-    tilt_rad: float = 0.0  # angle by which the direction that angles are measured from leans, its top forwards
+    doubts: tuple[str, ...] = ()  # oddities of the recording, and how they were handled
+    gaps: str = ""  # description of samples within the walk that are left out because values are missing
+    tilt_rad: float = 0.0  # forward lean of the direction from which angles are measured
     belt_m_s: float = 0.0  # speed of a treadmill's belt
-    hip_is_in_m: bool = False  # whether the place of the upper marker has a known unit
+    hip_is_in_m: bool = False  # whether the position of the upper marker is in a known unit
 
     def both_legs(self, name: str) -> Array | None:
         """Return a quantity of both legs (samples, 2), or None unless it is recorded for both."""
@@ -86,7 +88,7 @@ class RecordedWalk:
 
 @dataclass(frozen=True)
 class ColumnSource:
-    """Column, or line between markers, that a quantity comes from: sign times its values, plus a constant."""
+    """Source of a quantity: a column, or a line between markers. Its values are multiplied by a sign, then shifted."""
 
     column: str
     sign: float = 1.0
@@ -96,34 +98,34 @@ class ColumnSource:
 def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> RecordedWalk:
     """Return the quantities of a recorded walk in SI units.
 
-    asked      what the user states about the file
+    asked      statements of the user about the file
     slope_rad  slope of the ground, for angles from the floor's normal
 
     Raises ConfigError for a column or unit that is unknown or missing, for gaps, and for running.
     """
     units = asked.units
     refuse_units(recording, units, QUANTITY_KINDS)
-    recording, notes = with_frame_times(recording, asked)
+    recording, notes = set_frame_times(recording, asked)
     if FRAME_TIME in recording.columns:
         units = {name: unit for name, unit in units.items() if name != TIME}
     named = find_named(recording, asked)
-    sources, left_out = matches(recording, named.keys())
+    sources, left_out = match_columns(recording, named.keys())
     sources |= {name: source.column for name, source in named.items()}
     for name in NEEDED:
         if name in left_out:
             raise ConfigError(left_out[name], f'Choose one: --columns "{name}=..."')
         if name not in sources:
-            raise missing(recording, name)
+            raise missing_error(recording, name)
     ends = {name: pairs for name, source in sources.items() if (pairs := ends_of(recording, source))}
-    recording, more_notes = with_likely_places(recording, [sources[name] for name in ends], asked.min_likelihood)
+    recording, more_notes = remove_unlikely_positions(recording, [sources[name] for name in ends], asked.min_likelihood)
     for pairs in ends.values():
         columns_with_gaps, unseen = unseen_as_gaps(recording.columns, pairs)
         recording = replace(recording, columns=columns_with_gaps, unseen=recording.unseen | unseen)
-    recording = without_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
+    recording = remove_frozen_angles(recording, [sources[name] for name in NEEDED[1:] if name not in ends])
     needed = [sources[name] for name in {**dict.fromkeys(NEEDED), **named}]
     time_unit = unit_value(recording, TIME, sources[TIME], "time", units)
-    rows = within_span(recording, recording.columns[sources[TIME]] * time_unit, asked)
-    rows, cut, gaps = without_gaps(recording, needed, rows)
+    rows = select_span(recording, recording.columns[sources[TIME]] * time_unit, asked)
+    rows, cut, gaps = remove_gaps(recording, needed, rows)
     left_out |= {"samples": cut} if cut else {}
     within = replace(recording, columns={name: values[rows] for name, values in recording.columns.items()})
     values = {}
@@ -166,10 +168,10 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
     return add_lines(walk, lines, constants, str(recording.path))
 
 
-def with_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, list[str]]:
-    """Return a recording whose time is that of frames at a stated rate, if one is stated, and what is odd about it.
+def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, list[str]]:
+    """If the user states a frame rate, replace the times by those of the frames. Also returns notes about the times.
 
-    Frames are those of a column that counts them, otherwise those of regular times, otherwise the samples.
+    Frame numbers come from a column that counts frames, otherwise from regular times, otherwise from the sample order.
     """
     if asked.fps is None or not recording.columns:
         return recording, []
@@ -195,8 +197,10 @@ def with_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, 
     return replace(recording, columns={FRAME_TIME: frames / asked.fps, **columns}, units=units), notes
 
 
-def with_likely_places(recording: Recording, lines: Sequence[str], least: float | None) -> tuple[Recording, list[str]]:
-    """Return a recording with gaps where a marker of some lines is unlikely, and what is odd about likelihoods.
+def remove_unlikely_positions(
+    recording: Recording, lines: Sequence[str], least: float | None
+) -> tuple[Recording, list[str]]:
+    """Replace positions of the markers of `lines` by gaps where their likelihood is below `least`. Also returns notes.
 
     Raises ConfigError for a limit without likelihoods in the file.
     """
@@ -227,10 +231,10 @@ def with_likely_places(recording: Recording, lines: Sequence[str], least: float 
     return replace(recording, columns=columns, unseen=unseen), []
 
 
-def without_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
-    """Return the recording with gaps in place of angles that stand still for some samples and then leap.
+def remove_frozen_angles(recording: Recording, names: Iterable[str]) -> Recording:
+    """Replace angles by gaps where they stand still for some samples and then leap.
 
-    Software that fills gaps leaves such angles.
+    Software that fills gaps produces such angles.
     """
     for name in names:
         if name in recording.problems:
@@ -244,7 +248,7 @@ def without_frozen_angles(recording: Recording, names: Iterable[str]) -> Recordi
 
 
 def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tuple[float, list[str]]:
-    """Return the angle (rad) by which the direction that angles are from leans, and what the file says about it."""
+    """Return the forward lean (rad) of the direction from which angles are measured, and notes about it."""
     tilt = asked.camera_tilt_deg
     if tilt is None and recording.levelled_by:
         return (0.0 if recording.levelled_by == SEGMENTS else slope_rad), [
@@ -259,7 +263,7 @@ def camera_tilt(recording: Recording, asked: Recorded, slope_rad: float) -> tupl
 def floor_in_column(recording: Recording, asked: Recorded, slope_rad: float) -> float:
     """Return the angle (rad) that Sports2D subtracted from angles of segments, because the floor leans in its picture.
 
-    It does so with one sign for walks to both sides, although it mirrors the picture of a walk to the left.
+    Sports2D uses the same sign for walks in both directions, although it mirrors the picture of a walk to the left.
     """
     if asked.camera_tilt_deg is not None or recording.levelled_by != SEGMENTS:
         return 0.0
@@ -300,19 +304,19 @@ def only_rows(walk: RecordedWalk, rows: NDArray[np.bool_]) -> RecordedWalk:
 
 
 def ends_of(recording: Recording, source: str) -> list[tuple[str, str]]:
-    """Return the two columns of each coordinate of a line's ends, or () if the source is not a line."""
+    """Return the columns of the upper and lower end of a line for each coordinate, or nothing if it is not a line."""
     ends = None if source in recording.columns else LINE.fullmatch(source)
     return line_columns(recording, ends[1], ends[2]) if ends else []
 
 
-def within_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[np.bool_]:
-    """Return which samples are in the part that is asked for.
+def select_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[np.bool_]:
+    """Mark the samples in the requested part of the recording.
 
     Raises ConfigError if there are none.
     """
     begin = -math.inf if asked.from_s is None else asked.from_s
     end = math.inf if asked.to_s is None else asked.to_s
-    # samples without a time are no part that could be left out
+    # Samples without a time are neither before nor after the part, so they remain and are reported as gaps.
     rows = ~((time < begin) | (time > end))
     if rows.size and not rows.any():
         raise ConfigError(
@@ -323,12 +327,12 @@ def within_span(recording: Recording, time: Array, asked: Recorded) -> NDArray[n
     return np.asarray(rows)
 
 
-def without_gaps(
+def remove_gaps(
     recording: Recording, sources: Iterable[str], rows: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], str, str]:
-    """Return the rows without gaps in any source, and in words what is cut at the ends and what is left out within.
+    """Mark the rows without gaps in any source. Also describes the samples cut off at the ends, and the gaps within.
 
-    Raises ConfigError for a column that is not of numbers, and if every sample has a gap.
+    Raises ConfigError for a column that does not contain numbers, and if every sample has a gap.
     """
     used = list(dict.fromkeys(column for source in sources for column in columns_of(recording, source)))
     for column in used:
@@ -360,7 +364,7 @@ def refuse_problem(recording: Recording, column: str) -> None:
 
 
 def refuse_gaps(recording: Recording, source: str, rows: NDArray[np.bool_] | slice) -> None:
-    """Raise ConfigError for a source of which values are missing at some of the rows."""
+    """Raise ConfigError if values of a source are missing in some of the rows."""
     for column in columns_of(recording, source):
         refuse_problem(recording, column)
         values = recording.columns[column]
@@ -374,7 +378,7 @@ def refuse_gaps(recording: Recording, source: str, rows: NDArray[np.bool_] | sli
 
 
 def refuse_order(path: Path, time: Array) -> None:
-    """Raise ConfigError unless the times are at least two and strictly rising."""
+    """Raise ConfigError unless there are at least two times and they rise strictly."""
     if time.size < 2:
         raise ConfigError(f"{path} holds {time.size} samples; a walk needs at least two.", "Record a longer walk.")
     steps_back = np.flatnonzero(np.diff(time) <= 0.0)
@@ -387,27 +391,27 @@ def refuse_order(path: Path, time: Array) -> None:
         )
 
 
-def plain(name: str) -> str:
+def normalise_name(name: str) -> str:
     """Return a name in lower case, with underscores as its only separators."""
     return re.sub(r"[\s_\-]+", "_", name.strip().lower())
 
 
-def matches(recording: Recording, named: Collection[str]) -> tuple[dict[str, str], dict[str, str]]:
-    """Return a column by quantity: the column with the quantity's name, otherwise the only one whose name ends in it.
+def match_columns(recording: Recording, named: Collection[str]) -> tuple[dict[str, str], dict[str, str]]:
+    """Find the column of each quantity: the one with its name, otherwise the only one whose name ends in it.
 
-    Also returns the reason for each quantity for which there are several columns.
+    Also returns, by quantity, why several columns could be meant.
 
     named  quantities to skip, because the user names their columns
     """
-    columns = {column: plain(column) for column in recording.columns}
+    columns = {column: normalise_name(column) for column in recording.columns}
     by_ending: dict[str, list[str]] = {}
     for column, name in columns.items():
-        for place in (0, *(match.end() for match in re.finditer(r"[./]", name))):
-            by_ending.setdefault(name[place:], []).append(column)
+        for start in (0, *(match.end() for match in re.finditer(r"[./]", name))):
+            by_ending.setdefault(name[start:], []).append(column)
     sources = {} if recording.time_name is None or TIME in named else {TIME: recording.time_name}
     problems = {}
     for name in (name for name in QUANTITY_KINDS if name != TIME and name not in named):
-        names = (plain(name), plain(name).removesuffix("_m"), *leg_names(name))
+        names = (normalise_name(name), normalise_name(name).removesuffix("_m"), *leg_names(name))
         found = list(dict.fromkeys(column for ending in names for column in by_ending.get(ending, ())))
         candidates = [column for column in found if columns[column] in names] or found
         if len(candidates) == 1:
@@ -418,9 +422,9 @@ def matches(recording: Recording, named: Collection[str]) -> tuple[dict[str, str
 
 
 def leg_names(name: str) -> list[str]:
-    """Return a leg quantity's name in exported models, e.g. leg_1.angle for 'angle 1', or '' for other quantities."""
+    """Return the name of a leg quantity in exported models, e.g. leg_1.angle for 'angle 1', or nothing for others."""
     quantity, blank, leg = name.rpartition(" ")
-    return [f"leg_{leg}.{UNIT_AT_END.sub('', plain(quantity))}"] if blank else []
+    return [f"leg_{leg}.{UNIT_AT_END.sub('', normalise_name(quantity))}"] if blank else []
 
 
 def find_named(recording: Recording, asked: Recorded) -> dict[str, ColumnSource]:
@@ -428,12 +432,12 @@ def find_named(recording: Recording, asked: Recorded) -> dict[str, ColumnSource]
 
     Raises ConfigError for an unknown quantity or column.
     """
-    known = {plain(name): name for name in QUANTITY_KINDS}
+    known = {normalise_name(name): name for name in QUANTITY_KINDS}
     sources = {TIME: ColumnSource(FRAME_TIME)} if FRAME_TIME in recording.columns else {}
     for quantity, text in asked.columns.items():
-        name = known.get(plain(quantity))
+        name = known.get(normalise_name(quantity))
         if name is None:
-            near = get_close_matches(plain(quantity), known, 1)
+            near = get_close_matches(normalise_name(quantity), known, 1)
             advice = f"Did you mean {known[near[0]]!r}?" if near else f"Available: {', '.join(QUANTITY_KINDS)}."
             raise ConfigError(f"--columns: {quantity!r} is not a quantity of a walk.", advice)
         if name not in sources:
@@ -443,7 +447,7 @@ def find_named(recording: Recording, asked: Recorded) -> dict[str, ColumnSource]
 
 
 def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
-    """Return the source that a text such as NAME, -NAME or NAME+90deg names. An exact or quoted column name wins.
+    """Parse a source such as NAME, -NAME or NAME+90deg. An exact or quoted column name takes precedence.
 
     Raises ConfigError for a constant in an unknown unit, and for a line with a sign.
     """
@@ -458,13 +462,13 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
     unit = value_in_si(match[4], kind) if match[4] else 0.0
     if unit is None:
         raise ConfigError(
-            f"--columns: {text!r} adds a constant in {match[4]!r}, which is no unit of {kind}.",
-            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; quote a name that ends so: '\"{text}\"'.",
+            f"--columns: {text!r} adds a constant in {match[4]!r}, which is not a unit of {kind}.",
+            f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; quote a name that ends like this: '\"{text}\"'.",
         )
     column = named_column(recording, match[2].strip())
     if match[1] and LINE.fullmatch(column) and column not in recording.columns:
         raise ConfigError(
-            f"--columns: {text!r} changes the sign of a line's angle, which follows from the way the walk goes.",
+            f"--columns: {text!r} changes the sign of a line's angle, which follows from the direction of the walk.",
             "Leave out the sign, or state the direction with --walks.",
         )
     return ColumnSource(column, -1.0 if match[1] else 1.0, float(match[3].replace(" ", "")) * unit if match[3] else 0.0)
@@ -477,21 +481,21 @@ def named_column(recording: Recording, name: str) -> str:
 
 
 def columns_of(recording: Recording, source: str) -> list[str]:
-    """Return the columns that a source needs: its own, or the coordinates of a line's ends.
+    """Return the columns that a source needs: one, or the coordinates of both ends of a line.
 
     Raises ConfigError if absent.
     """
     if pairs := ends_of(recording, source):
         return [column for pair in pairs for column in pair]
     if source not in recording.columns:
-        raise unknown_column(recording, source)
+        raise unknown_column_error(recording, source)
     return [source]
 
 
 def line_columns(recording: Recording, top: str, bottom: str) -> list[tuple[str, str]]:
     """Return the two columns of each coordinate, x, y or z, that both markers have.
 
-    Raises ConfigError without a marker.
+    Raises ConfigError if a marker is missing.
     """
     ends = [axes_of(recording, marker) for marker in (top, bottom)]
     return [(ends[0][axis], ends[1][axis]) for axis in "xyz" if axis in ends[0] and axis in ends[1]]
@@ -511,18 +515,18 @@ def axes_of(recording: Recording, marker: str) -> dict[str, str]:
                 "Rename one of them in the file.",
             )
     if len(axes) < 2:
-        raise unknown_column(recording, f"{marker}.x")
+        raise unknown_column_error(recording, f"{marker}.x")
     return axes
 
 
-def unknown_column(recording: Recording, column: str) -> ConfigError:
+def unknown_column_error(recording: Recording, column: str) -> ConfigError:
     """Build the error for a column that the file lacks. It suggests the one with the most similar name."""
     near = get_close_matches(column, recording.columns, 1, 0.3)
     advice = f"Did you mean {near[0]!r}?" if near else f"Available: {', '.join(list(recording.columns)[:12])}."
     return ConfigError(f"{recording.path} has no column {column!r}.", advice)
 
 
-def missing(recording: Recording, name: str) -> ConfigError:
+def missing_error(recording: Recording, name: str) -> ConfigError:
     """Build the error for a quantity without a column. It suggests the column with the most similar name."""
     there = ", ".join(list(recording.columns)[:12])
     if name == TIME:
@@ -536,8 +540,8 @@ def missing(recording: Recording, name: str) -> ConfigError:
             f"{recording.path} has no column for {name!r}, but markers: {', '.join(markers[:12])}.",
             f'Name the markers at the hip and at the foot: --columns "{name}=HIP>FOOT"',
         )
-    near = get_close_matches(plain(name), [plain(column) for column in recording.columns], 1, 0.2)
-    nearest = next((column for column in recording.columns if near and plain(column) == near[0]), "NAME")
+    near = get_close_matches(normalise_name(name), [normalise_name(column) for column in recording.columns], 1, 0.2)
+    nearest = next((column for column in recording.columns if near and normalise_name(column) == near[0]), "NAME")
     return ConfigError(
         f"{recording.path} has no column for {name!r}; it has: {there}.", f'Name it: --columns "{name}={nearest}"'
     )
@@ -553,7 +557,7 @@ def refuse_units(recording: Recording, units: Mapping[str, str], quantities: Col
                 f"--units: {name!r} is neither a kind, a quantity nor a column of {recording.path}.", advice
             )
         if name in UNIT_VALUES and value_in_si(unit, name) is None:
-            raise unknown_unit(recording, unit, name, name)
+            raise unknown_unit_error(recording, unit, name, name)
 
 
 def unit_value(recording: Recording, name: str, source: str, kind: str, units: Mapping[str, str]) -> float:
@@ -569,7 +573,7 @@ def unit_value(recording: Recording, name: str, source: str, kind: str, units: M
         )
     value = value_in_si(unit, kind)
     if value is None:
-        raise unknown_unit(recording, unit, name, kind)
+        raise unknown_unit_error(recording, unit, name, kind)
     return value
 
 
@@ -592,7 +596,7 @@ def stated_unit(recording: Recording, name: str, source: str, kind: str, units: 
     return of_user or of_file
 
 
-def unknown_unit(recording: Recording, unit: str, name: str, kind: str) -> ConfigError:
+def unknown_unit_error(recording: Recording, unit: str, name: str, kind: str) -> ConfigError:
     return ConfigError(
         f"{recording.path}: {unit!r}, stated for {name!r}, is not a known unit of {kind}.",
         f"Known units: {', '.join(list(UNIT_VALUES[kind])[:6])}; set --units {kind}={SI[kind]}.",
@@ -600,14 +604,14 @@ def unknown_unit(recording: Recording, unit: str, name: str, kind: str) -> Confi
 
 
 def states_unit(recording: Recording, column: str, units: Mapping[str, str]) -> bool:
-    """Return whether the user or the file states the unit of a leg's angle for itself, not for all angles of a file."""
+    """Whether the user or the file states the unit of this leg angle, not only that of all angles in the file."""
     named = ends_of(recording, column) or column in recording.units or unit_in_name(column, "angle")
     return bool(named or not units.keys().isdisjoint((column, "angle 1", "angle")))
 
 
 def unit_in_name(column: str, kind: str) -> str:
     """Return the unit at the end of a column's name, such as mm in hip_mm, or '' if the name has none."""
-    endings = [unit for unit in UNIT_VALUES[kind] if plain(column).endswith(f"_{unit.replace('/', '_')}")]
+    endings = [unit for unit in UNIT_VALUES[kind] if normalise_name(column).endswith(f"_{unit.replace('/', '_')}")]
     return max(endings, key=len, default="")
 
 
@@ -618,7 +622,7 @@ def rate_unit(units: Mapping[str, str], kind: str) -> str:
 
 
 def places_of_ends(recording: Recording, pairs: Sequence[tuple[str, str]], units: Mapping[str, str]) -> Line:
-    """Return the positions (samples, axes) of a line's ends: in m, or as recorded if all have the same unknown unit."""
+    """Return the positions (samples, axes) of both ends of a line: in m, or as recorded if their unit is unknown."""
     scale = scale_of_line(recording, pairs, units) or {}
     top, bottom = (
         np.stack([recording.columns[column] * scale.get(column, 1.0) for column in end], axis=1)

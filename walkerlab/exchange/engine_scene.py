@@ -49,21 +49,22 @@ class EngineScene:
         return self.ours.gravity_along, self.ours.gravity_down
 
     @cached_property
-    def knee_places(self) -> tuple[int, ...]:
+    def knee_indices(self) -> tuple[int, ...]:
         """Index of each knee's angle among the engine's coordinates, or -1 for a locked knee."""
         ends = [(self.assembly.index(knee.shank), self.assembly.index(knee.thigh)) for knee in self.assembly.knees]
         bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
     def lock_knees(self, doing: NDArray[np.int8]) -> EngineScene:
-        """Scene in which the knees in state LOCKED are locked."""
+        """Return the scene with the knees in state LOCKED locked."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
 
     @cached_property
     def centre_levers(self) -> Floats:
-        """Vectors (bodies, 2) in body frames (m), which, when rotated, add up to the vector from base to
-        centre of mass.
+        """Vectors (bodies, 2) in m in the body frames.
+
+        Rotated by the bodies' angles, they lead from base to mass centre.
         """
         weighted = [mass * levers(self.assembly, self.base, anchor) for mass, anchor in masses(self.assembly)]
         return np.asarray(sum(weighted) / total_mass(self.assembly))
@@ -95,7 +96,7 @@ class EngineScene:
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
     def scale_start(self, factor: float) -> EngineScene:
-        """Scene with the start's velocities multiplied by `factor`. The stance foot still does not slip."""
+        """Return the scene with the initial velocities multiplied by `factor`. The stance foot still does not slip."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))
 
@@ -126,7 +127,7 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
 
 @dataclass(frozen=True)
 class EngineContact:
-    """Properties that an engine's own contact model is tuned to reproduce, SI."""
+    """Properties that the native contact model of an engine is tuned to reproduce, SI."""
 
     mass: float  # mass that rests on one foot (kg)
     gravity: float  # gravity towards the ground (m/s^2)

@@ -30,7 +30,7 @@ ENDINGS: Final[dict[str, Kind]] = {"adm": "adm", "cmd": "cmd", "xml": "mjcf", "m
 
 @dataclass(frozen=True)
 class ExportedFiles:
-    """Exported texts by file name, the model first, and the parts of the walk that they leave out."""
+    """Exported texts by file name, the model first, and descriptions of what they leave out."""
 
     files: dict[str, str]
     left_out: tuple[str, ...]
@@ -85,7 +85,7 @@ def export_model(
 
 
 def law_named(text: str) -> Law:
-    """Return the ADAMS contact law of this name.
+    """Check the name of an ADAMS contact law, and return it.
 
     Raises ConfigError for an unknown name.
     """
@@ -96,7 +96,7 @@ def law_named(text: str) -> Law:
 
 
 def slope_named(text: str) -> Slope:
-    """Return the way of this name to express a slope.
+    """Check the name of a way to express a slope, and return it.
 
     Raises ConfigError for an unknown name.
     """
@@ -109,7 +109,7 @@ def slope_named(text: str) -> Slope:
 def add_stops(config: Config) -> Config:
     """Return a config whose knees are caught by a stop before they lock.
 
-    ADAMS changes velocities in a way of its own where a joint is activated, so a knee must be at rest when it locks.
+    When ADAMS activates a joint, it changes velocities by its own rules, so a knee must be at rest when it locks.
     """
     walker = config.walker
     if not isinstance(walker, Kneed) or walker.knee.lock == "compliant":

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 PADS_BEHIND = 2
 PADS_AHEAD = 4
 RESERVED = ("ground", "world", "walker")
-COUPLED = 1e-12  # smaller weights of a coupling count as zero
+MIN_WEIGHT = 1e-12  # smaller weights of a coupling count as zero
 
 
 @dataclass(frozen=True)
@@ -85,19 +85,19 @@ class Exported:
     @property
     def knee_links(self) -> tuple[int, ...]:
         """Index of each leg's shank, or () for straight legs."""
-        return tuple(place - 2 for place in self.scene.knee_places)
+        return tuple(index - 2 for index in self.scene.knee_indices)
 
     @cached_property
     def couplings(self) -> list[dict[int, float]]:
         """Weights, by link, of the hinge angles of bodies that follow other bodies. Each weighted sum is zero."""
         weights = []
         for row in coupling_rows(self.scene.assembly, self.model):
-            if abs(row[0]) > COUPLED:
+            if abs(row[0]) > MIN_WEIGHT:
                 raise ConfigError(
                     "A body whose coupling weights do not add up to 1 cannot be exported.",
                     "Choose weights that add up to 1 in walker.couplings.",
                 )
-            weights.append({int(link): float(row[link]) for link in np.flatnonzero(np.abs(row) > COUPLED)})
+            weights.append({int(link): float(row[link]) for link in np.flatnonzero(np.abs(row) > MIN_WEIGHT)})
         return weights
 
     @cached_property

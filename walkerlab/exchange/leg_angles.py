@@ -1,6 +1,6 @@
-"""Mend recorded leg angles before heel strikes are sought: full turns, swapped legs, outliers, signs and the way back.
+"""Repair recorded leg angles before the search for heel strikes: full turns, swapped legs, outliers, signs, way back.
 
-Each change is stated in the walk's doubts, with the samples and times.
+Each repair is listed in the doubts of the walk, with samples and times.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from walkerlab.exchange.smooth_course import FAR_PERCENT, find_stretches
 from walkerlab.exchange.touches import ERRORS
 
 UPRIGHT_RAD: Final = math.pi / 4  # largest median of a leg's angle from the vertical
-FEWEST_PASSING: Final = 3  # fewest sample intervals of a passing of the legs
+FEWEST_PASSING: Final = 3  # a passing of the legs takes at least this many sample intervals
 TINY: Final = 1e-30  # rad^2, added to a variance that may be zero
 
 
@@ -34,7 +34,7 @@ class Way:
 
 
 def mend_angles(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Return a walk whose leg angles are continuous, from the vertical, positive with the foot ahead, and go one way.
+    """Return the walk with continuous leg angles from the vertical, positive with the foot ahead, in one direction.
 
     source  name of the recording, for messages
 
@@ -52,12 +52,12 @@ def legs(walk: RecordedWalk) -> Array:
     return angle
 
 
-def doubting(walk: RecordedWalk, doubt: str) -> RecordedWalk:
+def add_doubt(walk: RecordedWalk, doubt: str) -> RecordedWalk:
     return replace(walk, doubts=(*walk.doubts, doubt))
 
 
 def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
-    """Undo jumps by full turns, and take half a turn off angles that are measured from the upward vertical.
+    """Undo jumps by full turns, and subtract half a turn from angles that are measured from the upward vertical.
 
     Raises ConfigError for angles in another unit, and for a leg that is not near the vertical.
     """
@@ -80,8 +80,8 @@ def unwrap(walk: RecordedWalk, source: str) -> RecordedWalk:
             )
         walk = replace(walk, quantities={**walk.quantities, name: angle})
         if half_turns % 2:
-            walk = doubting(
-                walk, f"{name.capitalize()} is measured from the upward vertical, so 180 degrees are taken off."
+            walk = add_doubt(
+                walk, f"{name.capitalize()} is measured from the upward vertical, so 180 degrees are subtracted."
             )
     return walk
 
@@ -98,11 +98,11 @@ def swap_back(walk: RecordedWalk) -> RecordedWalk:
         if second in quantities:
             pair = quantities[first], quantities[second]
             quantities[first], quantities[second] = np.where(swapped, pair[::-1], pair)
-    return doubting(replace(walk, quantities=quantities), swap_doubt(walk.time_s, walk.quantities[SAMPLE], swapped))
+    return add_doubt(replace(walk, quantities=quantities), swap_doubt(walk.time_s, walk.quantities[SAMPLE], swapped))
 
 
 def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
-    """Leave out samples at which a leg is off its course, and cut where an angle jumps and stays beside it."""
+    """Remove samples at which a leg leaves its course, and cut the walk where an angle jumps and does not return."""
     stretches = find_stretches(walk.time_s, legs(walk))
     off = np.zeros((walk.time_s.size, 2), bool)
     numbers = walk.quantities[SAMPLE]
@@ -111,7 +111,7 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
             off[stretch.first : stretch.end, stretch.leg] = True
     for leg in np.flatnonzero(off.any(axis=0)).tolist():
         places = spell_samples(walk.time_s, numbers, off[:, leg])
-        walk = doubting(walk, f"Angle {leg + 1} is off its course at {places}, which is left out.")
+        walk = add_doubt(walk, f"Angle {leg + 1} is off its course at {places}, which is left out.")
     rows = np.asarray(~off.any(axis=1))
     if jumps := [stretch for stretch in stretches if stretch.lasts]:
         cuts = sorted({0, walk.time_s.size, *(jump.first for jump in jumps)})
@@ -123,18 +123,19 @@ def drop_off_course(walk: RecordedWalk) -> RecordedWalk:
         )
         kept = f"from time {walk.time_s[begin]:.6g} to {walk.time_s[end - 1]:.6g} s"
         doubt = (
-            f"As if a sensor had slipped, a jump lasts: {spelled}. Only the longest part without one is kept, {kept}."
+            f"As if a sensor had slipped, there is a lasting jump: {spelled}. Only the longest part without one is "
+            f"kept, {kept}."
         )
-        walk = doubting(walk, doubt)
+        walk = add_doubt(walk, doubt)
         rows[:begin] = rows[end:] = False
     return only_rows(walk, rows)
 
 
 def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
-    """Make angles positive with the foot ahead, and keep the longest stretch of a walk there and back.
+    """Make angles positive with the foot ahead, and keep the longest stretch in one direction.
 
-    The legs of a walk swing against each other. As they pass, the swing foot moves faster against the hip than the foot
-    on the ground, and forwards.
+    The legs swing in opposite directions. As they pass each other, the swing foot moves forwards relative to the hip,
+    and faster than the foot on the ground moves backwards.
     """
     angle = legs(walk)
     swing = angle - np.mean(angle, axis=0)
@@ -143,28 +144,28 @@ def keep_one_way(walk: RecordedWalk) -> RecordedWalk:
     ways = [way for way in find_ways(walk.time_s, angle * [1.0, second]) if way.forwards or not directed]
     if not ways:
         return walk
-    place = max(range(len(ways)), key=lambda place: len(ways[place].passings))
-    first = 1.0 if ways[place].forwards else -1.0
+    longest = max(range(len(ways)), key=lambda index: len(ways[index].passings))
+    first = 1.0 if ways[longest].forwards else -1.0
     signs = {"angle 1": first, "velocity 1": first, "angle 2": first * second, "velocity 2": first * second}
     signs |= dict.fromkeys(walk.lines, first)
     walk = replace(walk, quantities={name: signs.get(name, 1.0) * values for name, values in walk.quantities.items()})
     if reversed_names := [name for name in ("angle 1", "angle 2") if signs[name] < 0.0 and name not in walk.lines]:
-        walk = doubting(walk, f"Heel strikes are found with the sign of {' and '.join(reversed_names)} reversed.")
+        walk = add_doubt(walk, f"Heel strikes are found with the sign of {' and '.join(reversed_names)} reversed.")
     turns = [find_turn(walk, before, after) for before, after in pairwise(ways)]
     if not turns:
         return walk
-    begin = [0, *turns][place]
-    end = [*turns, walk.time_s.size - 1][place]
+    begin = [0, *turns][longest]
+    end = [*turns, walk.time_s.size - 1][longest]
     spelled = ", ".join(f"{walk.time_s[turn]:.6g} s" for turn in turns)
     kept = f"the longest stretch one way, from time {walk.time_s[begin]:.6g} to {walk.time_s[end]:.6g} s, is kept"
     rows = np.arange(walk.time_s.size)
     return only_rows(
-        doubting(walk, f"The walk turns round at time {spelled}: {kept}."), (begin <= rows) & (rows <= end)
+        add_doubt(walk, f"The walk turns round at time {spelled}: {kept}."), (begin <= rows) & (rows <= end)
     )
 
 
 def find_ways(time: Array, angle: Array) -> list[Way]:
-    """Return the stretches of a walk in one direction. A single passing of the legs the other way does not count."""
+    """Divide a walk into stretches in one direction. A single passing of the legs the other way does not count."""
     spread = angle[:, 0] - angle[:, 1]
     total = angle.sum(axis=1)
     runs = apart_runs(np.abs(spread) > WINDOW_AHEAD * np.percentile(np.abs(spread), FAR_PERCENT), spread > 0.0)
@@ -180,17 +181,15 @@ def find_ways(time: Array, angle: Array) -> list[Way]:
 
 
 def trend(time: Array, values: Array) -> float:
-    """Return the slope of a line through values, in its standard errors."""
+    """Fit a line through values, and return its slope divided by the standard error of the slope."""
     share = (time - np.mean(time)) / np.ptp(time)
     slope = float(share @ values) / float(share @ share)
-    left = values - np.mean(values) - slope * share
-    return slope / math.sqrt(float(left @ left) / (time.size - 2) / float(share @ share) + TINY)
+    residuals = values - np.mean(values) - slope * share
+    return slope / math.sqrt(float(residuals @ residuals) / (time.size - 2) / float(share @ share) + TINY)
 
 
 def find_turn(walk: RecordedWalk, before: Way, after: Way) -> int:
-    """Return the sample between two stretches at which the hip turns round, or the one in the middle
-    without markers.
-    """
+    """Return the sample between two stretches at which the hip turns round, or the middle one without markers."""
     begin = before.passings[-1][1]
     end = after.passings[0][0]
     hip = walk.quantities.get(HIP_OF_LINES)

@@ -1,7 +1,7 @@
 """Angles of lines between markers in the plane of the walk.
 
-The walk goes along the horizontal line on which the legs move most against each other. Which way along it the feet go
-ahead shows only as the legs pass each other, see `leg_angles`.
+The walk runs along the horizontal line on which the legs move most relative to each other. Which way it runs shows only
+when the legs pass each other, see `leg_angles`.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from walkerlab.errors import ConfigError
 from walkerlab.exchange.rate_jumps import Array, apart_runs
 
 Line = tuple[Array, Array]
-"""Places (samples, axes) of the upper and the lower marker (m)."""
+"""Positions (samples, axes) of the upper and the lower marker (m)."""
 
-NAMED: Final = 3  # number of stretches of samples that a doubt lists
-JUMP: Final = 8.0  # change of a line's length between samples that is a jump, in standard deviations of all changes
+NAMED: Final = 3  # maximum number of stretches of samples that a doubt lists
+JUMP: Final = 8.0  # a larger change of a line's length between samples is a jump; in standard deviations of all changes
 SMALLEST_JUMP: Final = 0.01  # the same, as a fraction of the length
-NEIGHBOURS: Final = 5  # number of changes whose median a jump differs from
-HUGE: Final = 1e50  # size of values that are gaps, because their squares overflow
-FEWEST_FROZEN: Final = 3  # fewest samples in which a marker freezes
-LONGEST_LEAP: Final = 1.5  # how much faster than before the leap a marker may move behind it
-LENGTH_PARTS: Final = 5  # number of parts of a walk whose lengths of legs are compared
+NEIGHBOURS: Final = 5  # number of neighbouring changes with whose median a change is compared
+HUGE: Final = 1e50  # larger values count as gaps, because their squares overflow
+FEWEST_FROZEN: Final = 3  # smallest number of missing samples for which a marker counts as frozen
+LONGEST_LEAP: Final = 1.5  # maximum ratio of the samples that a leap makes up for to those that stand still
+LENGTH_PARTS: Final = 5  # number of parts of a walk in which leg lengths are compared
 SLOW_CHANGE: Final = 0.02  # largest change of a leg's length along a walk, as a fraction of it
-ONE_HIP: Final = 0.02  # largest motion of two hip markers against each other, as a fraction of a leg
+ONE_HIP: Final = 0.02  # largest motion of two hip markers relative to each other, as a fraction of a leg
 NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
 PLANE_FITS: Final = 3
 RUNNING: Final = 0.5  # correlation of the hip's height with the distance of the feet; near -1 in walking
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
-FAST_PERCENT: Final = 80  # percentage of the motions between samples that are slower than fast ones
+FAST_PERCENT: Final = 80  # percentile of the motions between samples above which they count as fast
 EXCHANGE: Final = 0.2  # squared unevenness that an exchange must save, in squares of fast motions
 SCATTER: Final = 40.0  # the same, in medians of the squared unevenness
 
@@ -53,7 +53,7 @@ class WalkPlane:
 
 
 def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
-    """Return in words the samples at `rows` (samples,), by their numbers in the file, and their times."""
+    """Describe the samples at `rows` (samples,) by their numbers in the file and their times."""
 
     def spell_times(first: int, last: int) -> str:
         return f" (time {time[first]:.6g}{'' if first == last else f' to {time[last]:.6g}'} s)"
@@ -62,12 +62,12 @@ def spell_samples(time: Array, numbers: Array, rows: NDArray[np.bool_]) -> str:
 
 
 def spell_rows(rows: NDArray[np.bool_]) -> str:
-    """Return in words the samples at `rows` (samples,) of a file, which count from 1."""
+    """Describe the samples at `rows` (samples,) of a file by their numbers, which count from 1."""
     return spell_numbers(np.arange(1.0, rows.size + 1.0), rows)
 
 
 def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[int, int], str] | None = None) -> str:
-    """Return in words the samples at `rows` (samples,), each stretch with an addition for its first and last row."""
+    """Describe the samples at `rows` (samples,). `addition` returns a text for the first and last row of a stretch."""
     runs = apart_runs(rows, rows)
     places = [
         (f"sample {numbers[first]:.0f}" if first == last else f"samples {numbers[first]:.0f} to {numbers[last]:.0f}")
@@ -78,12 +78,12 @@ def spell_numbers(numbers: Array, rows: NDArray[np.bool_], addition: Callable[[i
 
 
 def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
-    """Return the samples (samples,) at which two things have changed places: at most half of them.
+    """Mark the samples (samples,) at which two points are exchanged, at most half of them.
 
-    Of all exchanges, those are chosen with which both move most evenly from sample to sample; each must save as much as
-    fast motions or scatter cost.
+    Exchanges are chosen so that both points move as evenly as possible from sample to sample. Each one must make the
+    motion more even by more than fast motions or scatter can explain.
 
-    apart  (samples, axes) difference of both
+    apart  (samples, axes) difference of the two points
     """
     if len(apart) < FEWEST_FOR_SWAPS or not apart.any():
         return np.zeros(len(apart), bool)
@@ -98,7 +98,7 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     costs = [[uneven(first * before, between, last * after) for last in (1.0, -1.0)] for first in (1.0, -1.0)]
     fast = float(np.percentile(np.sum(np.diff(apart, axis=0) ** 2, axis=1), FAST_PERCENT))
     least = max(EXCHANGE * fast, SCATTER * float(np.median(costs[0][0])))
-    # the cheapest way to each gap between samples, without and with an exchange there
+    # Dynamic programming: lowest cost up to each interval between samples, without and with an exchange in it.
     stays = 0.0
     changes = least
     ways = list[tuple[bool, bool]]()
@@ -113,14 +113,14 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     mended = np.where(swapped[:, None], -apart, apart)
     rough = np.pad(uneven(mended[:-2], mended[1:-1], mended[2:]) > least, 1)
     for first, last in apart_runs(swapped, swapped):
-        # an outlier of one of both is no exchange
+        # an outlier of one of the two points is not an exchange
         if rough[max(first - 1, 0) : first + 1].any() or rough[last : last + 2].any():
             swapped[first : last + 1] = False
     return np.asarray(swapped)
 
 
 def swap_lines_back(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[dict[str, Line], list[str]]:
-    """Swap the ends of both legs' lines back where they change places, and return the lines, and what was done."""
+    """Undo exchanges between the markers of both legs. Returns the lines, and a doubt for each pair that was mended."""
     mended = dict(lines)
     doubts = list[str]()
     for first, second in ((name, f"{name[:-1]}2") for name in lines if name.endswith(" 1")):
@@ -149,8 +149,8 @@ def legs_among(lines: Mapping[str, Line]) -> list[Line]:
 def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
     """Find the plane of a walk from the lines between its markers, by quantity.
 
-    walks  left, right, away or towards, as the recording sees the walk; '' for the line on which the legs move most
-           against each other, with the drift of the upper marker
+    walks  left, right, away or towards, in the view of the recording. If it is '', the walk runs along the line on
+           which the legs move most relative to each other, the way the upper marker drifts
     """
     legs = legs_among(lines)
     upright = np.mean([np.mean(top - bottom, axis=0) for top, bottom in legs], axis=0)
@@ -188,10 +188,10 @@ def stated_direction(walks: str, up: Array) -> Array:
 def unseen_as_gaps(
     columns: Mapping[str, Array], pairs: Sequence[tuple[str, str]]
 ) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return columns with gaps for markers that were not seen, and by column what was taken for a gap.
+    """Replace markers that were not seen by gaps. Also returns, by column, which values were replaced.
 
-    Programs write zeros for a marker that they did not see, or another value for all of its coordinates. But a foot may
-    well stand at the origin: such a place is a gap if the length of its line is not the usual one.
+    Programs write zeros, or another value, for all coordinates of a marker that they did not see. A foot may also stand
+    at the origin, so equal coordinates are a gap only if they give the line an unusual length.
 
     pairs  columns of both ends for each coordinate
     """
@@ -218,10 +218,10 @@ def unseen_as_gaps(
 
 
 def frozen_rows(places: Array) -> NDArray[np.bool_]:
-    """Return the samples (samples,) that repeat a place (samples, axes) before a leap to where it should have moved.
+    """Mark the samples (samples,) that repeat a position (samples, axes) before it leaps to where it should have moved.
 
-    So fillers of gaps write the last place that was seen. The speed behind the leap says how many samples are missing,
-    because a foot may have stood still before.
+    Software that fills gaps repeats the last position seen. The speed after the leap tells how many samples are
+    missing, because a foot may have stood still before the gap.
     """
     change = np.linalg.norm(np.diff(places, axis=0, append=places[-1:]), axis=1)
     still = np.append(False, change[:-1] == 0.0)
@@ -235,9 +235,9 @@ def frozen_rows(places: Array) -> NDArray[np.bool_]:
 
 
 def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[NDArray[np.bool_], list[str]]:
-    """Return at which samples a marker freezes, or the length of a leg is off until it jumps back, and name all jumps.
+    """Mark the samples at which a marker freezes, or the length of a line jumps and returns. Also describes all jumps.
 
-    Legs are rigid, and knees bend smoothly.
+    Legs are rigid and knees bend smoothly, so the length of a line never really jumps.
     """
     off = np.zeros(time.size, bool)
     doubts = []
@@ -267,13 +267,15 @@ def body_gaps(lines: Mapping[str, Line], numbers: Array, time: Array) -> tuple[N
         if brief.any():
             doubts.append(f"The length of {name} is off at {spell_samples(time, numbers, brief)}, which is left out.")
         if lasting.any():
-            doubts.append(f"The length of {name} jumps at {spell_samples(time, numbers, lasting)}, and not back.")
+            doubts.append(
+                f"The length of {name} jumps at {spell_samples(time, numbers, lasting)}, and does not return."
+            )
         off |= brief
     return off, doubts
 
 
 def body_doubts(lines: Mapping[str, Line], plane: WalkPlane) -> list[str]:
-    """Name legs whose length changes slowly, and legs that do not meet at one hip."""
+    """Describe lines whose length changes slowly, and lines that do not meet at one hip."""
     doubts = []
     lengths = list[float]()
     for name, (top, bottom) in lines.items():
@@ -310,5 +312,5 @@ def refuse_running(lines: Mapping[str, Line], plane: WalkPlane, source: str) -> 
     if float(np.corrcoef(hip - trend(np.arange(hip.size)), np.abs(spread))[0, 1]) > RUNNING:
         raise ConfigError(
             f"{source}: the hip is lowest as the legs pass each other: this is running, not walking.",
-            "Heel strikes are sought with one foot always on the ground. Cut the recording to its walking part.",
+            "The search for heel strikes assumes that one foot is always on the ground. Cut out the walking part.",
         )

@@ -30,7 +30,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineContact, contact_target
 from walkerlab.exchange.exported import Exported, Pad
 from walkerlab.exchange.planar import UPRIGHT, Ball, PlanarModel
-from walkerlab.physics.ground.knees import FLEXED
+from walkerlab.physics.ground.knees import MIN_FLEXION
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
@@ -41,9 +41,9 @@ MIN_INERTIA = 2e-15  # kg m^2, twice MuJoCo's minimum
 IMPEDANCE = 1e-3  # small, so that MuJoCo's soft contact behaves like a plain spring and damper that carry the full load
 IMPRATIO = 10.0  # large, so that sliding feet are not pushed off the ground
 JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
+PAD_M = 0.05
 STEP_S = 2.5e-5
 DAMPED_STEP = 0.33
-PAD_M = 0.05
 """Time step, and its maximum as a multiple of the time constant with which a damper stops a foot or a shank."""
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
@@ -202,7 +202,7 @@ def foot_text(model: PlanarModel, ball: Ball, foot: Foot, contact: Mapping[str, 
 
 
 def pair_text(model: PlanarModel, ball: Ball, foot: Foot, ground: str, contact: Mapping[str, float]) -> str:
-    """Write the contact between a foot and a named ground, of which only a pair can tune the friction's damping."""
+    """Write the contact pair of a foot and a named piece of ground. Only a pair can tune the damping of friction."""
     mu = contact["friction"]
     creep = inverse_weights(model).bodies[ball.link] * contact["friction_damping_N_s_m"]
     return (
@@ -243,6 +243,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
         Foot(f"foot_{foot + 1}", 1 << foot, export.lane_across_m(foot), limbs(export, foot)) for foot in range(2)
     )
     q, v = (" ".join(repr(float(value)) for value in values) for values in export.start)
+    # far enough from the plane of the walk to show a whole step
     distance = -4.0 * export.config.walker.leg_length_m
     scene = "".join(
         (
@@ -343,7 +344,7 @@ def pad_text(export: Exported, number: int, pad: Pad) -> str:
 
 
 def custom_texts(export: Exported) -> Iterator[str]:
-    """Yield what the script reads: drives, rules of the knees, and periods and lengths of walkerlab's steps."""
+    """Yield the values that the script reads: drives, rules of the knees, periods and lengths of walkerlab's steps."""
     push_off = export.config.push_off
     hip = export.hip
     walk = export.walk
@@ -351,7 +352,7 @@ def custom_texts(export: Exported) -> Iterator[str]:
     yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
     if export.knee_links:
         at_touch = int(export.scene.ours.whole.release_at_touch)
-        yield f'<numeric name="knees" data="{FLEXED!r} {at_touch}"/>'
+        yield f'<numeric name="knees" data="{MIN_FLEXION!r} {at_touch}"/>'
     steps = (walk.periods_s, walk.lengths_m) if walk.steps else ((0.0,), (0.0,))
     values = " ".join(repr(float(value)) for values in steps for value in values)
     yield f'<numeric name="steps_in_walkerlab" data="{values}"/>'
@@ -399,7 +400,7 @@ def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
 
 
 def parts_of_script(export: Exported) -> list[str]:
-    """Name the walker's drives and knees, on which only the script acts."""
+    """List the drives and the locks of knees that only the script can simulate."""
     parts = {"push-offs": export.config.push_off.impulse_N_s, "hip torque": export.hip.torque_N_m}
     parts |= {"locks of the knees": len(export.knee_links)}
     return [name for name, value in parts.items() if value != 0]

@@ -21,7 +21,7 @@ class Walk:
     It judges by the state at each time step. A knee locks when it has been bent and comes straight, by a plastic impact
     or, if it has a stop, when the stop turns it back. The trailing knee is released after the next touchdown.
 
-    stance  foot that stands, 0 or 1
+    stance  index of the stance foot, 0 or 1
     """
 
     def __init__(self, model: Any) -> None:
@@ -54,7 +54,7 @@ class Walk:
         self.stance = 1
         self.touches_s: list[float] = []
         self.touches_m: list[float] = []
-        # what the release of the trailing knee waits for: the leading foot's sinking in, then the push-off
+        # The trailing knee is released once the leading foot stops sinking in, and after the push-off.
         self.sinks = self.pushes = False
         self.bent = [False, False]
         for leg in range(len(self.knees)):
@@ -112,7 +112,7 @@ class Walk:
         mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, body, self.data.qfrc_applied)
 
     def turn_knees(self) -> None:
-        """Release the trailing knee when nothing holds it any longer. Lock a knee that comes straight from behind."""
+        """Release the trailing knee when it no longer has to wait, and lock a bent knee once it has straightened."""
         model = self.model
         data = self.data
         trailing = 1 - self.stance

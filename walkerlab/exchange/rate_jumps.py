@@ -29,7 +29,7 @@ MOST_FOUND: Final = 4
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
-    """Return likely values (rad) of the leg angles' sum at heel strikes, where leg rates jump. Clearest jumps first.
+    """Return likely sums (rad) of the leg angles at heel strikes, where the leg rates jump. Clearest jumps come first.
 
     time   (samples,) s
     angle  (samples, 2) rad, from the vertical
@@ -75,19 +75,19 @@ def apart_runs(apart: NDArray[np.bool_], first_ahead: NDArray[np.bool_]) -> list
 
 def noise_of(angle: Array) -> float:
     """Return the standard deviation (rad) of the scatter of angles (samples, 2) from sample to sample."""
-    # noise dominates the third differences of a smooth motion; their variance is 20 times its own
+    # noise dominates the third differences of a smooth motion, whose variance is 20 times that of the noise
     return (
         float(np.median(np.abs(np.diff(angle, 3, axis=0)))) / (NORMAL_QUARTILE * 20.0**0.5) if len(angle) > 3 else 0.0
     )
 
 
 def typical_interval(instants: Sequence[float], time: Array) -> float:
-    """Return the median interval (s) between instants of a recording. Its duration if there are fewer than two."""
+    """Return the median interval (s) between instants of a recording, or its duration if there are fewer than two."""
     return float(np.median(np.diff(instants))) if len(instants) > 1 else float(time[-1] - time[0])
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:
-    """Fit a rate jump at an instant, and return the squared scatter it explains and leaves, and the degrees of freedom.
+    """Fit a rate jump at an instant. Return the explained and residual sums of squares, and the degrees of freedom.
 
     Returns None if there are too few samples before or after the instant.
     """
@@ -98,5 +98,5 @@ def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[flo
         return None
     basis = np.linalg.qr(np.column_stack((t[:, None] ** np.arange(DEGREE + 1), np.maximum(t, 0.0))))[0]
     shares = basis.T @ y
-    left = float((y**2).sum() - (shares**2).sum())
-    return float((shares[-1] ** 2).sum()), max(left, SMALLEST_SCATTER * float((y**2).sum())), y.size - shares.size
+    residual = float((y**2).sum() - (shares**2).sum())
+    return float((shares[-1] ** 2).sum()), max(residual, SMALLEST_SCATTER * float((y**2).sum())), y.size - shares.size

@@ -117,19 +117,17 @@ class Recording:
 
     path: Path
     columns: dict[str, Array]  # (samples,) arrays by name
-    units: dict[str, str] = field(default_factory=dict)  # unit by column, where the file states one, as written there
+    units: dict[str, str] = field(default_factory=dict)  # unit by column as written in the file, if it states one
     # unit by kind ('angle', 'length', 'time', 'force'), where the file states one for all columns of that kind
     kind_units: dict[str, str] = field(default_factory=dict)
-    # reason by column why it cannot be used, such as a cell with text
+    # reason, by column, why it cannot be used, such as a cell with text
     problems: dict[str, str] = field(default_factory=dict)
-    unseen: dict[str, str] = field(default_factory=dict)  # by column of a marker, what is taken for a gap, and where
+    unseen: dict[str, str] = field(default_factory=dict)  # by column of a marker, why it has gaps
     levelled_by: str = ""  # program that turns angles until the floor is level
 
     @property
     def time_name(self) -> str | None:
-        """Name of the time column: the first that matches the first of TIME_NAMES that any matches, or None
-        if there is none.
-        """
+        """Name of the time column, or None. Earlier patterns of TIME_NAMES take precedence over later ones."""
         return next((name for pattern in TIME_NAMES for name in self.columns if pattern.fullmatch(name)), None)
 
 
@@ -175,7 +173,7 @@ def build_recording(
 ) -> Recording:
     """Build a recording from columns in order. Columns without a name are left out.
 
-    problems  reason for each column why it cannot be used, or ''; a name that several columns have is a reason, too
+    problems  for each column, why it cannot be used, or ''. Columns that share a name cannot be used either
     """
     columns = dict(zip(names, values, strict=True))
     reasons = {name: reason for name, reason in zip(names, problems, strict=False) if reason}
@@ -188,12 +186,12 @@ def build_recording(
 
 
 def read_delimited(path: Path) -> Recording:
-    """Read a CSV file or an ADAMS table: perhaps titles, a header, perhaps a row of units, and rows of numbers."""
+    """Read a CSV file or an ADAMS table: optional titles, a header, an optional row of units, and rows of numbers."""
     text = text_of(path)
     for beginning, (program, advice) in PROGRAMS.items():
         if beginning.match(text):
             raise ConfigError(f"{path} is a table of {program}, which walkerlab does not read.", advice)
-    lines = with_one_header(remove_blanks(text.splitlines()))
+    lines = merge_headers(remove_blanks(text.splitlines()))
     delimiter, header, unit_row, first = header_of(path, lines)
     names, units = names_and_units(header)
     names = [name or f"column {number}" for number, name in enumerate(names, 1)]
@@ -212,14 +210,14 @@ def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | N
     return np.ascontiguousarray(values.T) if values.shape[1] == count else None
 
 
-def with_one_header(lines: list[str]) -> list[str]:
+def merge_headers(lines: list[str]) -> list[str]:
     """Return the lines of a table of DeepLabCut with one row of names, such as hip.x, instead of three or four."""
     rows = list(csv.reader(lines[:4]))
     coords = next((number for number, row in enumerate(rows) if row[:1] == ["coords"]), 0)
     if not coords or rows[0][:1] != ["scorer"]:
         return lines
     names = [".".join(parts) for parts in zip(*(row[1:] for row in rows[1 : coords + 1]), strict=False)]
-    # blank lines keep the numbers of the others
+    # Blank lines take the place of the old header, so that messages name the right line numbers.
     return [*[""] * coords, ",".join(["frame", *(f'"{name}"' for name in names)]), *lines[coords + 1 :]]
 
 
@@ -234,13 +232,13 @@ def remove_blanks(lines: list[str]) -> list[str]:
 
 
 def text_of(path: Path) -> str:
-    """Read a text file: UTF-16, what an XML file declares, UTF-8 or Latin-1.
+    """Read a text file in UTF-16, in the encoding that an XML file declares, in UTF-8 or in Latin-1.
 
     Raises ConfigError for binary data.
     """
     data = path.read_bytes()
     declared = match[1].decode() if (match := DECLARED_ENCODING.match(data)) else "utf-8"
-    # bytes that can be matched are not in the UTF-16 that some programs declare
+    # Some programs declare UTF-16 but write UTF-8. In real UTF-16 the pattern above would not match.
     encodings = ("utf-8-sig" if declared.lower().startswith(("utf-", "ucs-")) else declared, "utf-8-sig", "latin-1")
     for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else encodings:
         try:
@@ -289,7 +287,7 @@ def header_of(path: Path, lines: Sequence[str]) -> tuple[str, list[str], list[st
 
 
 def refuse_without_table(path: Path, lines: Sequence[str]) -> None:
-    """Raise ConfigError for a file that is empty, has no rows, or separates its columns in another way."""
+    """Raise ConfigError for a file that is empty, has no rows, or separates its columns by another character."""
     rows = [line for line in lines if line.strip()]
     if not rows:
         raise ConfigError(f"{path} is empty.", "Export it again.")
@@ -372,7 +370,7 @@ def table_of(
 def clock_times(cells: Sequence[str]) -> Array | None:
     """Return the seconds of clock times, dates with times or durations, or None for a column of other cells.
 
-    Times of day go on after midnight.
+    Times of day continue after midnight.
     """
     if not cells or not (":" in cells[0] or cells[0].startswith("P")):
         return None
@@ -383,7 +381,7 @@ def clock_times(cells: Sequence[str]) -> Array | None:
 
 
 def seconds_of(cell: str) -> float:
-    """Return a duration, the seconds since midnight or, with a date, since 1970. Nan for a cell of another kind."""
+    """Return the seconds of a duration, since midnight or, with a date, since 1970. Other cells give nan."""
     for pattern in CLOCKS:
         if match := pattern.fullmatch(cell.replace(",", ".")):
             days, hours, minutes, seconds = (float(part or 0.0) for part in match.groups())
@@ -407,15 +405,15 @@ def parse_column(cells: Sequence[str], lines: Sequence[int], has_points: Callabl
         return np.array([float(cell or "nan") for cell in cells]), ""
     except ValueError:
         values = np.full(len(cells), np.nan)
-    commas = [place for place, cell in enumerate(cells) if DECIMAL_COMMA.fullmatch(cell)]
-    of_thousands = all(THOUSANDS.fullmatch(cells[place]) for place in commas)
-    if commas and (any("." in cell and is_number(cell) for cell in cells) or (of_thousands and has_points())):
+    commas = [index for index, cell in enumerate(cells) if DECIMAL_COMMA.fullmatch(cell)]
+    may_be_thousands = all(THOUSANDS.fullmatch(cells[index]) for index in commas)
+    if commas and (any("." in cell and is_number(cell) for cell in cells) or (may_be_thousands and has_points())):
         return values, f"line {lines[commas[0]]}: {cells[commas[0]]!r} has a comma, but other numbers have points"
-    for place, cell in enumerate(cells):
+    for index, cell in enumerate(cells):
         try:
-            values[place] = np.nan if cell.lower() in EMPTY else number_of(cell)
+            values[index] = np.nan if cell.lower() in EMPTY else number_of(cell)
         except ValueError:
-            return values, f"line {lines[place]}: {cell!r} is not a number"
+            return values, f"line {lines[index]}: {cell!r} is not a number"
     return values, ""
 
 
@@ -437,7 +435,7 @@ def read_adams_results(path: Path) -> Recording:
         raise ConfigError(
             f"{path} holds no simulation steps.", "Run a dynamic simulation before exporting its results."
         )
-    values = np.array([numbers_of_step(path, place, step, len(components)) for place, step in enumerate(steps)])
+    values = np.array([parse_step(path, number, step, len(components)) for number, step in enumerate(steps, 1)])
     names = [name for _, name, _ in components]
     units = {name: unit for _, name, unit in components if unit not in ("", "no_units")}
     return drop_repeated_times(build_recording(path, names, values.T, units, xml_units(root)))
@@ -464,17 +462,17 @@ def component_names(path: Path, root: ElementTree.Element) -> list[tuple[int, st
     return sorted(names)
 
 
-def numbers_of_step(path: Path, place: int, step: ElementTree.Element, count: int) -> list[float]:
-    """Return a step's numbers, in the order of the components' ids."""
+def parse_step(path: Path, number: int, step: ElementTree.Element, count: int) -> list[float]:
+    """Parse one simulation step into one value per component, ordered by id."""
     try:
         values = [number_of(cell) for cell in (step.text or "").split()]
     except ValueError:
         raise ConfigError(
-            f"{path}: step {place + 1} contains a value that is not a number.", "Export the results again."
+            f"{path}: step {number} contains a value that is not a number.", "Export the results again."
         ) from None
     if len(values) != count:
         raise ConfigError(
-            f"{path}: step {place + 1} holds {len(values)} numbers for {count} components.", "Export the results again."
+            f"{path}: step {number} holds {len(values)} numbers for {count} components.", "Export the results again."
         )
     return values
 
@@ -486,7 +484,7 @@ def xml_units(root: ElementTree.Element) -> dict[str, str]:
 
 
 def drop_repeated_times(recording: Recording) -> Recording:
-    """Keep the last of the samples at a time: a block begins with the last sample of the block before it."""
+    """Keep the last of several samples at one time, since a block begins with the last sample of the previous one."""
     time = recording.columns.get(recording.time_name or "", np.zeros(0))
     last = np.append(np.diff(time) != 0.0, True) if time.size else np.zeros(0, bool)
     return replace(recording, columns={name: column[last] for name, column in recording.columns.items()})
@@ -558,11 +556,11 @@ def read_markers(path: Path) -> Recording:
     if not rows or not any(markers):
         raise ConfigError(f"{path} holds no markers.", "Export it again as .trc.")
     names = [*labels[:2], *coordinates(markers), *[""] * (3 * (count - len(markers)))]
-    # writers leave out the tabs behind the last marker that is seen
+    # some programs omit the tabs after the last marker that was seen
     padded = ((number, cells + [""] * (len(names) - len(cells))) for number, cells in rows)
     unit = settings.get("Units")
     by_sports2d = "Sports2D" in lines[0]
-    # its files in pixels say metres, too
+    # Sports2D states metres even in files whose coordinates are pixels
     in_pixels = by_sports2d and "_px" in lines[0]
     table = table_of(path, names, padded, {}, {"time": "s", **({"length": unit} if unit and not in_pixels else {})})
     return replace(table, levelled_by="Sports2D" if by_sports2d and not in_pixels else "")

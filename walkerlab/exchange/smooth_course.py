@@ -1,4 +1,4 @@
-"""Find samples at which recorded leg angles leave their smooth course, and samples from which on they stay off it.
+"""Find samples at which recorded leg angles leave their smooth course, and samples from which they never return to it.
 
 Within a step each angle is smooth, and at a heel strike only the rates jump. So polynomials through the step before and
 the step after a strike, which meet there, describe the angles of both legs. A stretch of samples is off that course if
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs, noise_of, typical_interval
 
-HIGHEST_DEGREE: Final = 7  # of the polynomial through a step; it leaves 0.1 mrad of the angles of straight legs
+HIGHEST_DEGREE: Final = 7  # degree of the polynomial through a step; its error is 0.1 mrad for straight legs
 SAMPLES_PER_DEGREE: Final = 3  # samples of a step for each degree above 1
-FAR_PERCENT: Final = 80  # percentage of the samples at which the legs are nearer to each other than far apart
-NEAR: Final = 0.3  # time before and after a first guess in which a strike is sought, as a fraction of a step
-MARGIN: Final = 0.2  # time around the strikes before and after one that its fit leaves out, as a fraction of a step
+FAR_PERCENT: Final = 80  # percentile of the angle between the legs above which they count as far apart
+SEARCH_RANGE: Final = 0.3  # time before and after a first guess of a strike to search, as a fraction of a step
+MARGIN: Final = 0.2  # time around the neighbouring strikes that the fit of a strike leaves out, as a fraction of a step
 WIDEST: Final = 1.3  # longest time before and after a strike in a fit, as a fraction of a step
 FASTEST: Final = 6.0  # fastest motion between two samples, as a multiple of fast motions
 BRIEF: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
@@ -37,12 +37,12 @@ STANDARD_ERRORS: Final = 7.0
 TYPICAL: Final = 6.0  # how much more a stretch must explain than those in typical steps
 TYPICAL_PERCENT: Final = 30
 WIDEST_GAP: Final = 0.25  # widest gap between two samples, as a fraction of a step
-FEWEST: Final = 12  # fewest samples in the steps around a strike
+MIN_STRIKE_SAMPLES: Final = 12  # fewest samples in the steps around a strike
 NOISY: Final = 0.1  # largest scatter of the angles, as a fraction of the angle between the legs
-SUSPECT: Final = 0.5  # part of the limit above which a stretch is sought together with the strike
+SUSPECT: Final = 0.5  # fraction of the limit above which stretch and strike are searched for together
 SMALLEST: Final = 0.008  # smallest offset that is named, as a fraction of the angle between the legs
 MOST_STRETCHES: Final = 30  # largest number of stretches in the steps around a strike
-SMALLEST_NORM: Final = 0.05  # smallest squared part of a stretch that polynomials cannot follow, in samples
+SMALLEST_NORM: Final = 0.05  # smallest squared part of a stretch that polynomials do not follow, in samples
 NORMAL: Final = 1.4826  # standard deviation of a normal distribution, over its median absolute deviation
 
 
@@ -52,10 +52,10 @@ class Stretch:
 
     leg: int
     first: int
-    end: int  # first sample behind it
+    end: int  # first sample after it
     offset_rad: float
     explained: float  # rad^2, squared residuals that the offset explains
-    lasts: bool  # whether the angle stays beside its course
+    lasts: bool  # whether the angle never returns to its course
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class Strike:
 
     time: Array
     angle: Array
-    rows: NDArray[np.int64]  # of the samples in the recording
+    rows: NDArray[np.int64]  # indices of the samples in the recording
     span_s: tuple[float, float]
     step_s: float
     at_ends: tuple[bool, bool]  # whether the recording begins and ends with them
@@ -75,14 +75,14 @@ class Strike:
         columns = [np.ones((t.size, 1))]
         for side in (t < 0.0, t >= 0.0):
             degree = min(HIGHEST_DEGREE, 1 + int(np.sum(side)) // SAMPLES_PER_DEGREE)
-            own = np.where(side, t / self.step_s, 0.0)
-            # powers by products take a tenth of the time of powers
-            columns.append(np.multiply.accumulate(np.broadcast_to(own[:, None], (own.size, degree)), axis=1))
+            t_side = np.where(side, t / self.step_s, 0.0)
+            # repeated products take a tenth of the time of powers
+            columns.append(np.multiply.accumulate(np.broadcast_to(t_side[:, None], (t_side.size, degree)), axis=1))
         basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
         return basis, y - basis @ (basis.T @ y)
 
     def instant(self, cost: Callable[[float], float], *counts: int) -> float:
-        """Return the instant (s) of the smallest cost, from numbers of trials that each close in on it."""
+        """Return the instant (s) of the smallest cost. `counts` are numbers of trials, in ever smaller intervals."""
         begin, end = self.span_s
         for count in counts:
             trials = np.linspace(begin, end, count)
@@ -106,12 +106,12 @@ class Strike:
         return self.instant(self.cost_of(ROUGH), FIRST_TRIALS)
 
     def cost_of(self, samples: int) -> Callable[[float], float]:
-        """Return the function from instants to squared residuals, with about so many of the samples."""
+        """Return the squared residuals as a function of the instant, from about this number of samples."""
         thinning = max(1, self.time.size // samples)
         return lambda at: float(np.sum(self.fit(at, thinning)[1] ** 2))
 
     def scatter(self) -> Array:
-        """Return the residuals of the smooth course, as large as if it did not follow the samples."""
+        """Return the residuals of the smooth course, scaled up for the part that the fit has followed."""
         basis, residuals = self.fit(self.smooth_instant)
         free = 1.0 - np.sum(basis**2, axis=1)
         clear = free > SMALLEST_NORM
@@ -132,10 +132,10 @@ class Strike:
         sums = [np.concatenate((np.zeros((1, part.shape[1])), np.cumsum(part, axis=0))) for part in parts]
         longest = max(1, int(np.searchsorted(self.time, self.time[0] + LONGEST * self.step_s)))
         lengths = np.unique(np.geomspace(1, longest, LENGTHS).astype(int))
-        low, high = self.inside(BORDER)
+        low, high = self.inner_samples(BORDER)
         firsts = np.arange(low, high)
         short = np.stack(np.broadcast_arrays(firsts[:, None], firsts[:, None] + lengths), axis=2).reshape(-1, 2)
-        inner = np.arange(*self.inside(LASTING, whole=False))
+        inner = np.arange(*self.inner_samples(LASTING, whole=False))
         count = self.time.size
         lasting = np.stack((inner, np.full(inner.size, count)), axis=1)
         spans = np.concatenate((short[short[:, 1] <= high], lasting))
@@ -151,8 +151,8 @@ class Strike:
         offset = float(share[0, leg] / norm[0])
         return Stretch(leg, first, end, offset, offset * float(share[0, leg]), lasts)
 
-    def inside(self, part: float, whole: bool = True) -> tuple[int, int]:
-        """Return the samples (first, end) farther from the ends than a part of a step, which other steps cover.
+    def inner_samples(self, part: float, whole: bool = True) -> tuple[int, int]:
+        """Return the samples (first, end) farther than a fraction of a step from the ends. Other fits cover the rest.
 
         whole  whether to go up to an end of the recording
         """
@@ -174,8 +174,8 @@ def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int
     """Return first sample, end and leg of the span that explains most of the residuals."""
     norm, share = parts_of(sums, spans)
     explained = np.where(norm > SMALLEST_NORM, 1.0 / np.maximum(norm, SMALLEST_NORM), 0.0)[:, None] * share**2
-    place, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
-    return int(spans[place, 0]), int(spans[place, 1]), int(leg)
+    best, leg = np.unravel_index(int(np.argmax(explained)), explained.shape)
+    return int(spans[best, 0]), int(spans[best, 1]), int(leg)
 
 
 def find_stretches(time: Array, angle: Array) -> list[Stretch]:
@@ -187,26 +187,26 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     far = float(np.percentile(np.abs(angle[:, 0] - angle[:, 1]), FAR_PERCENT))
     if noise_of(angle) > NOISY * far:
         return []
-    found = leaps(time, angle, LONGEST * course_of(time, angle).step_s)
+    found = find_leaps(time, angle, LONGEST * course_of(time, angle).step_s)
     course = course_of(time, angle, found)
-    strikes = [course.strike(place) for place in range(len(course.spans))]
-    sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= FEWEST
+    strikes = [course.strike(index) for index in range(len(course.spans))]
+    sampled = bool(strikes) and min(strike.time.size for strike in strikes) >= MIN_STRIKE_SAMPLES
     if not sampled or np.max(np.diff(time)) > WIDEST_GAP * course.step_s:
         return found
     scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
     worst = [strike.best_stretch(strike.smooth_instant).explained for strike in strikes]
     limit = max((STANDARD_ERRORS * scatter) ** 2, TYPICAL * float(np.percentile(worst, TYPICAL_PERCENT)))
-    # a false strike in one step makes its neighbours look wrong, too
-    for place in np.argsort(worst)[::-1].tolist():
-        if worst[place] > SUSPECT * limit:
-            new = stretches_near(course, place, limit, SMALLEST * far)
+    # A false strike in one step makes the neighbouring steps look wrong as well.
+    for index in np.argsort(worst)[::-1].tolist():
+        if worst[index] > SUSPECT * limit:
+            new = stretches_near(course, index, limit, SMALLEST * far)
             found = found + new
-            course = course.without(new)
+            course = course.remove_stretches(new)
     return found
 
 
-def leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
-    """Return the stretches that begin and end with a motion between two samples that no leg can make."""
+def find_leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
+    """Find the stretches that begin and end with a jump faster than a leg can move."""
     moved = np.diff(angle, axis=0)
     fastest = FASTEST * float(np.percentile(np.abs(moved), FAR_PERCENT))
     found = []
@@ -221,12 +221,12 @@ def leaps(time: Array, angle: Array, longest_s: float) -> list[Stretch]:
     return found
 
 
-def stretches_near(course: Course, place: int, limit: float, smallest: float) -> list[Stretch]:
+def stretches_near(course: Course, index: int, limit: float, smallest: float) -> list[Stretch]:
     """Return the stretches in the steps around a strike that explain more than a limit (rad^2)."""
 
     def worst(others: Sequence[Stretch]) -> Stretch | None:
         """Return the worst stretch besides others, or None if it is within the limit."""
-        strike = course.without(others).strike(place)
+        strike = course.remove_stretches(others).strike(index)
         smooth = strike.smooth_instant
         if strike.best_stretch(smooth).explained <= SUSPECT * limit:
             return None
@@ -240,7 +240,7 @@ def stretches_near(course: Course, place: int, limit: float, smallest: float) ->
     found: list[Stretch] = []
     while len(found) < MOST_STRETCHES and (stretch := worst(found)):
         found.append(stretch)
-    # the first stretches may have stood for what the later ones explain
+    # The first stretches may only have stood in for later ones.
     for stretch in found[:-1]:
         others = [other for other in found if other is not stretch]
         found = found if worst(others) else others
@@ -249,17 +249,17 @@ def stretches_near(course: Course, place: int, limit: float, smallest: float) ->
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Samples of a recording, and for each reach of a leg ahead of the other the span of time (s) that it takes."""
+    """Samples of a recording, and the time span (s) of each stretch in which one leg is far ahead of the other."""
 
     time: Array
     angle: Array
-    rows: NDArray[np.int64]  # of the samples in the recording
+    rows: NDArray[np.int64]  # indices of the samples in the recording
     spans: list[tuple[float, float]]
     step_s: float
     guesses: dict[int, float] = field(default_factory=dict, init=False)
 
-    def without(self, stretches: Sequence[Stretch]) -> Course:
-        """Return the course without the samples of stretches, and with lasting offsets taken off."""
+    def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:
+        """Return the course without the samples of stretches, and with lasting offsets subtracted."""
         angle = self.angle.copy()
         kept = np.ones(self.rows.size, bool)
         for stretch in stretches:
@@ -278,10 +278,12 @@ class Course:
         first = max(self.guess(place - 1) + margin, at - farthest) if place else float(self.time[0])
         following = place + 1 < len(self.spans)
         last = min(self.guess(place + 1) - margin, at + farthest) if following else float(self.time[-1])
-        return self.part(first, last, (max(begin, at - NEAR * self.step_s), min(end, at + NEAR * self.step_s)))
+        return self.part(
+            first, last, (max(begin, at - SEARCH_RANGE * self.step_s), min(end, at + SEARCH_RANGE * self.step_s))
+        )
 
     def guess(self, place: int) -> float:
-        """Return about when rates jump within a span."""
+        """Return a first guess of the time at which rates jump within a span."""
         if place not in self.guesses:
             begin, end = self.spans[place]
             half = 0.5 * self.step_s
@@ -296,7 +298,7 @@ class Course:
 
 def course_of(time: Array, angle: Array, stretches: Sequence[Stretch] = ()) -> Course:
     """Return the course of a recording without some stretches: rates jump while one leg is far ahead of the other."""
-    course = Course(time, angle, np.arange(time.size), [], 0.0).without(stretches)
+    course = Course(time, angle, np.arange(time.size), [], 0.0).remove_stretches(stretches)
     time = course.time
     angle = course.angle
     spread = angle[:, 0] - angle[:, 1]

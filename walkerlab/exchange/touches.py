@@ -22,21 +22,23 @@ Height = Callable[[Array], Array]
 DEGREES: Final = range(1, 7)
 """Degrees of the polynomials; the samples decide between them."""
 MIN_SAMPLES: Final = 6
-"""Fewest samples on each side of a heel strike that a fit takes in, if the step has as many."""
+"""A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
 WIDEST: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
 SHORTEST: Final = 0.25  # fraction of the step period; nearer crossings of one leg are one heel strike
 SLOWEST: Final = 0.25  # fraction of the median speed of falling feet; a slower crossing is no heel strike
 ITERATIONS: Final = 20
-DEGREE_ITERATIONS: Final = 3  # number of iterations that choose the degree anew
+DEGREE_ITERATIONS: Final = 3  # number of iterations in which the degree is chosen again
 LOCATED: Final = 1e-3  # correction at which a heel strike is located, in standard errors
 ERRORS: Final = 3.0  # standard errors within which a value is zero
-LASTING_S: Final = 1e-4  # time that a heel strike takes on ground that gives way, so that no fit resolves less
+LASTING_S: Final = 1e-4  # duration of a heel strike on compliant ground, which limits the resolution of any fit
 PRECISE_S: Final = 2e-3  # largest standard error of a heel strike at the first sample
 JUMP_WINDOW: Final = 0.15  # time before and after a heel strike in which rates may jump, as a fraction of the period
 JUMP_SAMPLES: Final = 10  # fewest samples in that time
 JUMP_DEGREE: Final = 4
-JUMP_ERRORS: Final = 4.5  # standard errors beyond which rates jump elsewhere, of the many instants that are tried
-MOST_JUMPS: Final = 20  # number of heel strikes at which jumps are sought
+JUMP_ERRORS: Final = (
+    4.5  # standard errors by which a jump must be displaced to count; many, because many instants are tried
+)
+MOST_JUMPS: Final = 20  # maximum number of heel strikes at which jumps are searched for
 SHIFTS: Final = 61
 SIDES: Final = 2
 LOPSIDED: Final = 1 / 3  # fewest samples on a side of a fit, as a fraction of those on the other
@@ -50,7 +52,7 @@ class Fit:
     angle: Array  # (2,) at the instant
     rates: dict[str, Array]  # (2,) before and after it, by `before` and `after`; absent if there are too few samples
     squares: float  # sum of the squared residuals
-    freedoms: int  # number of values less number of coefficients
+    freedoms: int  # number of values minus number of coefficients
     deviation: float  # standard error of either angle
     criterion: float  # Bayesian information criterion, corrected for few values; smaller is better
 
@@ -159,7 +161,7 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
         correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
         if iteration >= DEGREE_ITERATIONS and abs(correction) < LOCATED * touch.error_s:
-            return touch_of(with_bias(touch.fit, t, y, at, degree), height, near + at, leg)
+            return touch_of(add_bias(touch.fit, t, y, at, degree), height, near + at, leg)
         at += correction
     # With much noise the samples that change sides keep moving the zero.
     return touch if touch and abs(correction) < touch.error_s else None
@@ -195,8 +197,10 @@ def fit_at(t: Array, y: Array, at: float, degree: int) -> Fit | None:
     return fit if fit and len(fit.rates) == SIDES else fit_of_degree(t, y, at, degree + 1) or fit
 
 
-def with_bias(fit: Fit, t: Array, y: Array, at: float, degree: int) -> Fit:
-    """Return a fit whose error includes what one degree more changes: the best degree balances bias and scatter."""
+def add_bias(fit: Fit, t: Array, y: Array, at: float, degree: int) -> Fit:
+    """Return a fit whose error includes the change due to one more degree, since the best one balances bias and
+    scatter.
+    """
     narrow, wide = (fit_of_degree(t, y, at, each) for each in (degree, degree + 1))
     change = float(np.linalg.norm(wide.angle - narrow.angle)) if narrow and wide else 0.0
     return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
@@ -224,7 +228,7 @@ def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
     coefficients = inverse @ (orthonormal.T @ y[used])
     squares = float(np.sum((y[used] - basis @ coefficients) ** 2)) + SMALLEST
     freedoms = 2 * (count - columns)
-    rates = {name: coefficients[1 + place * degree] / scale for place, name in enumerate(sides)}
+    rates = {name: coefficients[1 + k * degree] / scale for k, name in enumerate(sides)}
     deviation = float(np.sqrt(squares / freedoms) * np.linalg.norm(inverse[0]))
     criterion = 2 * count * float(np.log(squares)) + 2 * columns * float(np.log(2 * count)) * count / (count - columns)
     return Fit(coefficients[0], rates, squares, freedoms, deviation, criterion)
@@ -233,12 +237,12 @@ def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
 def angles_at_jumps(
     time: Array, angle: Array, touches: Sequence[Touch], period: float, errors: float = JUMP_ERRORS
 ) -> tuple[float, Array, NDArray[np.int64]] | None:
-    """Find where rates jump near heel strikes: how much later (s), and the angles (jumps, 2) and legs (jumps,) there.
+    """Find where rates jump near heel strikes. Return their delay (s), and angles (jumps, 2) and legs (jumps,) there.
 
-    All strikes are shifted alike, by the time that leaves the smallest residuals. Returns None unless the shift exceeds
-    some of its standard errors and the precision that heel strikes need.
+    All strikes are shifted by the same time, the one that leaves the smallest residuals. Returns None unless the shift
+    exceeds `errors` of its standard errors and PRECISE_S.
 
-    period  s, of the steps
+    period  step period (s)
     errors  number of standard errors
     """
     half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), WIDEST * period)
@@ -254,15 +258,15 @@ def angles_at_jumps(
     shifts = list(squares)
     if not inside or 0.0 not in squares:
         return None
-    place = min(range(len(shifts)), key=lambda place: squares[shifts[place]])
-    best = shifts[place]
-    least = squares[shifts[place]]
+    index = min(range(len(shifts)), key=lambda k: squares[shifts[k]])
+    best = shifts[index]
+    least = squares[shifts[index]]
     variance = least / sum(fit.freedoms for fit in trials[best])
-    if squares[0.0] - least <= errors**2 * variance or not 0 < place < len(shifts) - 1:
+    if squares[0.0] - least <= errors**2 * variance or not 0 < index < len(shifts) - 1:
         return None
     # the smallest residuals between three trials, by a parabola
-    before, after = squares[shifts[place - 1]], squares[shifts[place + 1]]
-    best += 0.5 * (before - after) / (before - 2.0 * least + after) * (shifts[place + 1] - best)
+    before, after = squares[shifts[index - 1]], squares[shifts[index + 1]]
+    best += 0.5 * (before - after) / (before - 2.0 * least + after) * (shifts[index + 1] - best)
     fits = fits_at(best)
     if abs(best) <= PRECISE_S or len(fits) < len(inside):
         return None

@@ -32,7 +32,7 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-SHANK: Final = 1.4  # ratio of a shank's farthest angle behind to that at heel strikes, at least; a thigh's is 1
+SHANK: Final = 1.4  # smallest ratio of a shank's farthest angle behind to that at heel strikes; for a thigh it is 1
 WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
@@ -45,10 +45,12 @@ SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a p
 LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
 FEWEST_ALTERNATING: Final = 2  # fewest heel strikes of each leg that show whether lengths alternate
 ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
-SIDE_ERRORS: Final = 6.0  # standard errors beyond which one leg's rates jump elsewhere, with half of the strikes
-BESIDE_RAD: Final = 0.03  # distance of the sum of angles from which a tilt is sought to the likely one
-SAME_WAY: Final = 0.03  # largest relative difference between the way over a belt and that of the legs
-FAR_CLOCK: Final = 1.15  # smallest factor between a clock and that of the swinging legs that is named
+SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for one leg and so half of the strikes
+BESIDE_RAD: Final = 0.03  # offset from the likely sum of angles at which the search for a tilt begins
+SAME_WAY: Final = (
+    0.03  # largest relative difference between the distance over a belt and the one that follows from the legs
+)
+FAR_CLOCK: Final = 1.15  # factor between the clock and the swinging legs from which a doubt is raised
 TURN_RAD: Final = 1e-3  # turn with which the direction of gravity is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
@@ -109,16 +111,16 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     refuse_spread(walk, touches, source)
     offsets = offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height)
     doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
-    steps = divided(walk, model, touches, tuple(doubts))
+    steps = build_steps(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
     # energy jumps at heel strikes, so that the clock shows only if these are certain
-    return with_belt(walk, steps if offsets else with_clock_doubt(steps, model))
+    return scale_to_belt(walk, steps if offsets else add_clock_doubt(steps, model))
 
 
 def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
-    """Return by how much (rad) the direction that angles are from leans off the vertical, its top forwards.
+    """Return the forward lean (rad) from the vertical of the direction from which angles are measured.
 
-    Rates of legs jump at heel strikes, where both feet are on the floor.
+    It follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """
     angle = legs(walk)
 
@@ -128,7 +130,7 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
-        # beside the likely sum, because a small shift would be within its error
+        # off the likely sum, because a small shift could not be told from its error
         return np.asarray((total(angles) - sum_rad - BESIDE_RAD) * (angles[:, 0] - angles[:, 1]))
 
     touches = find_touches(walk.time_s, angle, height)
@@ -137,8 +139,8 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     return 0.5 * (float(np.mean(total(jumps[1]))) if jumps else sum_rad)
 
 
-def with_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
-    """Return steps whose lengths add up to the way over a treadmill's belt, if there is one."""
+def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
+    """Scale the step lengths so that they add up to the distance over a treadmill's belt, if there is one."""
     if not walk.belt_m_s:
         return steps
     way = walk.belt_m_s * float(steps.touch_time_s[-1])
@@ -150,14 +152,14 @@ def with_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
     if abs(share - 1.0) > SAME_WAY:
         doubts = (
             *doubts,
-            f"The way over the belt is {share:.3g} times that of the legs' angles: the belt's speed, the leg's length "
-            "or the unit of time may be wrong.",
+            f"The distance over the belt is {share:.3g} times the one that follows from the leg angles: the speed of "
+            "the belt, the length of the leg or the unit of time may be wrong.",
         )
     return replace(steps, length_m=share * steps.length_m, doubts=doubts)
 
 
-def with_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
-    """Say if the legs swing as if the clock were wrong, as in a film that is played at another speed.
+def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
+    """Add a doubt if the legs swing as if the clock were wrong, as in a film that is played at another speed.
 
     Energy is constant within a step of straight legs that nothing drives. In the clock's time kinetic energy is smaller
     by the clock rate squared, so its changes over those of potential energy show the rate. A tilt of the recording
@@ -179,8 +181,8 @@ def with_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     if 1.0 / FAR_CLOCK < rate < FAR_CLOCK:
         return steps
     doubt = (
-        f"The legs of this walker would swing {rate:.2g} times as fast as the recording's: a film of another frame "
-        "rate (--fps), another unit of time, or another walker."
+        f"The legs of this walker would swing {rate:.2g} times as fast as those in the recording. The frame rate "
+        "(--fps), the unit of time or the walker may be wrong."
     )
     return replace(steps, doubts=(*steps.doubts, doubt))
 
@@ -202,10 +204,10 @@ def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
 
 
 def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
-    """Yield a sentence for each leg of a kneed walker whose angle may not be its thigh's."""
+    """Yield a sentence for each leg of a kneed walker whose angle may not be that of the thigh."""
     for leg, name in enumerate(("angle 1", "angle 2") if model.kneed else ()):
         farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
-        thigh = "of a kneed walker it must be the thigh's, from hip to knee"
+        thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
             yield f"{name.capitalize()} is that of the line {walk.sources[name]}; {thigh}."
         elif farthest < SHANK * (min(float(touch.fit.angle[leg]) for touch in touches) + model.slope):
@@ -224,22 +226,22 @@ def refuse_spread(walk: RecordedWalk, touches: list[Touch], source: str) -> None
 
 @dataclass(frozen=True)
 class Mismatch:
-    """How two signs of heel strikes differ: legs whose rates jump and feet that are level."""
+    """Disagreement between two signs of a heel strike: leg rates that jump, and feet that are level."""
 
-    shift_s: float  # how much later rates jump, at most; 0 within its standard error
-    sum_rad: float  # mean sum of the angles where rates jump, less than that of level feet
+    shift_s: float  # largest delay of a jump of the rates; 0 if it is within its standard error
+    sum_rad: float  # mean sum of the angles where rates jump, minus the sum for level feet
     lengths_m: list[float]  # mean length of the steps of each leg, if they alternate
     limps: bool  # whether periods alternate
-    between_rad: float | None  # how much larger angle 1 is than angle 2 over a step; None if that is no constant
+    between_rad: float | None  # constant by which angle 1 exceeds angle 2; None if the difference is not constant
 
 
 def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float) -> Mismatch:
     period = typical_interval([touch.time_s for touch in touches], time)
     sides = [[touch for touch in touches if touch.leg == leg] for leg in (0, 1)]
-    of_all = angles_at_jumps(time, angle, touches, period)
-    jumps = [of_all, *(angles_at_jumps(time, angle, side, period, SIDE_ERRORS) for side in sides)]
+    all_jumps = angles_at_jumps(time, angle, touches, period)
+    jumps = [all_jumps, *(angles_at_jumps(time, angle, side, period, SIDE_ERRORS) for side in sides)]
     shift = max((jump[0] for jump in jumps if jump), key=abs, default=0.0)
-    sums = np.mean(feet_on_slope(model, *of_all[1].T)) - touch_sum_rad if of_all else 0.0
+    sums = np.mean(feet_on_slope(model, *all_jumps[1].T)) - touch_sum_rad if all_jumps else 0.0
     spreads = [np.array([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in side]) for side in sides]
     periods = np.diff([touch.time_s for touch in touches])
     lengths = [2.0 * model.leg_length * math.sin(0.5 * float(np.mean(each))) for each in spreads if each.size]
@@ -253,7 +255,7 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
 
 
 def alternates(first: Array, second: Array) -> bool:
-    """Return whether the means of two samples differ clearly."""
+    """Whether the means of two samples differ clearly."""
     if min(first.size, second.size) < FEWEST_ALTERNATING:
         return False
     error = math.hypot(*(float(np.std(each)) / math.sqrt(each.size - 1) for each in (first, second)))
@@ -279,9 +281,9 @@ def offset_between(time: Array, angle: Array, touches: list[Touch]) -> float | N
 def offset_doubts(
     time: Array, angle: Array, touches: list[Touch], model: RigidModel, touch_sum_rad: float, height: Height
 ) -> list[str]:
-    """Say where rates jump at other instants than the feet are level, or steps alternate, and which error explains it.
+    """Describe rates that jump before or after the feet are level, and alternating steps, with the error behind them.
 
-    An error of the angles explains it if nothing of it is left without that error.
+    An error of the angles is the explanation if both disappear once it is subtracted.
     """
     before = mismatch(time, angle, touches, model, touch_sum_rad)
     alternate = bool(before.lengths_m) and before.between_rad is not None
@@ -294,20 +296,20 @@ def offset_doubts(
     degrees = np.degrees(errors)
     digit = float(np.diff(np.unique(np.round(angle, 9))).min())
     if after.shift_s or after.lengths_m or after.limps or digit > COARSE * float(np.abs(errors).max()):
-        cause = "no constant error of the angles explains it; a wrong gain, a tilt or coarse digits may be behind it"
+        cause = "no constant error of the angles explains it; a wrong gain, a tilt or coarse digits may be the cause"
     elif alternate:
         cause = " and ".join(f"angle {leg} is {error:.2f} degrees too large" for leg, error in enumerate(degrees, 1))
     else:
         cause = f"a tilt explains it, with both angles {degrees[0]:.2f} degrees too large"
     if not before.shift_s:
         spelled = " and ".join(f"{length:.3g} m of leg {leg}" for leg, length in enumerate(before.lengths_m, 1))
-        return [f"Lengths of steps alternate, {spelled}; {cause}."]
+        return [f"Step lengths alternate, {spelled}; {cause}."]
     moment = f"{1e3 * abs(before.shift_s):.0f} ms {'after' if before.shift_s > 0.0 else 'before'} the feet are level"
     return [f"Heel strikes are uncertain: the rates of the legs jump {moment}; {cause}."]
 
 
 def is_plausible(size: float) -> bool:
-    """Return whether a step can have this duration (s) or length (m)."""
+    """Whether a step can have this duration (s) or length (m)."""
     return PLAUSIBLE[0] <= size <= PLAUSIBLE[1]
 
 
@@ -324,12 +326,12 @@ def refuse_noise(angle: Array, source: str) -> None:
 
 
 def unit_doubts(touches: list[Touch]) -> Iterator[str]:
-    """Yield a sentence if the legs are so near each other at heel strikes that their unit may be another."""
+    """Yield a doubt about the unit of the angles if the legs are very close to each other at heel strikes."""
     apart = float(np.median([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in touches]))
     if apart < NARROWEST_RAD:
         yield (
-            f"The legs are only {math.degrees(apart):.2g} degrees apart at heel strikes. The unit of the angles may be "
-            "another than the file states."
+            f"The legs are only {math.degrees(apart):.2g} degrees apart at heel strikes. The file may state "
+            "the wrong unit of angles."
         )
 
 
@@ -341,8 +343,8 @@ def refuse_hurry(step_s: float, model: RigidModel, source: str) -> None:
     if step_s < SHORTEST_STEP * swing_s:
         raise ConfigError(
             f"{source}: steps of {step_s:.3g} s are not credible, because a leg of this walker swings forwards in "
-            f"{swing_s:.3g} s: the heel strikes are noise, or the walker or the unit of time is another.",
-            "Smooth the angles or record them better, state the walker, or the unit of time, e.g. --units time=ms.",
+            f"{swing_s:.3g} s: the heel strikes are noise, or the walker or the unit of time is wrong.",
+            "Smooth the angles or record them better, or correct the walker or the unit of time, e.g. --units time=ms.",
         )
 
 
@@ -381,11 +383,11 @@ def longest_gap(time: Array, begin: float, end: float) -> tuple[float, float]:
     """Return the two neighbouring sample times (s) farthest apart, from just before `begin` to just after `end`."""
     first, last = np.searchsorted(time, begin, "right") - 1, np.searchsorted(time, end)
     instants = time[first : last + 1]
-    place = int(np.argmax(np.diff(instants)))
-    return float(instants[place]), float(instants[place + 1])
+    widest = int(np.argmax(np.diff(instants)))
+    return float(instants[widest]), float(instants[widest + 1])
 
 
-def divided(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts: tuple[str, ...]) -> RecordedSteps:
+def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts: tuple[str, ...]) -> RecordedSteps:
     origin = touches[0].time_s
     swapped = touches[1].leg == 1
     times = np.array([touch.time_s for touch in touches[1:]]) - origin
@@ -399,8 +401,8 @@ def divided(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts:
     if not is_recorded_beyond(time, times):
         spans.pop()
     pieces = [samples_within(time, columns, *span) for span in spans]
-    for place, (_, angles, velocities) in enumerate(pieces):
-        for row, touch, rates in end_fits(touches, place):
+    for number, (_, angles, velocities) in enumerate(pieces):
+        for row, touch, rates in end_fits(touches, number):
             angles[row] = touch.fit.angle[order]
             if velocity is None and rates is not None:
                 velocities[row] = rates[order]
@@ -415,7 +417,7 @@ def divided(walk: RecordedWalk, model: RigidModel, touches: list[Touch], doubts:
 
 
 def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | None]]:
-    """Return for the ends of a step the row of its samples, the heel strike there, and the rates on the step's side."""
+    """Return, for each end of a step, the row of its sample, the heel strike, and the rates on this side of it."""
     ends = [(0, touches[step], touches[step].fit.rates.get("after"))]
     if step + 1 < len(touches):
         ends.append((-1, touches[step + 1], touches[step + 1].fit.rates.get("before")))
@@ -423,7 +425,7 @@ def end_fits(touches: list[Touch], step: int) -> list[tuple[int, Touch, Array | 
 
 
 def is_recorded_beyond(time: Array, touches: Array) -> bool:
-    """Return whether enough of the step after the last heel strike is recorded."""
+    """Whether enough of the step after the last heel strike is recorded."""
     if np.count_nonzero(time >= touches[-1]) <= SPLINE_DEGREE:
         return False
     first, last = longest_gap(time, float(touches[-1]), float(time[-1]))
@@ -465,8 +467,8 @@ def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: 
     for number in range(count):
         rows = np.flatnonzero(step == number)
         swing, stance = (0, 1) if number % 2 == 0 else (1, 0)
-        for place, row in enumerate((rows[0], rows[-1])):
+        for end, row in enumerate((rows[0], rows[-1])):
             bodies = np.zeros(n)
             bodies[SWING], bodies[STANCE] = angle[row, swing], angle[row, stance]
-            states[place, number, :n] = apply_couplings(model, STRAIGHT, bodies)
+            states[end, number, :n] = apply_couplings(model, STRAIGHT, bodies)
     return step_lengths(model, *states)

@@ -53,7 +53,7 @@ def test_locked_leg_is_one_body_and_released_leg_is_two():
     scene = kneed()
     stance, *swing = scene.model.links
     assert [link.name for link in swing] == ["thigh 1", "shank 1"]
-    assert scene.knee_places == (4, -1)
+    assert scene.knee_indices == (4, -1)
     # hip 0.5 kg, thigh 0.5 kg 0.325 m and shank 0.05 kg 0.625 m below the hip
     centre = -(0.5 * 0.325 + 0.05 * 0.625) / 1.05
     about_hip = 0.5 * 0.325**2 + 0.05 * 0.625**2
@@ -110,7 +110,7 @@ def knees_seen(scene):
     for time_s, y in zip(samples.time_s[1:].tolist(), samples.states[1:], strict=True):
         q, v = rules.scene.from_base(tuple(y))
         q[np.abs(q) < 1e-12] = 0.0  # a knee that has just locked is straight but for rounding
-        before = rules.scene.knee_places
+        before = rules.scene.knee_indices
         rules.follow(time_s, q, v)
         if rules.turn is not None:
             rules.watches = False
@@ -118,8 +118,8 @@ def knees_seen(scene):
             rules.watches = True
         if rules.turn is not None or rules.is_outdated:
             rules.go_on(q, v)
-        if rules.scene.knee_places != before:
-            changes.append((time_s, before, rules.scene.knee_places))
+        if rules.scene.knee_indices != before:
+            changes.append((time_s, before, rules.scene.knee_indices))
     return result, rules, changes
 
 
