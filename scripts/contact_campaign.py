@@ -51,13 +51,13 @@ from walkerlab.config.schema import Config
 from walkerlab.config.walkers import Kneed
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.contact_loop import EVENT_TIME
-from walkerlab.physics.hybrid.contact_result import UNEXPLAINED, ContactWalkResult
+from walkerlab.physics.hybrid.contact_result import RESIDUAL_FACTOR, ContactWalkResult
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 
 TIMES = 5.0  # the numerical error that walks may differ by
 TIGHTER = (1.0, 1e-2, 1e-4)  # than the config's tolerances
-BALANCED = 5.0  # residual of an energy balance over rtol x (energy + work exchanged); a walk fails at UNEXPLAINED
+BALANCED = 5.0  # residual of an energy balance over rtol x (energy + work exchanged); fails at RESIDUAL_FACTOR
 BUDGET = 5_000_000
 PLAIN_STEPS_S = (4e-5, 5e-6)  # the second for walks that seem to differ with the first
 PLANE_MEASURE_M = 0.45  # what steps on ground without pads are judged by
@@ -385,7 +385,7 @@ def compare_with(step_s: float, drawn: Drawn, steps: int) -> Compared:
     for tighter, walk, one, own in zip(TIGHTER, walks, found, (first, settled, settled), strict=True):
         error = {name: own[name] + plain_error[name] + floor[name] for name in UNITS}
         judged.append(Judged(tighter, walk.outcome.label, apart(one, expected), error))
-    residuals = tuple(UNEXPLAINED * walk.energy_balance_residual_J / walk.explained_residual_J for walk in walks)
+    residuals = tuple(RESIDUAL_FACTOR * walk.energy_balance_residual_J / walk.explained_residual_J for walk in walks)
     return Compared(
         drawn,
         Outcome(fine.outcome).label,

@@ -130,9 +130,9 @@ class Truth:
         draw = np.random.default_rng(seed)
         heights = draw.normal(0.0, self.roughness * self.leg, STEPS + 1)
         z = self.z * (1.0 + self.start_change * draw.normal(0.0, 1.0, self.z.size))
-        z = self.walks.settled(z, tuple(self.values))
+        z = self.walks.rest_on_ground(z, tuple(self.values))
         weighed = self.values[-1] * (1.0 + PRIOR * draw.normal())
-        walked = self.disturbed(z, heights, draw)
+        walked = self.take_disturbed_walk(z, heights, draw)
         if walked is None:
             return None
         periods, lengths, sampled = walked
@@ -144,7 +144,7 @@ class Truth:
         angles = sampled(times)
         return split_into_steps(times, angles + draw.normal(0.0, ANGLE_NOISE, angles.shape), touches), weighed
 
-    def disturbed(self, z, heights, draw):
+    def take_disturbed_walk(self, z, heights, draw):
         """Return periods, lengths and a function that samples the angles of a walk; None if it ends early."""
         p, relative = tuple(self.values), self.roughness / DISTURBANCE[1]
         if self.disturbed_by == "kicks":
@@ -158,10 +158,10 @@ class Truth:
                 * self.leg
                 * np.cumsum(np.sin(2.0 * np.pi * (np.arange(STEPS + 1) / WAVE + draw.uniform())))
             )
-        walk = self.walks.disturbed(z, p, heights)
+        walk = self.walks.take_disturbed_walk(z, p, heights)
         if walk.durations_s.size < STEPS:
             return None
-        return walk.durations_s, walk.lengths_m, lambda times: self.walks.sampled(z, p, heights, times)
+        return walk.durations_s, walk.lengths_m, lambda times: self.walks.sample_legs(z, p, heights, times)
 
     def identify(self, measured, weighed):
         prior = {self.keys[-1]: [weighed, PRIOR * self.values[-1]]}

@@ -124,13 +124,13 @@ def test_example_friction_law_of_the_docs_is_complete_and_its_derivative_correct
     monkeypatch.setattr(friction_coefficient, "_bodies", dict(friction_coefficient._bodies))
     example = runpy.run_path(str(ROOT / "docs" / "examples" / "extension" / "tanh_friction" / "law.py"))["Tanh"]
     assert missing_members(example, LAW_KINDS["friction"]) == []
-    law, h = example.of(Contact(units="si")), 1e-6
+    law, h = example.from_contact(Contact(units="si")), 1e-6
     assert law == pytest.approx((0.7, 0.1, 0.3, 0.3))
     low, high = (friction_coefficient(law, 0.05 + side * h)[0] for side in (-1, 1))
     assert friction_coefficient(law, 0.05)[1] == pytest.approx((high - low) / (2 * h), rel=1e-8)
     assert low < 0.0
     assert -friction_coefficient(law, law.rising_until)[0] == pytest.approx(law.largest, rel=0.005)
-    assert friction_coefficient(law.with_creep(0.5), 0.02) == pytest.approx(
+    assert friction_coefficient(law.scale_creep(0.5), 0.02) == pytest.approx(
         (friction_coefficient(law, 0.04)[0], 2.0 * friction_coefficient(law, 0.04)[1])
     )
 

@@ -157,7 +157,7 @@ class HuntCrossley(NamedTuple):
     a: float
 
     @classmethod
-    def of(cls, contact):
+    def from_contact(cls, contact):
         return cls(contact.stiffness, contact.exponent, 1e-3 * contact.damping)
 
     def resting_foot(self, weight, mass):
@@ -216,7 +216,7 @@ kernel_cache.watchers.append(names.append)
 def friction_at(law, slip):
     return friction_coefficient(law, slip)[0]
 def answer():
-    law = load(declared("friction")["tanh"]).of(SimpleNamespace(dynamic_friction=0.5, stiction_velocity=0.1))
+    law = load(declared("friction")["tanh"]).from_contact(SimpleNamespace(dynamic_friction=0.5, stiction_velocity=0.1))
     assert math.isclose(friction_at(law, 0.1), friction_coefficient(law, 0.1)[0])
     return names
 """

@@ -13,7 +13,7 @@ from numba.core.errors import TypingError
 from numba.core.itanium_mangler import mangle_type
 
 from walkerlab.physics import kernel_cache
-from walkerlab.physics.compiler import read_code, stripped
+from walkerlab.physics.compiler import read_code, strip_bitcode
 from walkerlab.physics.kernel_cache import watch_compilation
 from walkerlab.physics.kernels import (
     dispatch_by_type,
@@ -282,7 +282,7 @@ def test_machine_code_without_its_bitcode_runs(nested, tmp_path):
     assert nested.outer(1.0) == 4.0
     (stored,) = tmp_path.rglob("outer*.kernel")
     size = stored.stat().st_size
-    stored.write_bytes(stripped(stored))
+    stored.write_bytes(strip_bitcode(stored))
     assert stored.stat().st_size < size
     written = stored.stat().st_mtime_ns
     code = "import nested_kernels; print(nested_kernels.outer(1.0))"

@@ -111,8 +111,8 @@ class Module:
 def find_imports(module: str, is_package: bool, source: bytes) -> list[str]:
     """Return the full names of modules that a module may import, with all parent packages and its own name."""
     text = COMMENT.sub("", source.decode()).replace("\\\n", " ")
-    own = {PACKAGE, module.partition(".")[0]}
-    names = {module, *(name for name in imported_names(module, is_package, text) if name.partition(".")[0] in own)}
+    packages = {PACKAGE, module.partition(".")[0]}
+    names = {module, *(name for name in imported_names(module, is_package, text) if name.partition(".")[0] in packages)}
     return sorted(set(chain.from_iterable(accumulate(name.split("."), "{}.{}".format) for name in names)))
 
 

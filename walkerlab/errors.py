@@ -23,26 +23,26 @@ def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
     A setting of the command, `--set KEY=VALUE`, replaces those of its key.
     """
 
-    def with_options(match: re.Match[str]) -> str:
+    def add_options(match: re.Match[str]) -> str:
         start, command, key, value = match.groups()
         options = options_of(command)
-        return f"`{start}{options if key is None else f'{without_key(options, key)} --set {key}={value}'}`"
+        return f"`{start}{options if key is None else f'{drop_key(options, key)} --set {key}={value}'}`"
 
-    return COMMAND_PATTERN.sub(with_options, text)
+    return COMMAND_PATTERN.sub(add_options, text)
 
 
-def without_key(options: str, key: str) -> str:
-    """Return options, each preceded by a space, without settings of a key. The slope has two keys."""
+def drop_key(options: str, key: str) -> str:
+    """Return options, each preceded by a space, without the settings of a key. The slope has two keys."""
     words = shlex.split(options)
     same = SLOPES if key in SLOPES else (key,)
-    settings = [place for place, word in enumerate(words[:-1]) if word == "--set"]
-    dropped = [place for place in settings if words[place + 1].partition("=")[0].strip() in same]
-    kept = (word for place, word in enumerate(words) if not {place, place - 1} & {*dropped})
+    settings = [index for index, word in enumerate(words[:-1]) if word == "--set"]
+    dropped = [index for index in settings if words[index + 1].partition("=")[0].strip() in same]
+    kept = (word for index, word in enumerate(words) if not {index, index - 1} & {*dropped})
     return "".join(f" {shlex.quote(word)}" for word in kept)
 
 
 def escape_controls(text: str) -> str:
-    """Escape characters that could control a terminal, such as those in a column name of somebody else's file."""
+    """Escape characters that could control a terminal, such as those in a column name of a file from elsewhere."""
     return "".join(
         ascii(letter)[1:-1] if unicodedata.category(letter) in CONTROLS and letter not in "\n\t" else letter
         for letter in text

@@ -34,9 +34,9 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "normal_force": ("impact",),
     "friction": ("coulomb", "none"),
 }
-"""The package's own words of config keys to which extensions add words, by the last part of the key."""
+"""Built-in values of the config keys to which extensions can add values, by the last part of the key."""
 SLOTS: Final = ("task", "walks", "evidence", "benchmarks")
-"""Places of the page where extensions add sections: after the task, the walks, the models, and the accuracy."""
+"""Positions in the page where extensions add sections: after the task, the walks, the models, and the accuracy."""
 SETTLED_NS: Final = 2_000_000_000  # a folder that changed more recently may change again without a new time
 MAX_FOLDERS: Final = 500
 
@@ -45,8 +45,10 @@ MAX_FOLDERS: Final = 500
 class Study:
     """A published study, with its walker and its equations of motion if they differ from Lagrange's."""
 
-    own_walker: str  # function from a config to whether it has the study's walker
-    equations: Mapping[str, str] = field(default_factory=dict)  # functions that change a rigid model, by word
+    own_walker: str  # function that tells whether a config has the walker of the study
+    equations: Mapping[str, str] = field(
+        default_factory=dict
+    )  # functions that change a rigid model, by value of the config key
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ class Found:
     code: str  # module:name
     source: str  # distribution and version; empty for the package's own
     extension: Extension | None = None  # None if it is left out
-    why: str = ""  # reason why it is left out
+    reason: str = ""  # reason why it is left out
 
     @property
     def origin(self) -> str:
@@ -107,7 +109,7 @@ class Found:
 
 
 def load(code: str) -> Any:
-    """Import what "module:name" names."""
+    """Import the object that "module:name" names."""
     module, _, name = code.partition(":")
     return getattr(import_module(module), name)
 
@@ -123,11 +125,11 @@ opening: list[str] = []
 
 @cache
 def registry() -> tuple[Found, ...]:
-    """Return all extensions, the package's own first. Broken ones are marked as left out."""
+    """Return all extensions, the built-in ones first. Broken ones carry the reason why they are left out."""
     if opening:
         raise ImportError(f"{opening[0]} imports code that uses extensions; it must name that code in quotes")
-    own = [Found(name, f"{BUILT_IN}{code}", "") for name, code in walkerlab.EXTENSIONS.items()]
-    return tuple(map(open_extension, (*own, *(Found(*entry) for entry in announced()))))
+    built_in = [Found(name, f"{BUILT_IN}{code}", "") for name, code in walkerlab.EXTENSIONS.items()]
+    return tuple(map(open_extension, (*built_in, *(Found(*entry) for entry in announced()))))
 
 
 def open_extension(found: Found) -> Found:
@@ -139,7 +141,7 @@ def open_extension(found: Found) -> Found:
     except (Exception, SystemExit) as error:
         if not found.source:
             raise
-        return replace(found, why=f"{type(error).__name__}: {error}")
+        return replace(found, reason=f"{type(error).__name__}: {error}")
     finally:
         opening.pop()
     return replace(found, extension=extension)
@@ -167,12 +169,12 @@ def extensions() -> dict[str, Extension]:
 
 
 def declared(kind: str) -> dict[str, str]:
-    """Return the code that all extensions declare in a field that is a mapping, or under words of a config key."""
+    """Return the code that all extensions declare in a field that is a mapping, or for values of a config key."""
     return {word: code for extension in extensions().values() for word, code in extension.words(kind).items()}
 
 
 def words(key: str) -> tuple[str, ...]:
-    """Return all words that a config key allows: the package's own, then those of extensions."""
+    """Return all values that a config key allows: the built-in ones, then those of extensions."""
     return (*WORDS[key], *declared(key))
 
 
@@ -182,18 +184,15 @@ def foreign() -> tuple[Found, ...]:
 
 
 def origin_of(key: str) -> str:
-    """Describe which words of a config key come from other packages, to follow the key's source, or return '' if none
-    do.
-    """
+    """Describe which values of a config key come from other packages, or return '' if none do."""
     origins = ((found, word) for found in foreign() if found.extension for word in found.extension.words(key))
     return "".join(f"; {word}: extension {found.name} ({found.source})" for found, word in origins)
 
 
 def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> None:
-    """Raise ConfigError if two extensions, or an extension and the package, use one name, and warn of broken
-    extensions.
+    """Raise ConfigError if extensions, or an extension and this package, use the same name. Warn of broken extensions.
 
-    commands  names of the program's commands that are no stages
+    commands  names of the commands that are not stages
     """
     owners = {("stage", name): BUILT_IN for name in commands}
     owners |= {(key, word): BUILT_IN for key, own in WORDS.items() for word in own}
@@ -207,8 +206,8 @@ def check_names(warn: Callable[[str], object], commands: Iterable[str] = ()) -> 
                 advice = "Uninstall one of the two, or ask its author for another name."
                 raise ConfigError(f"{both} both add the {' '.join(name)}.", advice)
             owners[name] = found.origin
-        if found.why:
-            warn(f"extension {found.name} ({found.origin}) is left out: {found.why}")
+        if found.reason:
+            warn(f"extension {found.name} ({found.origin}) is left out: {found.reason}")
 
 
 @cache
@@ -231,12 +230,12 @@ def refuse_other_versions(expected: str) -> None:
 
 
 def announced() -> Iterator[tuple[str, str, str]]:
-    """Yield name, code and source of the extensions that other packages announce on the path of imports.
+    """Yield name, code and source of the extensions that installed packages announce.
 
     Importing importlib.metadata and reading all distributions takes longer than many commands, so the entries of a
     folder are read again only after it has changed.
     """
-    # `os.path`, which raises no error where a user has no home
+    # `os.path` instead of `Path`, which raises an error if the user has no home
     cache = os.path.expanduser(os.environ.get("XDG_CACHE_HOME") or "~/.cache")  # noqa: PTH111
     cache_file = Path(cache) / "walkerlab-extensions.json"
     stored = read_scans(cache_file)
@@ -272,7 +271,7 @@ def scan(folder: str) -> list[list[str]]:
 
 
 def read_scans(file: Path) -> dict[str, Any]:
-    """Read earlier scans by folder, or return none if there are none or if another user may have written them."""
+    """Read earlier scans by folder. Return nothing if there are none, or if another user may have written them."""
     with contextlib.suppress(OSError, ValueError):
         if not may_be_foreign(file):
             stored: dict[str, Any] = json.loads(file.read_text())

@@ -29,8 +29,8 @@ class Label:
     text: str  # meaning
     dims: tuple[str, ...] = ()  # dimensions of a row's value; () for a scalar
     timing: bool = False  # whether it is a measured run time or derived from one
-    absent: float | None = None  # substitute for a missing value; None leaves a gap
-    name: str = ""  # stored name, if it differs from the field's
+    absent: float | None = None  # substitute for a missing value, or None to leave it missing
+    name: str = ""  # stored name, if it differs from that of the field
 
 
 @cache
@@ -48,8 +48,9 @@ def unit_ending(name: str) -> str:
 
 
 def unit_by_name(name: str) -> str:
-    """Return the unit in the suffix of a name, or '1' if it has none. In a dotted name, the last part with a unit has
-    it.
+    """Return the unit in the suffix of a name, or '1' if it has none.
+
+    In a dotted name, the last part with a unit counts.
     """
     return next((UNITS[ending] for part in reversed(name.split(".")) if (ending := unit_ending(part))), "1")
 

@@ -1,4 +1,4 @@
-"""Files that only this user may write, because Python runs what they hold: compiled code and pickles."""
+"""Files that only this user may write, because Python executes their content: compiled code and pickles."""
 
 import contextlib
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def is_own(status: os.stat_result) -> bool:
-    """Whether a file belongs to this user. Always where the system has no owners by number, as on Windows."""
+    """Whether a file belongs to this user. True on systems without numbered owners, such as Windows."""
     return not hasattr(os, "geteuid") or status.st_uid == os.geteuid()
 
 
@@ -19,7 +19,7 @@ def is_foreign(path: Path) -> bool:
 
 
 def may_be_foreign(path: Path) -> bool:
-    """Whether another user, except root, may have written a file or a folder. Links may lead to one."""
+    """Whether another user, except root, may have written a file or a folder. Links may lead to one, so they count."""
     mode = path.lstat().st_mode
     return is_foreign(path) or stat.S_ISLNK(mode) or bool(mode & stat.S_IWOTH)
 
@@ -31,9 +31,9 @@ def make_private_folder(folder: Path) -> None:
 
 
 def make_private(path: Path) -> list[Path]:
-    """Close a file, or a folder with all that it holds, to other users, and delete and return what may be foreign.
+    """Close a file, or a folder with its content, to other users. Delete and return everything they may have written.
 
-    Raises OSError if something that may be foreign cannot be deleted.
+    Raises OSError if such a file cannot be deleted.
     """
     if may_be_foreign(path):
         if path.is_dir() and not path.is_symlink():

@@ -13,7 +13,7 @@ from measured_plain_walk import measure_angles, measure_steps
 from walkerlab.api.memory import in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
-from walkerlab.physics.estimation.fit import SETTLED_MOVE
+from walkerlab.physics.estimation.fit import MOVE_TOLERANCE
 from walkerlab.physics.estimation.judgement import implausible_disturbances
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.physics.estimation.mixed_model import Linearised, Noise, evaluate, reduce
@@ -203,7 +203,7 @@ def test_bound_without_influence_raises_no_doubt():
     edge = free.value - 0.5 * free.standard_error
     result = identify(measured_steps(), LEG + "=0.98", fit={"slope_deg": None, LEG: [0.9, edge]})
     assert result.verdict.fit == "fits"
-    assert result.pulls[0].standard_deviations == pytest.approx(0.5, abs=2.0 * SETTLED_MOVE)
+    assert result.pulls[0].standard_deviations == pytest.approx(0.5, abs=2.0 * MOVE_TOLERANCE)
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_correlated_angle_noise_shows_in_the_residuals():
     drift = np.array([np.convolve(leg, np.ones(30) / 30**0.5, "same") for leg in drawn.T]).T
     result = identify(replace(measured, angles_rad=measured.angles_rad + drift), fit={"slope_deg": None, HIP: None})
     assert result.verdict.fit == "fits-but"
-    assert "residuals of successive angles go together" in " ".join(result.verdict.reasons)
+    assert "residuals of successive angles are correlated" in " ".join(result.verdict.reasons)
 
 
 def test_many_noise_levels_of_a_long_walk_need_little_memory():

@@ -102,7 +102,7 @@ def test_rigid_walk_does_not_determine_the_mass_scale():
 
 def test_two_exact_steps_name_every_undetermined_parameter():
     own = truth()
-    walk = own.walks.disturbed(own.z * 1.01, tuple(own.values), np.zeros(3))
+    walk = own.walks.take_disturbed_walk(own.z * 1.01, tuple(own.values), np.zeros(3))
     measured = MeasuredWalk(walk.durations_s, walk.lengths_m)
     result = identify_walk(own.config, measured, own.gait, Identify(fit=dict.fromkeys(KEYS)))
     left_open = {estimate.key for estimate in result.estimates if estimate.standard_error is None}
@@ -127,7 +127,7 @@ def test_derivatives_equal_finite_differences_of_other_step_sizes():
 
 def test_long_walk_is_predicted_to_its_end():
     own = truth()
-    walk = own.walks.disturbed(own.z, tuple(own.values), np.zeros(121))
+    walk = own.walks.take_disturbed_walk(own.z, tuple(own.values), np.zeros(121))
     assert walk.outcome is Outcome.WALKED
     assert walk.durations_s.size == 120
 
@@ -137,9 +137,9 @@ def test_tangents_of_a_walk_equal_difference_quotients(name):
     own = CAMPAIGN["Truth"](name, CAMPAIGN["WALKERS"][name])
     heights, p, steps = np.random.default_rng(3).normal(0.0, 1e-3, 6) * own.leg, tuple(own.values), 5
     along = np.eye(own.z.size + steps + 1)
-    times = np.linspace(0.0, 0.999 * own.walks.disturbed(own.z, p, heights).durations_s.sum(), 40)
-    exact = own.walks.varied(own.z, p, heights, along, times)
-    differences = StepMap.varied(own.walks, own.z, p, heights, along, times)
+    times = np.linspace(0.0, 0.999 * own.walks.take_disturbed_walk(own.z, p, heights).durations_s.sum(), 40)
+    exact = own.walks.differentiate_walk(own.z, p, heights, along, times)
+    differences = StepMap.differentiate_walk(own.walks, own.z, p, heights, along, times)
     for field in ("durations_s", "lengths_m", "angles_rad", "samples_rad"):
         values, others = getattr(exact, field), getattr(differences, field)
         assert values == pytest.approx(others, abs=2e-5 * np.abs(values).max()), field
@@ -148,7 +148,7 @@ def test_tangents_of_a_walk_equal_difference_quotients(name):
 
 def test_noise_free_steps_give_the_parameters_to_many_digits():
     own = truth()
-    walk = own.walks.disturbed(own.z * 1.005, tuple(own.values), np.zeros(21))
+    walk = own.walks.take_disturbed_walk(own.z * 1.005, tuple(own.values), np.zeros(21))
     measured = MeasuredWalk(walk.durations_s, walk.lengths_m)
     result = identify(measured, "slope_deg=3.03", "walker.leg_length_m=1.01")
     assert result.process["at_bound"]

@@ -145,7 +145,7 @@ def test_a_damped_knee_takes_the_same_work_from_both_models():
     walk = scene.walk(start_state(scene, rigid.state), 8, tolerances_of(config, 8))
     assert walk.steps == 8
     assert rigid.work["knees"] < 0.0
-    assert walk.driven.per_step(8)["knees"] == pytest.approx(rigid.work["knees"], rel=0.05)
+    assert walk.driven.work_per_step(8)["knees"] == pytest.approx(rigid.work["knees"], rel=0.05)
     assert walk.driven.hip == 0.0
 
 

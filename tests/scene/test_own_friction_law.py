@@ -34,17 +34,17 @@ class Regularised(NamedTuple):
     v_0: float
 
     @classmethod
-    def of(cls, contact):
+    def from_contact(cls, contact):
         return cls(contact.dynamic_friction, contact.stiction_velocity)
 
     largest = property(lambda self: self.mu)
     rising_until = property(lambda self: 3.0 * self.v_0)
     sliding_from = property(lambda self: 3.0 * self.v_0)
 
-    def with_creep(self, factor):
+    def scale_creep(self, factor):
         return self._replace(v_0=factor * self.v_0)
 
-    def in_words(self):
+    def describe(self):
         return f"friction of {self.mu:g} tanh(v / {self.v_0:g} m/s)"
 
 
@@ -66,7 +66,7 @@ class Wordless(NamedTuple):
     mu: float
 
     @classmethod
-    def of(cls, contact):
+    def from_contact(cls, contact):
         return cls(contact.dynamic_friction)
 
     largest = rising_until = property(lambda self: self.mu)
@@ -77,7 +77,7 @@ def test_incomplete_law_is_explained_when_a_scene_is_built(monkeypatch):
     with pytest.raises(ConfigError) as said:
         contact_scene(load().config, 0.3714)
     assert str(said.value) == (
-        "the friction law Wordless ('coulomb') is incomplete: it lacks sliding_from, with_creep, in_words, "
+        "the friction law Wordless ('coulomb') is incomplete: it lacks sliding_from, scale_creep, describe, "
         "a case @friction_coefficient.case(Wordless)."
     )
 
@@ -88,7 +88,7 @@ def test_incomplete_law_is_rejected_before_anything_runs(stage, monkeypatch, tmp
     monkeypatch.setitem(FRICTION_LAWS, "coulomb", Wordless)
     # only laws of other packages are checked beforehand
     monkeypatch.setitem(WORDS, "friction", ("none",))
-    with pytest.raises(ConfigError, match="it lacks sliding_from, with_creep, in_words"):
+    with pytest.raises(ConfigError, match="it lacks sliding_from, scale_creep, describe"):
         execute(config, stage, RunFolder(tmp_path, "paper"))
     assert [*tmp_path.rglob("*.h5")] == []
 
@@ -121,13 +121,13 @@ def test_stated_properties_of_a_law_match_its_coefficient(word):
     assert rising == sorted(rising)
     assert len({mu for mu, slip in zip(found, slips, strict=True) if slip >= law.sliding_from}) == 1
     for slip in slips:
-        slowed = friction_coefficient(law.with_creep(0.25), 0.25 * slip)[0]
+        slowed = friction_coefficient(law.scale_creep(0.25), 0.25 * slip)[0]
         assert slowed == pytest.approx(friction_coefficient(law, slip)[0], rel=1e-12)
         assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
 
 
 def test_friction_laws_have_different_descriptions():
-    said = [ground_laws(Contact(friction=word))[1].in_words() for word in FRICTION_LAWS]
+    said = [ground_laws(Contact(friction=word))[1].describe() for word in FRICTION_LAWS]
     assert len(set(said)) == len(said)
     assert said[0] == (
         "ADAMS's Coulomb friction, with a coefficient of 0.9 at a slip velocity of 0.1 m/s and 0.7 above 1 m/s"

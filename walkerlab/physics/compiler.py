@@ -28,7 +28,8 @@ from walkerlab.code_digest import PACKAGE, Sources, digest_of
 from walkerlab.physics.kernel_cache import cache_folder, files_of, lock_of, watchers, write_file
 
 CHECKSUM_BYTES = 32  # of SHA-256, before a kernel's stored code
-SIGNATURE = 3  # place of the signature in a kernel's stored code
+# index of the signature in the stored tuple
+SIGNATURE = 3
 # The compiler may not contract or reorder arithmetic, so that code compiled twice computes the same to the last bit.
 # No reference counts (_nrt): kernels allocate nothing and borrow arrays from their caller, and counting would take as
 # long as the arithmetic.
@@ -55,9 +56,9 @@ Record.mangling_args = property(layout_symbol)  # type: ignore[method-assign, as
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """Compiled function that Python calls, with its machine code in files. It is also its own cache, as numba calls it.
+    """Compiled function that Python calls, with its machine code in files. It also implements numba's cache interface.
 
-    Compiled code that calls it compiles it once more, as its own part: stored machine code cannot be linked.
+    A kernel that calls another one compiles it again as a part of itself, because stored machine code cannot be linked.
     """
 
     @functools.cached_property
@@ -77,6 +78,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         vectorize = numba.config.LOOP_VECTORIZE
         numba.config.LOOP_VECTORIZE = 0
         try:
+            # Only compiling needs the lock; stored code can be loaded by any number of processes.
             with lock_of(name) if next(files_of(name), None) is None else contextlib.nullcontext():
                 return super().compile(sig)
         finally:
@@ -87,7 +89,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         name = self.file_name(signature)
         for path in files_of(name):
             payload = read_code(path)
-            # a class that a notebook defines is another class in the next process
+            # a class defined in a notebook is a different class in the next process
             if payload is not None and payload[SIGNATURE].args == tuple(signature):
                 files_in_use.add(name)
                 context.refresh()
@@ -106,11 +108,11 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
     def file_name(self, signature: Any) -> str:
         """Return the file name for some argument types. It depends on all code outside the sources of kernels."""
         function = self.py_func
-        place = f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
+        location = f"{function.__module__}.{function.__qualname__}:{function.__code__.co_firstlineno}"
         cells = dumps([cell.cell_contents for cell in function.__closure__]) if function.__closure__ else b""
         classes = sorted(set(classes_in(signature)), key=str)
         types = repr((signature, classes)).encode()
-        identity = digest_of([(place, types), ("closure", cells), *outside_sources(function, classes)])
+        identity = digest_of([(location, types), ("closure", cells), *outside_sources(function, classes)])
         return f"{function.__name__}-{identity[:24]}.kernel"
 
 
@@ -133,8 +135,9 @@ def read_code(path: Path) -> Any:
     return None
 
 
-def stripped(path: Path) -> bytes:
-    """Return a file's content with only symbol names of its LLVM bitcode, most of the file. Linking needs the rest."""
+def strip_bitcode(path: Path) -> bytes:
+    """Return a file's content without its LLVM bitcode, which is most of the file, except for the symbol names."""
+    # Only linking needs the bitcode itself, and stored kernels are never linked.
     (name, kind, (machine_code, bitcode)), *rest = read_code(path)
     module = binding.parse_bitcode(bitcode)
     names = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]

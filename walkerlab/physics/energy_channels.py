@@ -13,7 +13,7 @@ SUPPLY_ENTRIES = slice(PUSH_OFF, TORQUE)
 class Loss(NamedTuple):
     key: str  # name of the loss in results
     where: str  # text that completes 'energy is lost ...'
-    variable: str  # name of the variable that holds the loss over time; empty if no variable does
+    variable: str  # variable with the loss over time; empty if there is none
     meaning: str  # description of the variable
     cause: str  # label in figures
     colour: str
@@ -48,5 +48,5 @@ LOSSES = (
     Loss(key="knee_stop", where="in the knees' stops", variable="", meaning="", cause="knees", colour="#CC79A7"),
 )
 """Losses, in the order of the account."""
-SAMPLED = {place: loss for place, loss in enumerate(LOSSES) if loss.variable}
+SAMPLED = {index: loss for index, loss in enumerate(LOSSES) if loss.variable}
 CHANNELS = {loss.key: loss.where for loss in LOSSES}

@@ -94,12 +94,12 @@ def processor_name() -> str:
 
 
 def build_target() -> tuple[str, tuple[str, ...]] | None:
-    """Return the processor that builds on this platform compile for and the features that it needs, if it has one."""
+    """Return the processor and features for which builds on this platform compile, or None for other platforms."""
     return TARGETS.get(f"{sys.platform}-{platform.machine().lower()}")
 
 
 def circumstances() -> dict[str, str]:
-    """Return what the package's machine code depends on, as it is here."""
+    """Return the values, found on this machine, on which the package's machine code depends."""
     import llvmlite
     import numba
 
@@ -127,12 +127,12 @@ def why_not_built() -> str:
 
 
 def describe_origin() -> list[str]:
-    """Describe in lines where kernels come from, and why."""
+    """Return lines that say where kernels come from, and why."""
     versions = ", ".join(f"{name} {here}" for name, here in circumstances().items())
-    why = why_not_built()
+    reason = why_not_built()
     folder = f"compiled when a run needs them, and kept in {cache_root()}"
-    if why:
-        return [versions, f"kernels: {folder}", f"The package's kernels are not used: {why}"]
+    if reason:
+        return [versions, f"kernels: {folder}", f"The package's kernels are not used: {reason}"]
     return [versions, f"kernels: {len(list(BUILT.glob('*.kernel')))} from the package; others are {folder}"]
 
 
@@ -150,14 +150,15 @@ def write_file(path: Path, content: bytes) -> None:
     make_private_folder(path.parent)
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
         file.write(content)
+    # Replacing is atomic, so no process ever reads half a file.
     Path(file.name).replace(path)
 
 
 def cache_root() -> Path:
-    """Return the folder of compiled code: $WALKERLAB_CACHE or the user's cache if usable, else a temporary folder."""
+    """Return the folder of compiled code: $WALKERLAB_CACHE or the user's cache if usable, else a temporary one."""
     chosen = os.environ.get("WALKERLAB_CACHE")
-    usual = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
-    return _first_usable((Path(chosen), usual) if chosen else (usual,))
+    default = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "walkerlab"
+    return _first_usable((Path(chosen), default) if chosen else (default,))
 
 
 @functools.cache
@@ -212,9 +213,7 @@ def cache_folder() -> Path:
 
 
 def _closed_to_others(folder: Path) -> Path:
-    """Close a folder to other users and delete code that they may have written, and return it, or another
-    if that fails.
-    """
+    """Close a folder to other users, delete code they may have written, and return it, or another if that fails."""
     try:
         deleted = make_private(folder)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Build the contact model of a config, without anything that the config does not need."""
+"""Build the contact model of a config, with only the parts that the config needs."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def contact_scene(
 
     rigid_step_length_m  step length of the rigid gait, the reference length for pads and terrain
     own_pitch_m          step length of the contact gait, for `pad_pitch: own`
-    asymmetry            difference between the lengths of second and first step over their mean, for the lanes of pads
+    asymmetry            second minus first step length, divided by their mean; it shifts the lanes of pads
     """
     contact = require_contact(config)
     pitch = pads_pitch(contact, rigid_step_length_m, own_pitch_m)
@@ -79,7 +79,8 @@ def contact_scene(
     gravity = config.gravity_m_s2
     laws = ground_laws(contact)
     rules = knee_rules(config.walker)
-    walker = apply_drives(contact_walker(assembly, *laws, gravity, config.slope_rad, rules), config)
+    passive = contact_walker(assembly, *laws, gravity, config.slope_rad, rules)
+    walker = apply_drives(passive, config)
     frame = Frame(leg, math.sqrt(leg / gravity), locate_switching=True)
     ground = JudgedGround(TERRAINS[contact.terrain](pitch, asymmetry), frame)
     return ContactScene(walker, ground, contact.stance == "pinned", pitch, assembly)
@@ -94,30 +95,30 @@ def scene_on_pads(
     config: ContactConfig,
     rigid_step: float,
     rigid_state: State,
-    answer: GaitAnswer | None = None,
+    search: GaitAnswer | None = None,
     asymmetry: float = 0.0,
 ) -> ContactScene:
     """Build the scene of a config with its pads.
 
-    answer  result of the search for the contact gait; None to search if necessary
+    search  result of an earlier search for the contact gait; None to search if necessary
 
     Raises NoAnswer if their pitch needs a contact gait and none is found.
     """
-    own = None
+    pitch = None
     require_known_legs(config)
     if wants_own_pitch(require_contact(config)):
-        answer = answer or contact_gait(config, rigid_step, rigid_state)
-        if answer.gait is None:
-            raise NoAnswer(f"no contact gait to lay the pads for: {answer.reason}", answer.advice)
-        own = float(answer.gait.lengths_m.mean())
-        if len(answer.gait.steps) > 1:
-            first, second = lengths_between_touches(answer.gait)
-            asymmetry = float((second - first) / own)
-    return contact_scene(config, rigid_step, own, asymmetry)
+        search = search or contact_gait(config, rigid_step, rigid_state)
+        if search.gait is None:
+            raise NoAnswer(f"no contact gait to lay the pads for: {search.reason}", search.advice)
+        pitch = float(search.gait.lengths_m.mean())
+        if len(search.gait.steps) > 1:
+            first, second = lengths_between_touches(search.gait)
+            asymmetry = float((second - first) / pitch)
+    return contact_scene(config, rigid_step, pitch, asymmetry)
 
 
 def require_known_legs(config: ContactConfig) -> None:
-    """Raise ConfigError for a leg with a knee beside one without, which the contact model does not know."""
+    """Raise ConfigError if only one leg has a knee, which the contact model does not support."""
     if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
         raise ConfigError(
             "the contact model needs two legs of one kind, both with a knee or both without.",
@@ -212,8 +213,7 @@ def ground_law(key: str, word: str, si: Any) -> Any:
 
 
 def start_state(scene: ContactScene, rigid_state: State) -> State:
-    """Convert a rigid start to the contact model's state. The stance foot just touches the ground at along = 0 and
-    rolls.
+    """Convert a rigid start to a state of the contact model. The stance foot just touches the ground at along = 0.
 
     rigid_state  state of the rigid model with both feet on the slope; for a compass (theta_1 swing, theta_2 stance,
                  dtheta_1, dtheta_2)
@@ -244,5 +244,5 @@ def scene_measures(scene: ContactScene) -> dict[str, Any]:
         "static_penetration_m": foot.depth,
         "damping_ratio": foot.damping_ratio,
         "pitch_m": scene.pitch_m,
-        "friction": scene.walker.friction.in_words(),
+        "friction": scene.walker.friction.describe(),
     }

@@ -25,7 +25,7 @@ RELATIVE_CHANGE = 1e-3  # relative change of a parameter, to test whether a mode
 
 
 def rigid_map(config: ContactConfig, parameter: Parameter, scale: float) -> RigidMap:
-    step_map = RigidMap(parameter.over(config, rigid_walker), scale, rigid_walker(config))
+    step_map = RigidMap(parameter.vary(config, rigid_walker), scale, rigid_walker(config))
     step_map.stride = steps_of_stride(config, parameter)
     return step_map
 
@@ -46,14 +46,14 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
     from walkerlab.physics.orbits.contact_map import ContactMap
 
     scene = scene_for(step_length_m)
-    step_map = ContactMap(parameter.over(config, scene), scale, CONTACT_STEP, step_length_m, scene(config))
+    step_map = ContactMap(parameter.vary(config, scene), scale, CONTACT_STEP, step_length_m, scene(config))
     step_map.stride = steps_of_stride(config, parameter)
     return step_map
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
     make: Callable[[ContactConfig], Any] = rigid_walker if model == "rigid" else scene_for(1.0)
-    first, last = ([*iterate_values(parameter.over(config, make)(value))] for value in values)
+    first, last = ([*iterate_values(parameter.vary(config, make)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))
 
 
@@ -75,7 +75,7 @@ def model_reads(model: str, config: ContactConfig, key: str) -> bool:
 
 
 def refuse_unread(where: str, key: str, config: ContactConfig, models: Sequence[str]) -> None:
-    """Raise ConfigError for the config key `where`, if none of the models reads the parameter `key` that it names."""
+    """Raise ConfigError for the config key `where` if it names a parameter `key` that none of the models reads."""
     if not any(model_reads(model, config, key) for model in models):
         raise unused_key_error(where, key, models)
 

@@ -8,7 +8,7 @@ from walkerlab.physics.solvers.system import Floats
 
 
 def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
-    """Return foothold heights (steps + 1,), m above the slope, from the start's foothold on, or None on even ground."""
+    """Return the heights (steps + 1,) of the footholds in m above the slope, from the start on, or None if even."""
     if ground.even:
         return None
     if ground.heights_m:

@@ -50,13 +50,13 @@ class SlopeRange:
 
 def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
     """Return the nearest range of slopes with gaits, preferring stable gaits, or None if no gait is found."""
-    own = config.slope_rad
-    span = ValueSpan(0.02 * own, min(MAX_FOLLOWED_TO, max(3.0 * own, MIN_FOLLOWED_TO)))
+    slope = config.slope_rad
+    span = ValueSpan(0.02 * slope, min(MAX_FOLLOWED_TO, max(3.0 * slope, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
-    for value in (*(factor * own for factor in SLOPE_FACTORS), *COMMON_SLOPES):
+    for value in (*(factor * slope for factor in SLOPE_FACTORS), *COMMON_SLOPES):
         if value in span and not any(candidate.stable for candidate in ranges):
-            ranges += walkable_ranges(follow(SLOPE.over(config, rigid_walker), span, value))
-    return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, own)), default=None)
+            ranges += walkable_ranges(follow(SLOPE.vary(config, rigid_walker), span, value))
+    return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, slope)), default=None)
 
 
 def distance(span: tuple[float, float], value: float) -> float:
@@ -73,7 +73,9 @@ def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBran
 
 
 def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
-    """Yield each branch's range of slopes where the ground need not pull on the foot, and its longest stable part."""
+    """Yield the range of slopes of each branch on which the ground need not pull on the foot, and its longest stable
+    part.
+    """
     for branch in branches:
         good = [point for point in branch.points if point.monitors[0] >= 0.0]
         if len(good) < 2:
@@ -111,18 +113,16 @@ def suggest_gaits(scene: RigidConfig) -> str:
 
 
 def rigid_alone(scene: RigidConfig) -> Config:
-    """Return a config with the keys of the rigid model that has a gait, and no others."""
+    """Return a config with only the keys on which a gait of the rigid model depends."""
     data = {name: getattr(scene, name) for name in keys_of(RigidConfig)}
     return Config.model_validate({**data, "push_off": {"impulse_N_s": scene.push_off.impulse_N_s}})
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
-    """Return the distance (m) of feet ahead of the shanks with the most stable gait, and the gait, or None
-    if no gait.
-    """
+    """Return the distance (m) of the feet ahead of the shanks with the most stable gait, and this gait, or None."""
     candidates = []
     for ahead_m in feet_ahead(config):
-        walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).over(config, rigid_walker)(ahead_m)
+        walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).vary(config, rigid_walker)(ahead_m)
         gaits = () if walker is None else find_gaits(walker, settings=SUGGESTION_SEARCH).gaits
         candidates += [(ahead_m, gait) for gait in gaits if not gait.objections]
     return min(candidates, key=lambda candidate: candidate[1].spectral_radius, default=None)
@@ -140,7 +140,7 @@ def name_feet_tried(config: Config) -> str:
 
 
 def suggest_walkers(config: Config) -> str:
-    alike = [name for name in builtin_names() if load(Path(name)).config.walker.type == config.walker.type]
-    if not alike:
+    names = [name for name in builtin_names() if load(Path(name)).config.walker.type == config.walker.type]
+    if not names:
         return ""
-    return f" Begin with a built-in walker of this type (`-c NAME`: {', '.join(alike)}) and change one key at a time."
+    return f" Begin with a built-in walker of this type (`-c NAME`: {', '.join(names)}) and change one key at a time."

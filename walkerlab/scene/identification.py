@@ -14,7 +14,7 @@ from walkerlab.config.fields import value_at
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import add_unit, unit_by_name
-from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitProblem, Fitted, evaluate_at, fit
+from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measured_multipliers import measure_radius
@@ -62,13 +62,13 @@ class Fixed(NamedTuple):
 
 
 Begin = Callable[[str, int], Callable[[], None]]
-KEPT_CONFIGS: Final = 512  # changed configs, and as many walkers of them
+KEPT_CONFIGS: Final = 512  # numbers of changed configs and of their walkers that are cached
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
 CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
-UNTOUCHED: Final = 1e-3  # a smaller relative reduction of a prior's variance counts as no information
+MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
 DECISIVE_GAIN: Final = 3.0  # of the log-likelihood, beyond which one more parameter explains the walk better
@@ -83,12 +83,12 @@ class ConfigFamily:
         self.parameters = [parameter_of(key, config) for key in keys]
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
         self.at = lru_cache(KEPT_CONFIGS)(partial(config_with, config, self.parameters))
-        self.rigid_walker = lru_cache(KEPT_CONFIGS)(self.over(rigid_walker))
+        self.rigid_walker = lru_cache(KEPT_CONFIGS)(self.vary(rigid_walker))
 
     def admits(self, values: Values) -> bool:
         return self.rigid_walker(values) is not None
 
-    def over(self, make: Callable[[ContactConfig], R]) -> Callable[[Any], R | None]:
+    def vary(self, make: Callable[[ContactConfig], R]) -> Callable[[Any], R | None]:
         """Return a function from values to `make(config)`, or to None if the schema rejects them or `make` does."""
 
         def make_at_values(values: Values) -> R | None:
@@ -111,7 +111,7 @@ def step_map_of(subject: ModelUnderTest, family: ConfigFamily) -> StepMap:
     from walkerlab.physics.orbits.contact_map import ContactMap
 
     scene = scene_for(subject.length_m)
-    return ContactMap(family.over(scene), 1.0, CONTACT_WALKS, subject.length_m, scene(subject.config))
+    return ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, scene(subject.config))
 
 
 def identify_walk(
@@ -126,7 +126,7 @@ def identify_walk(
 
     gait   summary of `fixedpoint` for the config
     note   receives messages
-    begin  receives the name of each fit and its largest number of rounds; returns what to call at each round
+    begin  receives the name of each fit and its maximum number of rounds, returns a function to call at each round
 
     Raises ConfigError for keys that are not parameters, NoAnswer if no model can be fitted.
     """
@@ -160,13 +160,13 @@ def identify_with(
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
-        fit(problem, start, begin(f"{model} model, start {place} of {question.starts}", MAX_ROUNDS))
-        for place, start in enumerate(starts_of(problem, question.starts), 1)
+        fit(problem, start, begin(f"{model} model, start {number} of {question.starts}", MAX_ROUNDS))
+        for number, start in enumerate(starts_of(problem, question.starts), 1)
     ]
-    walked = [result for result in fits if isinstance(result, Fitted)]
-    if not walked:
-        return str(fits[0])
-    best = max(walked, key=lambda result: (not result.why, result.evaluation.likelihood))
+    predicted = [result for result in fits if result is not None]
+    if not predicted:
+        return FitEnd.WALK_FAILS.value
+    best = max(predicted, key=lambda result: (not result.reason, result.evaluation.likelihood))
     timed = refit_in_time(best, begin)
     if timed is None:
         return describe(subject, question, best, best)
@@ -185,7 +185,7 @@ def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
     start = u if nuisances == forecast.nuisances else np.append(u, 0.0)
     problem = replace(first.problem, forecast=replace(forecast, in_phase=False, nuisances=nuisances))
     fitted = fit(problem, start, begin("angles at their times", MAX_ROUNDS))
-    return fitted if isinstance(fitted, Fitted) and not fitted.why else None
+    return fitted if fitted is not None and not fitted.reason else None
 
 
 def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> FitProblem:
@@ -195,7 +195,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.sensors)
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
-    priors = {place: question.prior[key] for place, key in enumerate(question.keys) if key in question.prior}
+    priors = {index: question.prior[key] for index, key in enumerate(question.keys) if key in question.prior}
     leg_m = subject.config.walker.leg_length_m
     loss = question.loss
     return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
@@ -204,10 +204,10 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
 def starts_of(problem: FitProblem, count: int) -> list[Floats]:
     """Return the starts of the fit, each (unknowns,): the config's values, then random values near them."""
     rng = np.random.default_rng(0)
-    own = problem.forecast.scales.size
-    starts = [problem.first() for _ in range(count)]
+    count_parameters = problem.forecast.scales.size
+    starts = [problem.initial_unknowns() for _ in range(count)]
     for start in starts[1:]:
-        start[:own] *= 1.0 + SPREAD_OF_STARTS * rng.uniform(-1.0, 1.0, own)
+        start[:count_parameters] *= 1.0 + SPREAD_OF_STARTS * rng.uniform(-1.0, 1.0, count_parameters)
     return starts
 
 
@@ -239,7 +239,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     fixed = [*fixed_parameters(subject, question, best)]
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
-        reasons = (*verdict[1], *map(pull_in_words, strong(pulls)), *better_with(fixed, best, len(keys)))
+        reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggest_parameter(fixed, best, len(keys)))
         verdict = ("fits-but" if reasons else "fits"), reasons
     dof = max(1, best.data.residuals.size - best.u.size)
     gait = gait_with_errors(best, information.covariance, subject.units if question.robustness else None)
@@ -280,37 +280,37 @@ def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
 
 
 def pulls_of_priors(estimates: Sequence[Estimate], priors: Mapping[str, Sequence[float]]) -> Iterator[Pull]:
-    """Yield the distance of each prior from the walk's own estimate, in standard errors of the difference."""
+    """Yield the distance of each prior from the estimate by the walk alone, in standard errors of the difference."""
     for estimate in estimates:
         if estimate.key in priors:
             value, sigma = priors[estimate.key]
             error = estimate.standard_error
             free = 0.0 if error is None else sigma**2 - error**2
-            distance = abs(estimate.value - value) / math.sqrt(free) if free > UNTOUCHED * sigma**2 else 0.0
+            distance = abs(estimate.value - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(estimate.key, "prior", value, distance)
 
 
-def strong(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
+def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
     return tuple(pull for pull in pulls if pull.standard_deviations > STRONG_PULL)
 
 
-def pull_in_words(pull: Pull) -> str:
+def describe_pull(pull: Pull) -> str:
     return (
         f"the walk pulls {pull.key} against its {pull.against} of {pull.value:g} by {pull.standard_deviations:.2g} "
         "standard deviations"
     )
 
 
-def better_with(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Iterator[str]:
-    """Yield the fixed parameter or nuisance that would raise the log-likelihood most if it was estimated, too.
+def suggest_parameter(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Iterator[str]:
+    """Yield the fixed parameter or nuisance that would raise the log-likelihood most if it were estimated as well.
 
-    The gain is that of a linearised step with new standard deviations. It is reduced by the share of the values that
-    the unknowns use up, since any parameter fits a short walk better.
+    The gain is that of a linearised step with new standard deviations. It is reduced by the fraction of the values that
+    the unknowns use up, since any additional parameter fits a short walk better.
     """
     data = fitted.data
     problem = fitted.problem
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
-    left = (data.residuals.size - fitted.u.size - 1) / data.residuals.size
+    remaining = (data.residuals.size - fitted.u.size - 1) / data.residuals.size
     best = fitted.evaluation.likelihood
     wider = None
     for other in others:
@@ -325,13 +325,13 @@ def better_with(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Ite
         noise = estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise)
         free = evaluate(rows, noise)
         gain = free.likelihood - fitted.evaluation.likelihood
-        if gain * left > DECISIVE_GAIN:
+        if gain * remaining > DECISIVE_GAIN:
             start = NUISANCES.get(other.name, (other.value, 0.0))[0]
             option = "--nuisance" if other.name in NUISANCES else "--fit"
             value = add_unit(f"{start + free.move[-1] * other.scale:.4g}", other.unit)
             yield (
                 f"{other.name} of {value} instead of {start:.4g} would raise the log-likelihood by about {gain:.3g}: "
-                f"estimate it, too ({option} {other.name})"
+                f"estimate it as well ({option} {other.name})"
             )
 
 
@@ -356,7 +356,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. Of the leg for lengths and inertias of zero, and zero for drives of zero."""
+    """Return 1 % of a parameter. For lengths and inertias of zero, use the leg. Drives of zero do not change."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
@@ -384,14 +384,14 @@ def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted
     )
     values = np.array(family.start[count:])
     u = np.concatenate((fitted.u[:count], values / wide.scales[count:], fitted.u[count:], np.zeros(len(sensors))))
-    places = [*range(count, count + len(fixed)), *range(u.size - len(sensors), u.size)]
+    indices = [*range(count, count + len(fixed)), *range(u.size - len(sensors), u.size)]
     scales = [*wide.scales[count:].tolist(), *(NUISANCES[name][1] for name in sensors)]
     units = [*(parameter_of(key, config).unit for key in fixed), *map(unit_by_name, sensors)]
-    for name, value, scale, unit, place in zip(
-        (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, places, strict=True
+    for name, value, scale, unit, index in zip(
+        (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
         for exact in (False, True):
-            slope = wide.slope_along(u, np.eye(u.size)[place], fitted.heights_m, exact)
+            slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:
                 yield Fixed(name, value, scale, unit, slope)
                 break
@@ -401,9 +401,9 @@ def nuisances_with_errors(fitted: Fitted, names: Sequence[str]) -> dict[str, Unc
     """Return the estimated properties of clock and sensors with their standard errors."""
     forecast = fitted.forecast
     variances = np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True))
-    own = dict(zip(forecast.nuisances, variances[forecast.unknowns - len(forecast.nuisances) :], strict=True))
+    by_name = dict(zip(forecast.nuisances, variances[forecast.unknowns - len(forecast.nuisances) :], strict=True))
     values = forecast.sensors(fitted.u)
-    return {name: Uncertain(values[name], NUISANCES[name][1] * math.sqrt(max(own[name], 0.0))) for name in names}
+    return {name: Uncertain(values[name], NUISANCES[name][1] * math.sqrt(max(by_name[name], 0.0))) for name in names}
 
 
 def measurement_noise(fitted: Fitted) -> dict[str, float]:
@@ -443,8 +443,8 @@ def rms_residuals(fitted: Fitted) -> dict[str, float]:
     """Return the rms of measured minus predicted values by quantity, given the most probable floor heights."""
     quantity = fitted.forecast.quantity
     return {
-        name: float(np.sqrt(np.mean(fitted.residuals[quantity == place] ** 2)))
-        for place, name in enumerate(fitted.forecast.quantities)
+        name: float(np.sqrt(np.mean(fitted.residuals[quantity == index] ** 2)))
+        for index, name in enumerate(fitted.forecast.quantities)
     }
 
 
@@ -465,9 +465,9 @@ def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
 def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) -> dict[str, Uncertain]:
     """Return period, step length and spectral radius of the identified gait, with errors propagated from the estimates.
 
-    Empty if the identified walker has no one-step gait near the fitted start.
+    Returns nothing if the identified walker has no one-step gait near the fitted start.
 
-    units  units of the walker; None leaves out the gait's sensitivity to a drop of the floor
+    units  units of the walker, or None to leave out the sensitivity of the gait to a drop of the floor
     """
     forecast = fitted.forecast
 
@@ -475,7 +475,7 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
         parameters = forecast.parameters(fitted.u + move)
         if not forecast.admits(parameters):
             return None
-        z = forecast.walks.settled(fitted.predicted.walk.z, parameters)
+        z = forecast.walks.rest_on_ground(fitted.predicted.walk.z, parameters)
         gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
@@ -490,11 +490,11 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
         return {}
     slopes = np.zeros((forecast.scales.size, centre.size))
     names = GAIT_NAMES[: centre.size]
-    for place, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
+    for index, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
         # for measured steps, the derivatives of the walk take the same step, so these walkers are cached
         slope = derivative(lambda share, unit=unit: quantities(share * unit), EXACT_STEP)  # type: ignore[misc]
         if slope is None:
             return {name: Uncertain(float(v), None) for name, v in zip(names, centre, strict=True)}
-        slopes[place] = slope / forecast.scales[place]
+        slopes[index] = slope / forecast.scales[index]
     errors = np.sqrt(np.maximum(np.einsum("iq,ij,jq->q", slopes, covariance, slopes), 0.0))
     return {name: Uncertain(float(v), float(e)) for name, v, e in zip(names, centre, errors, strict=True)}

@@ -97,7 +97,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family)
     level = np.zeros(plan.max_steps + 2)
-    walk = walks.disturbed(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
+    walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
         raise NoAnswer(
             f"the {subject.model} model takes only {walk.durations_s.size} of {plan.max_steps + 1} steps.",
@@ -106,7 +106,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     steps = slice(plan.max_steps)
     touches = np.append(0.0, np.cumsum(walk.durations_s[steps]))
     times = np.arange(0.0, touches[-1], 1.0 / plan.rate_hz)
-    angles = walks.sampled(subject.z, family.start, level, times)  # type: ignore[arg-type]
+    angles = walks.sample_legs(subject.z, family.start, level, times)  # type: ignore[arg-type]
     of_steps = MeasuredWalk(walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps])
     return of_steps, split_into_steps(times, angles, touches)
 
@@ -130,7 +130,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
         nuisances = tuple(dict.fromkeys((*question.sensors, DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast
-    data = linearise(problem, problem.first(), np.zeros(forecast.heights), exact=True)
+    data = linearise(problem, problem.initial_unknowns(), np.zeros(forecast.heights), exact=True)
     if data is None:
         raise NoAnswer(
             f"a {subject.model}-model walk with slightly changed parameters, needed for the derivatives, ends early.",
@@ -143,7 +143,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain after the `measured` quantities of the first steps, and what remains open."""
+    """Return the errors that remain after measuring these quantities of the first steps, and what stays open."""
     noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
     data = walk.data
     quantities = walk.forecast.quantities
@@ -158,7 +158,7 @@ def expected_errors(
 
 
 def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], most: int) -> int | None:
-    """Return the smallest number of steps that reduces a key's error to `wanted`, or None if it is more than `most`."""
+    """Return the smallest number of steps that reduces the error of a key to `wanted`, or None if above `most`."""
 
     def suffices(count: int) -> bool:
         error = errors_after(count)[0].get(key)

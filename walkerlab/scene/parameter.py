@@ -60,7 +60,7 @@ class Parameter:
             key,
         )
 
-    def over(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
+    def vary(self, config: ContactConfig, make: Callable[[Config], R]) -> Callable[[float], R | None]:
         """Return a function from parameter values to `make(config)`, or to None if the schema rejects the value."""
 
         def make_at_value(value: float) -> R | None:
@@ -93,7 +93,7 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
-    """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg's."""
+    """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg."""
     value = value_at(config, path)
     return value_at(config, [name for name in path if name != SECOND_LEG]) if value is None else value
 
@@ -119,11 +119,11 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    # `identify` does not know legs that differ; all others may vary a key that the config leaves to the first leg
+    # `identify` does not support legs that differ; all others may vary a key that leg 2 takes from leg 1.
     left_out = SECOND_LEG in key.split(".") and asker[:1] != ("identify",)
-    why = why_no_parameter(key, config, own, stated_value if left_out else value_at)
-    if why:
-        raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {why}", _KEY_ADVICE, asker)
+    reason = why_no_parameter(key, config, own, stated_value if left_out else value_at)
+    if reason:
+        raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
     unit = annotation_of(own[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 

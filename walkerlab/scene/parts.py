@@ -14,7 +14,7 @@ from walkerlab.config.walkers import (
 )
 from walkerlab.errors import ConfigError
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
-from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, straight_legs, with_second_leg
+from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, replace_second_leg, straight_legs
 
 PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
@@ -27,7 +27,7 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
     """
     parts = legs_of(walker, rigid)
     other = second_of(walker)
-    parts = parts if other is walker else with_second_leg(parts, legs_of(other, rigid))
+    parts = parts if other is walker else replace_second_leg(parts, legs_of(other, rigid))
     torso = walker.torso
     return parts if torso is None else add_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
 

@@ -1,4 +1,4 @@
-"""Build the rigid model of a config, without anything that the config does not need."""
+"""Build the rigid model of a config, with only the parts that the config needs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, rigid_on_level_ground
-from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, with_fields
+from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.scene.footholds import foothold_heights
@@ -75,13 +75,13 @@ def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Rig
 
 
 def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
-    """Return the model with the config's push-off, hip and dampers of the knees."""
+    """Return the model with the push-off, hip spring and knee dampers of the config."""
     driven = passive.changed(**drive_parameters(config))
     first, second = knee_dampings(config.walker)
     if first == second:
         return driven.changed(knees=damper(first)) if first else driven
     models = zip((driven, driven.exchanged), (first, second), strict=True)
-    return pair(*(with_fields(model, {"knees": damper(damping)}) for model, damping in models))
+    return pair(*(replace_fields(model, {"knees": damper(damping)}) for model, damping in models))
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)
@@ -105,7 +105,7 @@ def refuse_different_legs(config: RigidConfig, request: str) -> None:
     if have_different_legs(config):
         raise ConfigError(
             f"{request} needs two equal legs, but those of this walker differ.",
-            "Leave out walker.leg_2, or ask `walkerlab report`, which shows the walk of legs that differ.",
+            "Leave out walker.leg_2, or run `walkerlab report`, which shows the walk of legs that differ.",
             ("walker",),
         )
 
@@ -118,7 +118,7 @@ def state_names(config: RigidConfig) -> tuple[str, ...]:
 def first_step_length(config: RigidConfig, start: State) -> float:
     """Return the length (m) of the rigid model's first step from a state, or half a leg if it does not complete it.
 
-    This is the reference length of a walk that starts in mid-step, where the feet are not a step apart.
+    This is the reference length of a walk that starts in mid-step, when the feet are not a step apart.
     """
     first = take_walk(rigid_walker(config), FIRST_STEP, start, 1)
     return float(first.lengths_m[0]) if first.steps else 0.5 * config.walker.leg_length_m

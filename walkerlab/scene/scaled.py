@@ -15,21 +15,19 @@ from walkerlab.scene.contact import ContactScene, start_state
 # away from boundaries between outcomes, these tolerances give the same map as the config's (docs/adjustment.md)
 MAP_RTOL = 1e-4
 MAP_ATOL = 1e-6
-LEAST_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
+MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
 
 
 def starts_of(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
-    """Build a scene's starts from a rigid start with scaled velocities. Walks must settle on the gait if it
-    is known.
-    """
-    own = None if answer.gait is None else steps_to_settle_on(answer.gait)
+    """Build starts with scaled velocities from a rigid start. Walks must settle on the contact gait if it is known."""
+    gait = None if answer.gait is None else steps_to_settle_on(answer.gait)
 
     def start(swing: float, stance: float) -> State:
         return start_state(scene, scale_rates(rigid, state, swing, stance))
 
-    starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, own)
+    starts = scaled_starts.scaled_starts(scene.walker, scene.ground, start, steps, gait)
     return replace(starts, tolerances=replace(tolerances, method=scaled_starts.START_TOLERANCES.method))
 
 
@@ -45,4 +43,4 @@ def scale_for_map(starts: scaled_starts.ScaledStarts, evaluations: int) -> scale
 
     evaluations  right-hand-side evaluations for the unchanged start; a cell's budget is a multiple of them
     """
-    return starts.coarser(MAP_RTOL, MAP_ATOL, max(LEAST_BUDGET, BUDGET_FACTOR * evaluations))
+    return starts.coarser(MAP_RTOL, MAP_ATOL, max(MIN_BUDGET, BUDGET_FACTOR * evaluations))

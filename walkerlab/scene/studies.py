@@ -1,4 +1,4 @@
-"""Studies of extensions in scenes: their walkers, and their own equations in addition to Lagrange's."""
+"""Studies that extensions add: their walkers, and their equations of motion in addition to Lagrange's."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class ModelUnderTest:
     z: Floats  # (d,) coordinates of the gait on the section
     length_m: float  # step length
 
-    def at(self, parameter: Parameter = SLOPE) -> GaitOnMap:
+    def gait_on_map(self, parameter: Parameter = SLOPE) -> GaitOnMap:
         p = parameter.value_in(self.config)
         step_map: StepMap = (
             rigid_map(self.config, parameter, 1.0)
@@ -52,14 +52,14 @@ class ModelUnderTest:
     def quick_by_leg(self) -> list[GaitOnMap]:
         """Return the gait from the start of each leg's step (once for equal legs), on a map of quick walks."""
         quick = QUICK_WALKS[self.model]
-        return [gait._replace(step_map=gait.step_map.at(quick)) for gait in self.at().by_leg()]
+        return [gait._replace(step_map=gait.step_map.replace_tolerances(quick)) for gait in self.gait_on_map().by_leg()]
 
     @property
     def units(self) -> Units:
         return unit_walker(rigid_walker(self.config))[1]
 
     def gradients(self, parameter: Parameter, selection: Collection[str]) -> dict[str, Gradient]:
-        return gradients(self.at(parameter), abs(parameter.value_in(self.config)) or 1e-2, selection)
+        return gradients(self.gait_on_map(parameter), abs(parameter.value_in(self.config)) or 1e-2, selection)
 
 
 def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
@@ -73,7 +73,7 @@ def section_coordinates(walker: RigidModel, state: Sequence[float]) -> Floats:
 def find_model_gait(
     model: str, config: ContactConfig, gait: Mapping[str, Any], note: Callable[[str], None]
 ) -> ModelUnderTest:
-    """Return a model with its gait, which for the contact model is on ground without pads.
+    """Find the gait of a model, on ground without pads for the contact model.
 
     gait  summary of `fixedpoint`
     note  receives a message about each difference from the config's scene
@@ -84,12 +84,12 @@ def find_model_gait(
     if model == RIGID:
         z = section_coordinates(rigid_walker(config), gait["state"])
         return ModelUnderTest(RIGID, config, z, length)
-    # Imported late: the rigid model does not need it.
+    # Imported late, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
-    own = SLOPE.config_at(config, config.slope_rad)
-    assert own is not None, "the config's own slope is always possible"
-    answer = gait_off_pads(own, length, as_state(gait["state"]))
+    scene_config = SLOPE.config_at(config, config.slope_rad)
+    assert scene_config is not None, "the slope of the config is always possible"
+    answer = gait_off_pads(scene_config, length, as_state(gait["state"]))
     if answer.gait is None:
         raise NoAnswer(f"no gait of the contact model: {answer.reason}", answer.advice)
     if require_contact(config).terrain == "checkerboard":

@@ -28,7 +28,7 @@ class Pads:
     """Pads on which walks ended."""
 
     pitch_m: Range  # minimum and maximum over the walks, m
-    step_m: Range | None = None  # minimum and maximum length of the walks' last steps, m; None if unknown
+    step_m: Range | None = None  # minimum and maximum length of the last steps of the walks, m; None if unknown
     laid: str = ""  # `contact.pad_pitch` in the config, if it is the same for all walks
 
 
@@ -38,7 +38,7 @@ def describe_endings(
     """Count and describe the walks that ended early, the most frequent outcome first.
 
     outcomes  number of walks by outcome; other keys are ignored
-    contact   whether the walks are the contact model's
+    contact   whether they are walks of the contact model
     pads      pads of the walks that ended off-pad
 
     Returns rows with `outcome`, `walks`, `of` (total number of walks), `ground` (whether the ground is the cause) and
@@ -49,10 +49,10 @@ def describe_endings(
     for outcome, walks in sorted(outcomes.items(), key=lambda item: -item[1]):
         ending = outcome_of(outcome)
         if ending is not None and ending is not Outcome.WALKED:
-            why = ground_causes(outcome, config, contact, pads)
+            causes = ground_causes(outcome, config, contact, pads)
             aside = "" if OUTCOME_TEXTS[ending].did == outcome else f" ({outcome})"
-            description = " ".join([f"{walks:,} of {total:,} walks {OUTCOME_TEXTS[ending].did}{aside}.", *why])
-            rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(why), "said": description})
+            description = " ".join([f"{walks:,} of {total:,} walks {OUTCOME_TEXTS[ending].did}{aside}.", *causes])
+            rows.append({"outcome": outcome, "walks": walks, "of": total, "ground": bool(causes), "said": description})
     return rows
 
 
@@ -65,12 +65,12 @@ def ground_causes(outcome: str, config: ContactConfig, contact: bool, pads: Pads
     if pads is not None:
         steps = "" if pads.step_m is None else f"; their last steps were {format_range(pads.step_m)} long"
         sentences.append(f"The pads' pitch is {format_range(pads.pitch_m)}{PITCH_SOURCES.get(pads.laid, '')}{steps}.")
-    own = "" if config.contact.pad_pitch == "own" else " or contact.pad_pitch=own"
-    return [*sentences, f"Try {ground_without_pads(config)}{own}."]
+    other_pitch = "" if config.contact.pad_pitch == "own" else " or contact.pad_pitch=own"
+    return [*sentences, f"Try {ground_without_pads(config)}{other_pitch}."]
 
 
 def ground_without_pads(config: ContactConfig) -> str:
-    """Return a setting for ground without pads: a plane for kneed walkers, whose feet clear it, or after-mid-swing."""
+    """Return the --set text for ground without pads: plane if knees clear it, otherwise after-mid-swing."""
     return f"contact.terrain={'plane' if isinstance(config.walker, Kneed) else 'after-mid-swing'}"
 
 

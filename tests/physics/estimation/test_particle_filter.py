@@ -31,7 +31,7 @@ def problem():
     planned = MeasuredWalk(np.ones(STEPS), np.ones(STEPS))
     walks = problem_of(subject, planned, question).forecast.walks
     heights = rng.normal(0.0, ROUGHNESS_M, STEPS + 1)
-    walk = walks.disturbed(subject.z, (3.0,), heights)
+    walk = walks.take_disturbed_walk(subject.z, (3.0,), heights)
     periods, lengths = (values + rng.normal(0.0, 1e-3, STEPS) for values in (walk.durations_s, walk.lengths_m))
     return problem_of(subject, MeasuredWalk(periods, lengths), question)
 
@@ -55,7 +55,9 @@ def filtered(problem, u, rng):
     floors, total = rng.normal(0.0, ROUGHNESS_M, (PARTICLES, 1)), 0.0
     for step in range(STEPS):
         floors = np.column_stack((floors, rng.normal(0.0, ROUGHNESS_M, PARTICLES)))
-        walks = [forecast.walks.disturbed(forecast.start(u), forecast.parameters(u), floor) for floor in floors]
+        walks = [
+            forecast.walks.take_disturbed_walk(forecast.start(u), forecast.parameters(u), floor) for floor in floors
+        ]
         predicted = np.array([(walk.durations_s[step], walk.lengths_m[step]) for walk in walks])
         logs = -0.5 * (((measured[step] - predicted) / NOISE) ** 2 + np.log(2.0 * np.pi * NOISE**2)).sum(axis=1)
         weights = np.exp(logs - logs.max())

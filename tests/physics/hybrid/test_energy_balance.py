@@ -25,7 +25,7 @@ FEET_ABREAST = np.array([0.875, 0.0, 0.5, 0.0, 1.0, -0.5])
 @pytest.fixture
 def nothing_explained(monkeypatch):
     """Every residual but none is too large."""
-    monkeypatch.setattr(contact_result, "UNEXPLAINED", 0.0)
+    monkeypatch.setattr(contact_result, "RESIDUAL_FACTOR", 0.0)
 
 
 def test_walk_with_inconsistent_equations_is_rejected_with_its_residual():

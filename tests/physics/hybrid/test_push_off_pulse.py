@@ -9,7 +9,7 @@ from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.motion import foot_wrench
 from walkerlab.physics.ground.pulse import pulse_force
-from walkerlab.physics.ground.walker import LOCKED, OF_BODIES, new_progress, place_on_ground
+from walkerlab.physics.ground.walker import BODY_VECTOR, LOCKED, new_progress, place_on_ground
 from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.orbits.contact_map import step_from_section
 from walkerlab.physics.orbits.fixed_point import find_gaits
@@ -90,7 +90,7 @@ def test_push_off_force_acts_from_foot_to_hip_without_moment_about_the_hip():
     system = place_on_ground(scene.walker, (False, False), progress=new_progress(steps=1))
     form, y = scene.walker.whole, np.array(start_state(scene, gait.state))
     n = int(form.bodies)
-    s, c, r = np.sin(y[2 : 2 + n]), np.cos(y[2 : 2 + n]), np.zeros(len(OF_BODIES))
+    s, c, r = np.sin(y[2 : 2 + n]), np.cos(y[2 : 2 + n]), np.zeros(len(BODY_VECTOR))
     trailing = 0
     along, upward = foot_wrench(system, 0.0025, trailing, s, c, y, r)
     hip_F = c * form.hip_x[:n] - s * form.hip_y[:n]

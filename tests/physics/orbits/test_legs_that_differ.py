@@ -9,9 +9,9 @@ from plain_unequal_walk import Leg, Segment, Walker
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.mechanics.hinges import HIP_ROW
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
-from walkerlab.physics.mechanics.rigid_model import change_slope, pair, with_fields
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, straight_legs, with_second_leg
-from walkerlab.physics.orbits.fixed_point import SearchSettings, find_gaits, with_mean_legs
+from walkerlab.physics.mechanics.rigid_model import change_slope, pair, replace_fields
+from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, replace_second_leg, straight_legs
+from walkerlab.physics.orbits.fixed_point import SearchSettings, average_legs, find_gaits
 from walkerlab.physics.orbits.gradients import gait_quantities, gradients
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import EXACT_STEPS, RigidMap, states_on_section
@@ -70,11 +70,11 @@ def assembly(leg, hip_mass):
 
 def model_of(plain):
     first, second = (assembly(leg, plain.hip_mass) for leg in plain.legs)
-    model = rigid_on_slope(with_second_leg(first, second), plain.gravity, plain.slope)
+    model = rigid_on_slope(replace_second_leg(first, second), plain.gravity, plain.slope)
     if not any(plain.knee_damping):
         return model
     models = zip((model, model.exchanged), plain.knee_damping, strict=True)
-    return pair(*(with_fields(each, {"knees": (0.0, damping, 0.0)}) for each, damping in models))
+    return pair(*(replace_fields(each, {"knees": (0.0, damping, 0.0)}) for each, damping in models))
 
 
 def legs_of(state):
@@ -168,10 +168,10 @@ def test_a_damped_knee_takes_work_that_the_hip_does_not():
 
 def test_the_mean_of_two_legs_is_one_walker_of_equal_legs():
     walker = model_of(draw_walker("round", 7))
-    even = with_mean_legs(walker, 0.0)
+    even = average_legs(walker, 0.0)
     assert not even.legs_differ
-    assert even == with_mean_legs(walker.exchanged, 0.0)
-    np.testing.assert_array_equal(with_mean_legs(walker, 1.0).A, walker.A)
+    assert even == average_legs(walker.exchanged, 0.0)
+    np.testing.assert_array_equal(average_legs(walker, 1.0).A, walker.A)
 
 
 @pytest.mark.parametrize(("damping", "slope", "walks"), [
@@ -208,7 +208,7 @@ def test_each_legs_disturbed_steps_are_those_of_plain_integration(kind):
         model = model_of(plain) if gait.leg == 1 else model_of(plain).exchanged
         start = states_on_section(model, np.array(gait.z) / [1.0, *[gait.units.time] * 2])
         rises = (2e-3 * gait.units.length, -5e-4 * gait.units.length)
-        walk = gait.step_map.disturbed(gait.z, gait.p, np.append(0.0, np.cumsum(rises)), swing=gait.swing)
+        walk = gait.step_map.take_disturbed_walk(gait.z, gait.p, np.append(0.0, np.cumsum(rises)), swing=gait.swing)
         steps, end = plain.stride(start, rises, gait.leg - 1)
         np.testing.assert_allclose(np.transpose([walk.durations_s, walk.lengths_m]), steps, rtol=1e-9)
         np.testing.assert_allclose(walk.z / [1.0, *[gait.units.time] * 2], end[1:], atol=1e-9)

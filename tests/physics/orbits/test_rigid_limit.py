@@ -8,7 +8,7 @@ import pytest
 
 from walkerlab.config.loader import load
 from walkerlab.physics.orbits.contact_gait import scale_laws
-from walkerlab.physics.orbits.contact_map import OwnPads
+from walkerlab.physics.orbits.contact_map import AdaptivePads
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.physics.orbits.rigid_limit import (
     ALL_POINT_SERIES,
@@ -80,7 +80,7 @@ def test_gait_with_push_off_converges_to_the_rigid_one_in_first_order():
     scene, found = contact_scene(config, rigid.step_length), gait_off_pads(config, rigid.step_length, rigid.state)
 
     def off(walker, gait):
-        pads = OwnPads(lambda _: walker, scene.ground, solver_settings(1e-10), rigid.step_length)
+        pads = AdaptivePads(lambda _: walker, scene.ground, solver_settings(1e-10), rigid.step_length)
         near = gait_near(pads, gait.z, 0.0, SERIES_EFFORT)
         return near, abs(near.step.period_s - rigid.period) if isinstance(near, Cycle) else np.inf
 

@@ -43,7 +43,7 @@ def standpoint(name, key="slope_rad", tolerances=EXACT_STEPS, changes=()):
     z = np.array(find_gaits(walker).gait.state)[walker.section[: walker.coordinates]]
     z[1:] *= units.time
     parameter = parameter_of(key, config)
-    step_map, p = rigid_map(config, parameter, 1.0).at(tolerances), parameter.value_in(config)
+    step_map, p = rigid_map(config, parameter, 1.0).replace_tolerances(tolerances), parameter.value_in(config)
     return GaitOnMap(step_map, p, z, step_map.step(z, p).DP, units)
 
 

@@ -9,7 +9,7 @@ import pytest
 from walkerlab.config import loader
 from walkerlab.evidence.paper.appendix_a import AS_PRINTED, CORRECTED, RigidWalker, assembled
 from walkerlab.outcome import Outcome
-from walkerlab.physics.orbits.contact_map import OwnPads, step_from_section
+from walkerlab.physics.orbits.contact_map import AdaptivePads, step_from_section
 from walkerlab.physics.orbits.fixed_point import find_gaits as find_gaits_of_model
 from walkerlab.physics.orbits.newton import Effort, newton
 from walkerlab.physics.orbits.rigid_map import RigidMap
@@ -137,7 +137,7 @@ def test_newton_converges_quadratically_on_the_contact_step_map(scene):
     tolerances = Tolerances("radau5", 1e-11, 1e-13, 10**6)
 
     def moves(tolerance):
-        pads = OwnPads(lambda _: scene.walker, scene.ground, tolerances, PITCH)
+        pads = AdaptivePads(lambda _: scene.walker, scene.ground, tolerances, PITCH)
         found = newton(lambda z: walk_steps(pads, z, 0.0, 1).mismatch(), NEAR_THE_GAIT + ASIDE, Effort(tolerance))
         return found.corrections, found.evaluated.residual
 

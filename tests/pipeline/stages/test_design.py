@@ -170,7 +170,7 @@ def contact_gait(name):
     walker = rigid_walker(config, config.equations)
     gait = find_gaits(walker).gait
     told = {"state": gait.state, "step_length_m": gait.step_length}
-    here = find_model_gait("contact", config, told, Silent().note).at()
+    here = find_model_gait("contact", config, told, Silent().note).gait_on_map()
     found = gait_off_pads(config, gait.step_length, gait.state).gait
     return config, gait, found.step, gait_quantities(here, ["cost_of_transport"])["cost_of_transport"]
 

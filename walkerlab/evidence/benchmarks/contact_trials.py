@@ -23,6 +23,6 @@ def contact_trial(
 def stiff_ground_trial(config: ContactConfig, state: State, length_m: float, steps: int) -> ContactTrial:
     """Set up a walk that is harder to integrate: on much stiffer ground with less creep."""
     trial = contact_trial(config, state, length_m, steps)
-    friction = trial.walker.friction.with_creep(CREEP_FACTOR)
+    friction = trial.walker.friction.scale_creep(CREEP_FACTOR)
     normal = trial.walker.normal.stiffen(STIFFNESS_FACTOR, STIFFNESS_FACTOR, 1.0)
     return replace(trial, walker=trial.walker._replace(normal=normal, friction=friction), name="contact-near-rigid")

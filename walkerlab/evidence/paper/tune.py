@@ -291,7 +291,7 @@ def gait_summary(tune: TuneRun) -> dict[str, Any]:
         "residual": gait.residual,
         "lost_J": losses_by_channel(tune.scene.walker, step.dissipated_J),
         "height_lost_J": step.driven.gravity,
-        "work_per_step_J": step.driven.per_step(1),
+        "work_per_step_J": step.driven.work_per_step(1),
         "cost_of_transport": step.driven.cost_of_transport(step.length_m),
         "balance_J": float(step.dissipated_J.sum() - step.driven.net_work),
     }

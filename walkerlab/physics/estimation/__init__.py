@@ -1,8 +1,8 @@
 """Estimation of a walker from a measured walk: prediction of steps and angles, likelihood, fit, and uncertainty.
 
-Steps follow z' = P(z; p) + w with the step map P. The disturbances w come from the floor's heights, the random effects:
-they are independent and normally distributed about the slope, and one height affects periods and lengths of several
-steps. Each measured quantity has noise of a certain standard deviation. Linearised about the walk over the most
+Steps follow z' = P(z; p) + w with the step map P. The disturbances w come from the heights of the floor. These are the
+random effects: independent and normally distributed about the slope, and each affects the periods and lengths of
+several steps. Each measured quantity has noise of a certain standard deviation. Linearised about the walk over the most
 probable heights, the measured values y are
 
     y = f(p, z0; h) + G h + v,   h ~ N(0, roughness^2),   v ~ N(0, noise^2)

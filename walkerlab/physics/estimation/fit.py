@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import cached_property
 from typing import Final, Literal, NamedTuple
 
@@ -27,22 +28,27 @@ from walkerlab.physics.solvers.system import Floats
 
 Loss = Literal["linear", "soft_l1"]
 MAX_ROUNDS: Final = 25
-FREE_ROUNDS: Final = 10  # rounds after which noise and heights keep to the middle of two that lead to each other
-MIN_LIKELIHOOD_GAIN: Final = 3.0  # largest difference of the log-likelihoods of such two
-SETTLED_NOISE: Final = 1e-2  # largest relative change of a settled standard deviation
-SETTLED_LIKELIHOOD: Final = 1e-2  # largest change of the restricted log-likelihood for standard deviations as likely
-SETTLED_MOVE: Final = 0.1  # largest change of a settled unknown, in standard errors
+# From this round on, heights are averaged with those of the round before, and the noise keeps its value unless the
+# likelihood rises by at least MIN_LIKELIHOOD_GAIN: otherwise two estimates could lead to each other forever.
+FREE_ROUNDS: Final = 10
+MIN_LIKELIHOOD_GAIN: Final = 3.0
+# A standard deviation has converged when it changes by less than this (relative), or when the restricted
+# log-likelihood rises by less than LIKELIHOOD_TOLERANCE.
+NOISE_TOLERANCE: Final = 1e-2
+LIKELIHOOD_TOLERANCE: Final = 1e-2
+# change of a converged unknown, in standard errors
+MOVE_TOLERANCE: Final = 0.1
 FIRST_NOISE: Final = 0.02  # noise before the first fit, as a fraction of a quantity's typical size
 # smallest noise, as a fraction of a quantity's typical size; noise-free measurements are given this noise
 NOISE_FLOOR: Final = 1e-6
 NO_WALK: Final = 1e3  # whitened residual if the walk cannot be predicted
-NO_NEIGHBOURS: Final = "the predicted walk, or one with slightly changed parameters, ends before the last measured step"
 HEIGHT_SHARES: Final = (1.0, 0.5, 0.0)
 EVALUATIONS: Final = 12  # maximum number of evaluations per round
-SETTLED_FIT: Final = 1e-6  # relative change of the cost, or of the unknowns, that ends a round
+# a round ends when the cost or the unknowns change by less than this (relative)
+FIT_TOLERANCE: Final = 1e-6
 SAME_DERIVATIVES: Final = 1e-2  # derivatives are kept until a scaled unknown has changed by this much
 BOUND_MARGIN: Final = 1e-9  # minimum distance of a scaled unknown from its bounds at the start of a round
-# prior standard deviation of each scaled unknown about its start, which keeps undetermined combinations there
+# standard deviation of a weak prior about the start for each scaled unknown; it holds undetermined combinations there
 WEAK_PRIOR: Final = 1.0
 # efficiency of the soft_l1 loss for normal noise: E[psi']^2 / E[psi^2] with psi(x) = x / sqrt(1 + x^2)
 SOFT_EFFICIENCY: Final = 0.9268
@@ -67,7 +73,7 @@ class FitProblem:
         rounding = [resolution.get(name, 0.0) / math.sqrt(12.0) for name in self.forecast.quantities]
         return np.maximum(NOISE_FLOOR * sizes, rounding)
 
-    def first(self) -> Floats:
+    def initial_unknowns(self) -> Floats:
         """Return the scaled unknowns (unknowns,) at the start."""
         u = np.zeros(self.forecast.unknowns)
         u[: self.forecast.scales.size] = np.array(self.start) / self.forecast.scales
@@ -76,17 +82,27 @@ class FitProblem:
     def limits(self) -> tuple[Floats, Floats]:
         """Return lower and upper bounds (unknowns,) of the scaled unknowns."""
         low, high = (np.full(self.forecast.unknowns, sign * np.inf) for sign in (-1.0, 1.0))
-        for place, (least, most) in enumerate(self.bounds):
-            low[place], high[place] = np.array((least, most)) / self.forecast.scales[place]
+        for index, (lowest, highest) in enumerate(self.bounds):
+            low[index], high[index] = np.array((lowest, highest)) / self.forecast.scales[index]
         return low, high
 
     def prior_rows(self, u: Floats) -> Floats:
         """Return whitened residuals and derivatives (priors, 1 + unknowns) of the priors."""
         rows = np.zeros((len(self.priors), 1 + u.size))
-        for row, (place, (value, sigma)) in zip(rows, self.priors.items(), strict=True):
-            scale = self.forecast.scales[place]
-            row[0], row[1 + place] = (value - u[place] * scale) / sigma, scale / sigma
+        for row, (index, (value, sigma)) in zip(rows, self.priors.items(), strict=True):
+            scale = self.forecast.scales[index]
+            row[0] = (value - u[index] * scale) / sigma
+            row[1 + index] = scale / sigma
         return rows
+
+
+class FitEnd(Enum):
+    """How a fit ended. The value is the reason if it did not converge, with the maximum number of walks to insert."""
+
+    CONVERGED = ""
+    STILL_CHANGES = "standard deviations still change"
+    WALK_FAILS = "the predicted walk, or one with slightly changed parameters, ends before the last measured step"
+    OUT_OF_WALKS = "the budget of {} predicted walks is exhausted (identify.max_walks)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +114,12 @@ class Fitted:
     evaluation: Evaluation
     data: Linearised
     predicted: Prediction  # walk over even ground, from the most probable start
-    why: str = ""  # reason why it did not converge; empty if it did
+    end: FitEnd = FitEnd.CONVERGED
+
+    @property
+    def reason(self) -> str:
+        """Reason why the fit did not converge, or '' if it did."""
+        return self.end.value.format(self.problem.max_walks)
 
     @property
     def forecast(self) -> Forecast:
@@ -124,8 +145,8 @@ class Fitted:
         return self.noise.measurement * (math.sqrt(SOFT_EFFICIENCY) if self.problem.loss == "soft_l1" else 1.0)
 
 
-def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambda: None) -> Fitted | str:
-    """Fit the unknowns from a start (unknowns,), or return the reason if no walk near the start can be predicted.
+def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambda: None) -> Fitted | None:
+    """Fit the unknowns from a start (unknowns,), or return None if no walk near the start can be predicted.
 
     Each round fits the unknowns by least squares on whitened residuals, then the standard deviations.
     """
@@ -134,11 +155,11 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
     even = np.zeros(forecast.heights)
     noise = Noise(FIRST_NOISE * typical_sizes(forecast), 0.0)
     heights = even
-    why = "standard deviations still change"
+    end = FitEnd.STILL_CHANGES
     data = linearise(problem, u, heights)
     disturbances = heights
     if data is None:
-        return NO_NEIGHBOURS
+        return None
     robust = None
     for done in range(MAX_ROUNDS):
         on_round()
@@ -146,12 +167,12 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
         u = least_squares_fit(problem, u, start, heights, data, noise)
         data = None if forecast.predict(u, even) is None else linearise(problem, u, disturbances, robust=robust)
         if data is None:
-            # The data pull the walker out of its basin of attraction: judge the last walk that did not end early.
+            # The data pull the walker out of its basin of attraction. The last completed walk is judged instead.
             u = before
-            why = NO_NEIGHBOURS
+            end = FitEnd.WALK_FAILS
             data = linearise(problem, u, disturbances, robust=robust)
         if data is None:
-            return NO_NEIGHBOURS
+            return None
         rows = reduce(data)
         earlier = noise
         noise = estimate_noise(rows, problem.floors, problem.leg_length_m, noise)
@@ -161,23 +182,23 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
         robust = robust_at(rows, noise)
         disturbances = most_probable_disturbances(rows, noise, evaluation.move)
         likeliest = disturbances[: heights.size]
-        heights = passable(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
+        heights = reduce_heights(problem, u, likeliest if done < FREE_ROUNDS else 0.5 * (heights + likeliest))
         disturbances[: heights.size] = heights
-        if why == NO_NEIGHBOURS:
+        if end is FitEnd.WALK_FAILS:
             break
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(evaluation.information, hermitian=True)), 1e-300))
         moved = float(np.max(np.abs(u - before) / errors))
-        if moved < SETTLED_MOVE and has_settled(rows, earlier, noise, problem.leg_length_m):
-            why = ""
+        if moved < MOVE_TOLERANCE and noise_has_converged(rows, earlier, noise, problem.leg_length_m):
+            end = FitEnd.CONVERGED
             break
         if forecast.walks_taken > problem.max_walks:
-            why = f"the budget of {problem.max_walks} predicted walks is exhausted (identify.max_walks)"
+            end = FitEnd.OUT_OF_WALKS
             break
     data = linearise(problem, u, disturbances, True, robust) or linearise(problem, u, disturbances, robust=robust)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
-        return NO_NEIGHBOURS
-    return Fitted(problem, u, disturbances, noise, evaluate(reduce(data), noise), data, predicted, why)
+        return None
+    return Fitted(problem, u, disturbances, noise, evaluate(reduce(data), noise), data, predicted, end)
 
 
 def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
@@ -200,8 +221,8 @@ def evaluate_at(u: Floats, like: Fitted) -> Fitted | None:
     )
 
 
-def passable(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
-    """Return the heights, reduced if the walk over them ends early."""
+def reduce_heights(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
+    """Return the heights, or a fraction of them if the walk over the full heights ends early."""
     shares = (share for share in HEIGHT_SHARES if problem.forecast.predict(u, share * heights) is not None)
     return next(shares, 0.0) * heights
 
@@ -212,14 +233,14 @@ def halfway(before: Noise, after: Noise) -> Noise:
     return Noise(middle, *(0.5 * (before.process + after.process)).tolist())
 
 
-def has_settled(rows: Reduced, before: Noise, after: Noise, leg_length_m: float) -> bool:
+def noise_has_converged(rows: Reduced, before: Noise, after: Noise, leg_length_m: float) -> bool:
     """Whether standard deviations have stopped changing, or change without becoming likelier."""
-    same = np.all(np.abs(np.log(after.measurement / before.measurement)) < SETTLED_NOISE)
+    same = np.all(np.abs(np.log(after.measurement / before.measurement)) < NOISE_TOLERANCE)
     change = np.abs(after.process - before.process)
-    least = 1e-7 * np.array((leg_length_m, 1.0))
-    if same and np.all(change < SETTLED_NOISE * np.maximum(after.process, least)):
+    negligible = 1e-7 * np.array((leg_length_m, 1.0))
+    if same and np.all(change < NOISE_TOLERANCE * np.maximum(after.process, negligible)):
         return True
-    return gain_of(rows, before, after) < SETTLED_LIKELIHOOD
+    return gain_of(rows, before, after) < LIKELIHOOD_TOLERANCE
 
 
 def gain_of(rows: Reduced, before: Noise, after: Noise) -> float:
@@ -239,8 +260,8 @@ def linearise(
 ) -> Linearised | None:
     """Linearise the prediction at u (unknowns,) and the disturbances, or return None if a walk ends early.
 
-    disturbances  heights (m), then kicks if they are known; the walk goes over these heights, without kicks
-    robust        how a robust loss trims the residuals; None leaves them whole
+    disturbances  heights (m), then any known kicks. The walk is predicted over these heights but without kicks
+    robust        scatter for trimming the residuals with a robust loss, or None to leave them unchanged
     """
     forecast = problem.forecast
     heights = disturbances[: problem.forecast.heights]
@@ -277,7 +298,7 @@ def trim(residuals: Floats, quantity: NDArray[np.int64], robust: Robust) -> Floa
 
 
 class Robust(NamedTuple):
-    """Scatter of each quantity, and how much of its noise a fit absorbs, as a robust loss needs them."""
+    """Scatter of each quantity, and the share of its noise that the fit absorbs, for a robust loss."""
 
     scatter: Floats  # (quantities,) standard deviation of values without outliers
     absorbed: Floats  # (quantities,) share of the noise's variance that the fitted unknowns and floor absorb
@@ -288,7 +309,8 @@ def robust_at(rows: Reduced, noise: Noise) -> Robust:
     unknowns = rows.unknowns
     disturbed = spread > 0.0
     columns = np.column_stack((rows.fixed[:, 1:], rows.G[:, disturbed])) / noise.measurement[rows.quantity][:, None]
-    informations = np.array([own.T @ own for own in (columns[rows.quantity == q] for q in range(rows.sizes.size))])
+    blocks = [columns[rows.quantity == q] for q in range(rows.sizes.size)]
+    informations = np.array([block.T @ block for block in blocks])
     whole = informations.sum(axis=0)
     whole[:unknowns, :unknowns] += rows.prior[1:, 1:]
     whole[unknowns:, unknowns:] += np.diag(spread[disturbed] ** -2.0)
@@ -304,24 +326,26 @@ def least_squares_fit(
 
     forecast = problem.forecast
     low_high = problem.limits()
+    # SciPy refuses a start on a bound, where the last round may have ended.
     inside = np.clip(u, low_high[0] + BOUND_MARGIN, low_high[1] - BOUND_MARGIN)
     whiten = whitening(data, noise)
+    # Derivatives cost one walk per parameter, so the last ones serve as long as the unknowns have hardly moved.
     known = (inside, data.J)
     offset = forecast.values - data.trimmed + data.G[:, : heights.size] @ heights
 
     def residuals(x: Floats) -> Floats:
         prediction = forecast.predict(x, heights)
-        own = np.full(offset.size, NO_WALK) if prediction is None else whiten(offset - prediction.values)
-        return np.concatenate((own, problem.prior_rows(x)[:, 0], (start - x) / WEAK_PRIOR))
+        data_rows = np.full(offset.size, NO_WALK) if prediction is None else whiten(offset - prediction.values)
+        return np.concatenate((data_rows, problem.prior_rows(x)[:, 0], (start - x) / WEAK_PRIOR))
 
     def jacobian(x: Floats) -> Floats:
         nonlocal known
         if np.abs(x - known[0]).max() > SAME_DERIVATIVES:
             derivatives = forecast.differentiate(x, heights, exact=False, disturbed=False)
             known = x.copy(), np.zeros((offset.size, x.size)) if derivatives is None else derivatives[0]
-        own = -whiten(known[1])
-        return np.vstack((own, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
+        data_rows = -whiten(known[1])
+        return np.vstack((data_rows, -problem.prior_rows(x)[:, 1:], -np.eye(x.size) / WEAK_PRIOR))
 
-    settings = {"max_nfev": EVALUATIONS, "xtol": SETTLED_FIT, "ftol": SETTLED_FIT}
+    settings = {"max_nfev": EVALUATIONS, "xtol": FIT_TOLERANCE, "ftol": FIT_TOLERANCE}
     result = least_squares(residuals, inside, jacobian, low_high, **settings)
     return np.asarray(result.x)

@@ -37,7 +37,7 @@ def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
     """Marginalise information (unknowns, unknowns) to the parameters, its first rows. Noise levels count as known."""
-    reduced = free_the_rest(whole, len(keys))
+    reduced = marginalise(whole, len(keys))
     sizes, vectors = np.linalg.eigh(reduced)
     order = np.argsort(sizes)[::-1]
     singular = np.sqrt(np.maximum(sizes[order], 0.0))
@@ -74,10 +74,11 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     def evaluate_at(logs: Floats) -> Evaluation:
         return evaluate(fitted.rows, noise_at(logs, sources))
 
+    # The seed is fixed, so that the same walk always gives the same error.
     draws = np.random.default_rng(0).uniform(-1.0, 1.0, (NOISE_DRAWS, centre.size))
     logs = centre + np.where(draws < 0.0, *(draws * reach for reach in noise_reach(evaluate_at, centre)))
     drawn = evaluate_at(logs)
-    inverses = np.linalg.pinv(basis @ free_the_rest(drawn.information, count) @ basis.T, hermitian=True)
+    inverses = np.linalg.pinv(basis @ marginalise(drawn.information, count) @ basis.T, hermitian=True)
     moved = drawn.move[:, :count] @ basis.T
     covariances = inverses + moved[:, :, None] * moved[:, None, :]
     weights = np.exp(drawn.restricted - drawn.restricted.max())
@@ -91,16 +92,17 @@ def noise_reach(evaluate_at: Callable[[Floats], Evaluation], centre: Floats) -> 
     above = likelihoods[1 : 1 + centre.size]
     below = likelihoods[1 + centre.size :]
     curvatures = (2.0 * likelihoods[0] - above - below) / NOISE_LOG_STEP**2
+    # three standard deviations of a normal distribution with this curvature
     spread = 3.0 / np.sqrt(np.maximum(curvatures, 1e-6))
     return np.minimum(spread, FARTHEST_NOISE[0]), np.minimum(spread, FARTHEST_NOISE[1])
 
 
-def free_the_rest(information: Floats, count: int) -> Floats:
+def marginalise(information: Floats, count: int) -> Floats:
     """Return the information (..., count, count) on the first unknowns if the others are free (Schur complement)."""
-    own = information[..., :count, :count]
+    kept = information[..., :count, :count]
     cross = information[..., :count, count:]
     rest = information[..., count:, count:]
-    return np.asarray(own - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.swapaxes(-1, -2))
+    return np.asarray(kept - cross @ np.linalg.pinv(rest, hermitian=True) @ cross.swapaxes(-1, -2))
 
 
 def is_open(singular: Floats) -> NDArray[np.bool_]:
@@ -121,11 +123,11 @@ def open_combinations(information: Information) -> tuple[tuple[Unidentifiable, .
         moved = (np.abs(direction) * information.scales > errors) & (errors > 0.0)
         parts = [(information.keys[k], float(signed[k])) for k in order if moved[k] or abs(signed[k]) >= LOADED]
         keys |= {key for key, _ in parts}
-        named.append(Unidentifiable(combination_in_words(parts), reason_in_words(value, largest)))
+        named.append(Unidentifiable(describe_combination(parts), describe_reason(value, largest)))
     return tuple(named), keys
 
 
-def combination_in_words(parts: list[tuple[str, float]]) -> str:
+def describe_combination(parts: list[tuple[str, float]]) -> str:
     """Describe which parameters change together, and by which fraction of its scale each of them changes."""
     if len(parts) == 1:
         return parts[0][0]
@@ -134,7 +136,7 @@ def combination_in_words(parts: list[tuple[str, float]]) -> str:
     return " and ".join(up) + (f" up, {' and '.join(down)} down" if down else " together")
 
 
-def reason_in_words(value: float, largest: float) -> str:
+def describe_reason(value: float, largest: float) -> str:
     if value <= LOST_SHARE * largest:
         return "the walk does not change with this combination"
     return f"changing it by its whole size moves the walk by only {value:.2g} standard deviations of the data"
@@ -146,12 +148,12 @@ def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
     quantities = fitted.forecast.quantities
     if not len(basis):
         return dict.fromkeys(quantities, 0.0)
-    whole = np.diag(basis @ free_the_rest(fitted.evaluation.information, count) @ basis.T)
+    whole = np.diag(basis @ marginalise(fitted.evaluation.information, count) @ basis.T)
     losses = []
-    for place in range(len(quantities)):
+    for index in range(len(quantities)):
         noise = fitted.noise.measurement.copy()
-        noise[place] *= 1e6
+        noise[index] *= 1e6
         without = evaluate(fitted.rows, fitted.noise._replace(measurement=noise)).information
-        left = np.diag(basis @ free_the_rest(without, count) @ basis.T)
-        losses.append(float(np.mean(1.0 - np.clip(left / whole, 0.0, 1.0))))
+        remaining = np.diag(basis @ marginalise(without, count) @ basis.T)
+        losses.append(float(np.mean(1.0 - np.clip(remaining / whole, 0.0, 1.0))))
     return dict(zip(quantities, losses, strict=True))

@@ -16,14 +16,16 @@ from walkerlab.physics.estimation.result import Fit
 from walkerlab.physics.solvers.system import Floats
 
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
-ROUGHEST: Final = 0.02  # largest roughness, as a fraction of the leg length
+MAX_ROUGHNESS: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
 SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; the residual of a missed heel strike is far larger
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
 PHASE_BINS: Final = 20
 UNUSUALLY_ROUGH: Final = 0.003  # fraction of the leg length; the floor of a laboratory is rough by about 0.001
 UNUSUAL_KICK: Final = 0.05  # fraction of the rates
-DEPENDENT: Final = 2.4  # largest acceptable scatter of averaged residuals, as a normal deviate: 0.8 % of right walks
+# largest acceptable scatter of averaged residuals, as a normal deviate; 0.8 % of walks that the model explains exceed
+# it
+MAX_DEPENDENCE: Final = 2.4
 
 
 def judge(fitted: Fitted) -> tuple[Fit, tuple[str, ...]]:
@@ -43,22 +45,27 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
                 "misfit",
                 f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.0f} % of its size",
             )
-    if fitted.why:
-        return "not-converged", fitted.why
-    if fitted.noise.roughness_m > ROUGHEST * fitted.problem.leg_length_m:
+    if fitted.reason:
+        return "not-converged", fitted.reason
+    if fitted.noise.roughness_m > MAX_ROUGHNESS * fitted.problem.leg_length_m:
         return "misfit", f"only a floor {1e3 * fitted.noise.roughness_m:.3g} mm rough could explain the steps"
     white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
     steps = forecast.measured.count
-    for place, quantity in enumerate(forecast.channels):
-        own = white[place * steps : (place + 1) * steps]
+    for index, quantity in enumerate(forecast.channels):
+        residuals = white[index * steps : (index + 1) * steps]
         name = name_and_unit(quantity)[0]
-        worst = int(np.argmax(np.abs(own)))
-        spread = float(np.median(np.abs(own))) * 1.4826 or 1.0
-        large = abs(own[worst]) * fitted.noise.measurement[place] > SMALLEST_OUTLIER * sizes[place]
-        if large and abs(own[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
-            times = abs(own[worst]) / spread
-            return "misfit", f"the {name} of step {worst + 1} is off by {times:.2g} times the others' scatter"
-        if (alternation := alternation_of(own)) > ALTERNATION:
+        worst = int(np.argmax(np.abs(residuals)))
+        # The median is robust: 1.4826 times it is the standard deviation of normal residuals, however large the
+        # outliers are.
+        spread = float(np.median(np.abs(residuals))) * 1.4826 or 1.0
+        large = abs(residuals[worst]) * fitted.noise.measurement[index] > SMALLEST_OUTLIER * sizes[index]
+        if large and abs(residuals[worst]) > OUTLIER * max(spread, 0.3) and steps > 4:
+            times = abs(residuals[worst]) / spread
+            return (
+                "misfit",
+                f"the {name} of step {worst + 1} deviates by {times:.2g} times the scatter of the other steps",
+            )
+        if (alternation := alternation_of(residuals)) > ALTERNATION:
             reason = f"the {name} alternates from step to step by {alternation:.2g} standard deviations: a limp"
             return "misfit", reason
     if forecast.measured.sampled:
@@ -69,7 +76,7 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
 
 
 def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
-    """Yield what is wrong with a floor that is rougher than floors are, or with large kicks."""
+    """Yield a reason to doubt the fit if the floor is implausibly rough, and another if kicks are large."""
     roughness = fitted.noise.roughness_m
     leg = fitted.problem.leg_length_m
     if roughness > UNUSUALLY_ROUGH * leg:
@@ -85,7 +92,7 @@ def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
 
 
 def dependent_residuals(fitted: Fitted) -> Iterator[str]:
-    """Yield how much more the residuals' averages over half steps scatter than independent noise allows."""
+    """Yield a reason to doubt the errors if averages over half steps scatter more than independent noise allows."""
     # Angles compared at fractions of steps inherit the errors of the measured heel strikes.
     measured = fitted.forecast.measured
     if not measured.sampled or fitted.forecast.in_phase:
@@ -96,9 +103,9 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     sums = np.array([np.bincount(half, leg) for leg in white.T])[:, counts > 0]
     squares = float((sums**2 / counts[counts > 0]).sum())
     freedom = max(1, sums.size - fitted.u.size)
-    if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > DEPENDENT:
+    if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > MAX_DEPENDENCE:
         yield (
-            f"residuals of successive angles go together (averages over half a step scatter "
+            f"residuals of successive angles are correlated (averages over half a step scatter "
             f"{math.sqrt(squares / freedom):.2g} times as much as independent noise allows)"
         )
 
@@ -123,6 +130,7 @@ def phase_means(fitted: Fitted) -> Floats:
     """Return the angles' mean residual (phases, 2) at each phase over the most probable floor, swing leg first."""
     measured = fitted.forecast.measured
     residuals = fitted.residuals[-measured.angles_rad.size :].reshape(-1, 2)
+    # The legs exchange roles at every heel strike.
     swaps = measured.step % 2 == 1
     residuals = np.where(swaps[:, None], residuals[:, ::-1], residuals)
     bins = np.minimum((PHASE_BINS * measured.phase).astype(int), PHASE_BINS - 1)

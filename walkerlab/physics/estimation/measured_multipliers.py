@@ -8,7 +8,7 @@ from walkerlab.physics.estimation.fit import Fitted
 from walkerlab.physics.estimation.result import MeasuredRadius
 from walkerlab.physics.solvers.system import Floats
 
-FEWEST_STEPS = 8
+MIN_STEPS = 8
 REPLICATES = 400
 
 
@@ -21,6 +21,7 @@ def spectral_radius(steps: Floats) -> Floats:
     """
     before, after = steps[..., :-1, :], steps[..., 1:, :]
     before, after = (each - each.mean(axis=-2, keepdims=True) for each in (before, after))
+    # In units of its own scatter, no quantity is lost in the pseudo-inverse, whatever its unit.
     scale = np.sqrt(np.mean(before**2, axis=-2, keepdims=True))
     before, after = before / scale, after / scale
     products = np.swapaxes(before, -1, -2) @ before
@@ -28,28 +29,28 @@ def spectral_radius(steps: Floats) -> Floats:
     return np.asarray(np.abs(np.linalg.eigvals(step)).max(axis=-1))
 
 
-def measure_radius(fitted: Fitted, own: float) -> MeasuredRadius | None:
+def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | None:
     """Measure the spectral radius from periods, lengths and angles of successive steps, or None for fewer than 8 steps.
 
     Bias and standard error are those of the same estimate for walks of the fitted model, with its disturbances and its
     noise, whose spectral radius is known.
 
-    own  spectral radius of the fitted walker
+    fitted_radius  spectral radius of the fitted walker
     """
     forecast = fitted.forecast
     rng = np.random.default_rng(0)
     count = forecast.measured.count
     channels = len(forecast.channels)
-    if count < FEWEST_STEPS or not channels:
+    if count < MIN_STEPS or not channels:
         return None
 
-    def by_step(values: Floats) -> Floats:
+    def reshape_by_step(values: Floats) -> Floats:
         return np.swapaxes(values[..., : count * channels].reshape(*values.shape[:-1], channels, count), -1, -2)
 
     spread = fitted.data.spread(fitted.noise)
     noise = fitted.noise.measurement[forecast.quantity]
     disturbed = (rng.normal(size=(REPLICATES, spread.size)) * spread) @ fitted.data.G.T
     replicates = fitted.predicted.values + disturbed + rng.normal(size=(REPLICATES, noise.size)) * noise
-    plain = float(spectral_radius(by_step(forecast.values)))
-    simulated = spectral_radius(by_step(replicates))
-    return MeasuredRadius(plain, plain + own - float(simulated.mean()), float(simulated.std(ddof=1)))
+    plain = float(spectral_radius(reshape_by_step(forecast.values)))
+    simulated = spectral_radius(reshape_by_step(replicates))
+    return MeasuredRadius(plain, plain + fitted_radius - float(simulated.mean()), float(simulated.std(ddof=1)))

@@ -19,10 +19,12 @@ from walkerlab.physics.solvers.system import Floats
 
 NOISE_FACTORS: Final = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 DISTURBANCES: Final = (1e-5, 1e-4, 1e-3, 1e-2)
-"""Candidate starts of the search: factors on the measurement noise so far; roughness as a fraction of the leg length,
-and kicks as a fraction of the rates."""
-DISTURBANCE_BOUNDS: Final = (1e-8, 0.2)  # the same fractions
-NEARLY_NONE: Final = 1e-5  # the same; a smaller disturbance may be none
+"""Candidate starts of the search: multiples of the current measurement noise, and disturbances as fractions, roughness
+of the leg length and kicks of the rates."""
+# bounds on roughness and kicks, as the same fractions
+DISTURBANCE_BOUNDS: Final = (1e-8, 0.2)
+# the same fraction; a smaller disturbance cannot be told from none
+NEGLIGIBLE_DISTURBANCE: Final = 1e-5
 NOISE_RATIO: Final = 1.0
 """Prior standard deviation of the logarithm of the quantities' relative noises.
 
@@ -33,10 +35,11 @@ about one standard error away from zero where noise and floor cannot be separate
 Source: Chung et al., A nondegenerate penalized likelihood estimator for variance parameters in multilevel models,
 Psychometrika 78 (2013).
 """
-MOST_NUMBERS: Final = 4_000_000  # of the matrices of all noise levels that are evaluated together
+# of all noise levels that are evaluated together, which limits the memory
+MAX_MATRIX_ENTRIES: Final = 4_000_000
 ROUNDING: Final = 1e-14  # relative rounding error of a covariance
-LEAST_GAINS: Final = (1e-6, 0.5)
-"""Gains of the log-likelihood up to which a walk without heights, or without kicks, is the better explanation."""
+MIN_GAINS: Final = (1e-6, 0.5)
+"""A disturbance by heights, or one that includes kicks, must raise the log-likelihood by more than this to be kept."""
 # eigenvalues of scaled information below this fraction of the largest are rounding errors
 LOST_INFORMATION: Final = 1e-13
 
@@ -46,7 +49,7 @@ class Noise(NamedTuple):
 
     measurement: Floats  # (quantities,)
     roughness_m: Any  # a float, or an array (...,) for several sets of standard deviations
-    kick: Any = 0.0  # the same; as a fraction of the rates
+    kick: Any = 0.0  # likewise, as a fraction of the rates
 
     @property
     def process(self) -> Floats:
@@ -88,7 +91,7 @@ class Evaluation(NamedTuple):
 
 
 class Reduced(NamedTuple):
-    """Values of a walk as rows with the same sums of squares and products, at most one a quantity and column."""
+    """Values of a walk, reduced to rows with the same sums of squares and products."""
 
     fixed: Floats  # (rows, 1 + unknowns) residuals, and derivatives with respect to the unknowns
     G: Floats  # (rows, heights + kicks)
@@ -104,13 +107,13 @@ class Reduced(NamedTuple):
     def unknowns(self) -> int:
         return int(self.fixed.shape[1]) - 1
 
-    def disturbed_by(self) -> tuple[tuple[int, ...], ...]:
+    def disturbance_sets(self) -> tuple[tuple[int, ...], ...]:
         """Return the possible disturbances, the simplest first: none, heights (0), kicks (1), or both."""
         return ((), (0,), (1,), (0, 1)) if self.kicks else ((), (0,))
 
 
 def reduce(data: Linearised) -> Reduced:
-    # In this order, triangular factors keep what only the noise explains apart from what disturbances explain.
+    # In this order of columns, the triangular factors separate what only noise can explain from what disturbances can.
     columns = np.column_stack((data.G, data.J, data.residuals))
     parts = [columns[data.quantity == q] for q in range(data.sizes.size)]
     rows = [part if len(part) <= part.shape[1] else np.linalg.qr(part, mode="r") for part in parts]
@@ -138,9 +141,12 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     fixed = 1 + rows.unknowns
     count = len(rows.fixed)
     sets = np.broadcast_shapes(deviations.shape[:-1], process.shape[:-1])
-    if sets and sets[0] > 1 and sets[0] * (count + fixed) ** 2 > MOST_NUMBERS:
+    if sets and sets[0] > 1 and sets[0] * (count + fixed) ** 2 > MAX_MATRIX_ENTRIES:
         both = [np.broadcast_to(each, (*sets, each.shape[-1])) for each in (deviations, process)]
-        halves = [Noise(own, *of_process.T) for own, of_process in zip(*map(np.array_split, both, (2, 2)), strict=True)]
+        halves = [
+            Noise(measured, *disturbances.T)
+            for measured, disturbances in zip(*map(np.array_split, both, (2, 2)), strict=True)
+        ]
         return Evaluation(*map(np.concatenate, zip(*(evaluate(rows, half) for half in halves), strict=True)))
     scaled = rows.fixed / deviations[..., rows.quantity][..., None]
     # The Cholesky factor of [[V, F], [F^T, F^T F + large]], with V the covariance of the rows in units of their noise
@@ -149,6 +155,7 @@ def evaluate(rows: Reduced, noise: Noise) -> Evaluation:
     joint[..., :count, :count] = covariance_in_noise(rows, noise)
     joint[..., count:, :count] = np.swapaxes(scaled, -1, -2)
     squares = np.swapaxes(scaled, -1, -2) @ scaled
+    # `large` only keeps the lower right block positive definite. That part of the factor is not used.
     large = 1.0 + np.trace(squares, axis1=-2, axis2=-1)
     joint[..., count:, count:] = squares + large[..., None, None] * np.eye(fixed)
     factor = np.linalg.cholesky(joint)
@@ -238,38 +245,39 @@ def most_probable_disturbances(rows: Reduced, noise: Noise, move: Floats) -> Flo
 def estimate_noise(rows: Reduced, floors: Floats, leg_length_m: float, start: Noise) -> Noise:
     """Maximise the restricted likelihood over standard deviations above `floors`.
 
-    Without disturbances, with each alone and with both, the search starts from the likeliest of several; fewer
-    disturbances are the simpler explanation, which wins unless another raises the likelihood.
+    The search is run without disturbances, with each alone and with both, each time from the likeliest of several
+    starts. Fewer disturbances are the simpler explanation, so more of them must raise the likelihood.
     """
     units = np.array((leg_length_m, 1.0))
     widest = np.maximum(rows.sizes, 2.0 * floors)
     middle = np.maximum(start.measurement, 2.0 * floors)
     measured = np.log([np.clip(factor * middle, floors, widest) for factor in NOISE_FACTORS])
     levels = np.log(DISTURBANCES)
-    found: dict[tuple[int, ...], Floats] = {}
+    logs: dict[tuple[int, ...], Floats] = {}
     best = start
-    most = -math.inf
-    for sources in rows.disturbed_by():
-        starts = [np.append(own, level) for own in measured for level in levels] if sources else [np.log(middle)]
-        if len(sources) == 2:  # one disturbance more than what explains the walk best alone
-            starts = [np.insert(found[(0,)], middle.size + 1, level) for level in levels]
-            starts += [np.insert(found[(1,)], middle.size, level) for level in levels]
+    best_likelihood = -math.inf
+    for sources in rows.disturbance_sets():
+        starts = [np.append(row, level) for row in measured for level in levels] if sources else [np.log(middle)]
+        if len(sources) == 2:
+            # start where one disturbance alone explains the walk best, and add the other one
+            starts = [np.insert(logs[(0,)], middle.size + 1, level) for level in levels]
+            starts += [np.insert(logs[(1,)], middle.size, level) for level in levels]
         before = (start.process / units)[list(sources)]
-        if sources and before.min() > NEARLY_NONE:
+        if sources and before.min() > NEGLIGIBLE_DISTURBANCE:
             starts.append(np.log(np.append(middle, before)))
         ends = zip((floors, widest), DISTURBANCE_BOUNDS, strict=True)
-        bounds = np.log([np.append(own, [bound] * len(sources)) for own, bound in ends]).T
-        found[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
-        if likelihood > most + LEAST_GAINS[1 in sources]:
-            best = noise_at(found[sources], sources, leg_length_m)
-            most = likelihood
+        bounds = np.log([np.append(noise, [bound] * len(sources)) for noise, bound in ends]).T
+        logs[sources], likelihood = climb(rows, starts, bounds, sources, leg_length_m)
+        if likelihood > best_likelihood + MIN_GAINS[1 in sources]:
+            best = noise_at(logs[sources], sources, leg_length_m)
+            best_likelihood = likelihood
     return Noise(best.measurement, float(best.roughness_m), float(best.kick))
 
 
 def climb(
     rows: Reduced, starts: Sequence[Floats], bounds: Floats, sources: tuple[int, ...], leg_length_m: float
 ) -> tuple[Floats, float]:
-    """Maximise the restricted likelihood over logarithms as in `noise_at`, and return them, and the likelihood there.
+    """Maximise the restricted likelihood over logarithms (see `noise_at`), and return them and the likelihood there.
 
     The search starts from the likeliest of `starts`.
     """
@@ -291,11 +299,11 @@ def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) 
 
     leg_length_m  unit of the heights' deviation (m)
     """
-    own = np.exp(logs)
+    deviations = np.exp(logs)
     count = logs.shape[-1] - len(sources)
     process = np.zeros((*logs.shape[:-1], 2))
-    process[..., list(sources)] = own[..., count:]
-    return Noise(own[..., :count], leg_length_m * process[..., 0], process[..., 1])
+    process[..., list(sources)] = deviations[..., count:]
+    return Noise(deviations[..., :count], leg_length_m * process[..., 0], process[..., 1])
 
 
 def whitening(data: Linearised, noise: Noise) -> Callable[[Floats], Floats]:

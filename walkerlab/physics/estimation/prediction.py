@@ -28,15 +28,16 @@ NUISANCES: Final[Mapping[str, tuple[float, float]]] = {
 }
 """Properties of clock and sensors that may be estimated: value if not estimated, and typical change."""
 # a direction of the start is dropped if a change along it has a smaller relative effect on the next step
-FELT: Final = 1e-3
+MIN_EFFECT: Final = 1e-3
 LAST_INSTANT: Final = 1e-9  # samples in this last fraction of a walk count as after its last heel strike
 START_SCALE: Final = 0.02  # typical change of the start, in section coordinates
 SETTLING_STEP: Final = 1e-4  # step in section coordinates, for difference quotients of settled starts
 QUICK_STEP: Final = 1e-6  # step in an unknown's scale, for difference quotients during the search
 EXACT_STEP: Final = 1e-3  # step in an unknown's scale, for difference quotients of the result
-# the same for sampled angles, which have kinks at heel strikes: a larger step would move these past samples
+# the same for sampled angles: these have kinks at heel strikes, which a larger step would move past samples
 SAMPLED_STEP: Final = 1e-5
-KEPT_PREDICTIONS: Final = 16  # search, derivatives and checks ask for the same walks
+# predictions cached, because search, derivatives and checks ask for the same walks
+KEPT_PREDICTIONS: Final = 16
 
 
 class WalkMap(Protocol):
@@ -45,16 +46,16 @@ class WalkMap(Protocol):
     def step(self, z: Floats, p: Any) -> MappedStep:
         """Take a step from z (d,), with its derivative."""
 
-    def disturbed(self, z: Floats, p: Any, heights_m: Floats) -> DisturbedWalk:
+    def take_disturbed_walk(self, z: Floats, p: Any, heights_m: Floats) -> DisturbedWalk:
         """Walk from z (d,) over foothold heights (steps + 1,) in m."""
 
-    def settled(self, z: Floats, p: Any) -> Floats:
+    def rest_on_ground(self, z: Floats, p: Any) -> Floats:
         """Return z (d,) with the stance foot at rest on the ground."""
 
-    def sampled(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
+    def sample_legs(self, z: Floats, p: Any, heights_m: Floats, times_s: Floats) -> Floats:
         """Return the legs' angles (times, 2), first swing leg first, at times counted from the first heel strike."""
 
-    def varied(
+    def differentiate_walk(
         self, z: Floats, p: Any, heights_m: Floats, along: Floats, times_s: Floats = ..., kicked: bool = ...
     ) -> VariedWalk | None:
         """Differentiate the walk and its samples along columns (d + steps + 1, columns), and by kicks if `kicked`."""
@@ -124,11 +125,11 @@ class Forecast:
         return tuple((u[: self.scales.size] * self.scales).tolist())
 
     def sensors(self, u: Floats) -> dict[str, float]:
-        own = dict(zip(self.nuisances, u[self.unknowns - len(self.nuisances) :], strict=True))
-        return {name: value + own.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
+        estimated = dict(zip(self.nuisances, u[self.unknowns - len(self.nuisances) :], strict=True))
+        return {name: value + estimated.get(name, 0.0) * change for name, (value, change) in NUISANCES.items()}
 
     def start(self, u: Floats) -> Floats:
-        return self.walks.settled(self._unsettled(u), self.parameters(u))
+        return self.walks.rest_on_ground(self._unsettled(u), self.parameters(u))
 
     def _unsettled(self, u: Floats) -> Floats:
         first = self.scales.size
@@ -159,12 +160,12 @@ class Forecast:
             return None
         z = self.start(u)
         sensors = self.sensors(u)
-        walk = self.walks.disturbed(z, p, heights_m)
+        walk = self.walks.take_disturbed_walk(z, p, heights_m)
         if walk.outcome is not Outcome.WALKED or walk.durations_s.size < self.heights - 1:
             return None
         times, inside = self._times(walk, sensors)
-        angles = self.walks.sampled(z, p, heights_m, times) if times.size else np.zeros((0, 2))
-        values = np.concatenate((*self._by_step(walk, sensors), (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
+        angles = self.walks.sample_legs(z, p, heights_m, times) if times.size else np.zeros((0, 2))
+        values = np.concatenate((*self._step_values(walk, sensors), (sensors[OFFSET] + sensors[GAIN] * angles).ravel()))
         return Prediction(values, walk, times, inside, angles)
 
     def differentiate(
@@ -173,7 +174,7 @@ class Forecast:
         """Return derivatives for the unknowns, (values, unknowns), and for disturbances, (values, heights + kicks).
 
         exact      whether differences over parameters are of 4th order, one-sided where a walk on one side fails
-        disturbed  whether derivatives for disturbances are wanted, too
+        disturbed  whether to differentiate by the disturbances as well
         """
         # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
         prediction = self.predict(u, heights_m)
@@ -201,7 +202,7 @@ class Forecast:
         ahead = values(QUICK_STEP)
         return None if here is None or ahead is None else (ahead - here) / QUICK_STEP
 
-    def _by_step(self, walk: DisturbedWalk | VariedWalk, sensors: Mapping[str, float]) -> list[Floats]:
+    def _step_values(self, walk: DisturbedWalk | VariedWalk, sensors: Mapping[str, float]) -> list[Floats]:
         """Return each channel's values (steps,) in a walk, or their derivatives (steps, columns)."""
         values = {
             STEP_PERIOD: walk.durations_s * sensors[CLOCK],
@@ -239,19 +240,21 @@ class Forecast:
         settling = settling_along(self.walks, self._unsettled(u), self.parameters(u), self.directions)
         along[: z.size, :starts], along[z.size :, starts:] = START_SCALE * settling, lifts
         kicked = self.kicked and lifts.size > 0
-        varied = self.walks.varied(z, self.parameters(u), heights_m, along, prediction.times_s, kicked)
+        varied = self.walks.differentiate_walk(z, self.parameters(u), heights_m, along, prediction.times_s, kicked)
         if varied is None:
             return None
         angles = prediction.angles_rad
         count = self.measured.count
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
         moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
-        moves = np.concatenate((*self._by_step(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1])))
+        moves = np.concatenate(
+            (*self._step_values(varied, sensors), moving.swapaxes(1, 2).reshape(-1, moving.shape[1]))
+        )
         clock = 0.0 if self.in_phase else -self._measured_times()[:, None] / sensors[CLOCK] ** 2
-        own = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
+        by_name = {OFFSET: np.ones_like(angles), GAIN: angles, DELAY: rates, CLOCK: rates * clock}
         by_sensor = np.zeros((self.values.size, len(self.nuisances)))
         for column, name in zip(by_sensor.T, self.nuisances, strict=True):
-            column[count * len(self.channels) :] = own[name].ravel()
+            column[count * len(self.channels) :] = by_name[name].ravel()
             if name == CLOCK and STEP_PERIOD in self.channels:
                 column[:count] = walk.durations_s[:count]
             column *= NUISANCES[name][1]
@@ -269,12 +272,14 @@ class Forecast:
 def settling_along(walks: WalkMap, z: Floats, p: Any, directions: Floats) -> Floats:
     """Return the derivatives (d, starts) of the settled start along directions (d, starts) of z (d,)."""
     h = SETTLING_STEP
-    ends = [walks.settled(z + h * column, p) - walks.settled(z - h * column, p) for column in directions.T]
+    ends = [
+        walks.rest_on_ground(z + h * column, p) - walks.rest_on_ground(z - h * column, p) for column in directions.T
+    ]
     return np.array(ends).reshape(-1, z.size).T / (2.0 * h)
 
 
 def felt_directions(walks: WalkMap, z: Floats, p: Any) -> Floats:
     """Return the directions (d, starts) in which a change of the start z (d,) affects the next step."""
-    DP = walks.step(walks.settled(z, p), p).DP
+    DP = walks.step(walks.rest_on_ground(z, p), p).DP
     _, sizes, rows = np.linalg.svd(DP @ settling_along(walks, z, p, np.eye(z.size)))
-    return np.asarray(rows[sizes > FELT * max(1.0, sizes[0])].T)
+    return np.asarray(rows[sizes > MIN_EFFECT * max(1.0, sizes[0])].T)

@@ -93,7 +93,7 @@ class ModelFit:
     model: str
     log_likelihood: float | None
     fit: Fit
-    reasons: tuple[str, ...] = ()  # why a model does not fit, or what speaks against its errors
+    reasons: tuple[str, ...] = ()  # why a model does not fit, or why its errors are doubtful
 
     @property
     def usable(self) -> bool:

@@ -40,7 +40,7 @@ class KneeRules:
 @dataclass(frozen=True)
 class Root:
     tree: Tree
-    numbers: dict[str, Any]  # fields with equal values in all forms that have this root
+    constants: dict[str, Any]  # fields that have the same value in all forms with this root
     rows: dict[str, Floats]  # (..., n) fields that are summed over bodies that turn together
 
 
@@ -105,7 +105,10 @@ def levers_by_axis(feet: Any, hip: Floats) -> dict[str, Floats]:
 
 
 def hip_levers(assembly: Assembly, to_foot: Floats) -> Floats:
-    """Compute levers (bodies, 2) in m to the hip, from the same point as `to_foot`, the levers to the first foot."""
+    """Return the levers (bodies, 2) to the hip in m.
+
+    They start at the same point as `to_foot`, those to the first foot.
+    """
     # Without named legs, the first foot takes the place of the hip.
     if not all(assembly.legs):
         return to_foot
@@ -136,9 +139,9 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     rolling = np.zeros((2, len(onto)))
     for k, foot in enumerate(assembly.feet):
         rolling[k, assembly.index(foot.body)] = foot.radius_m
-    for name, value in root.numbers.items():
+    for name, value in root.constants.items():
         form[name] = value
-    merged = root.tree.merged(S) | {name: value @ S for name, value in (root.rows | {"rolling": rolling}).items()}
+    merged = root.tree.merge_bodies(S) | {name: value @ S for name, value in (root.rows | {"rolling": rolling}).items()}
     form["mass"] = merged.pop("mass")
     for name, value in (merged | {"E": reduction(rows, n)[None]}).items():
         form[name][tuple(map(slice, value.shape))] = value

@@ -6,7 +6,7 @@ from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.normal_force import elastic_energy
 from walkerlab.physics.ground.pulse import push_on
 from walkerlab.physics.ground.walker import (
-    OF_BODIES,
+    BODY_VECTOR,
     GroundModel,
     OnGround,
     foot_force,
@@ -24,7 +24,7 @@ from walkerlab.physics.mechanics.tree import add_inertia, projections
 @kernel_part
 def kinetic_energy(form: GroundModel, y: Any) -> float:
     # r is scratch here; only M is used
-    s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
+    s, c, r, M = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), matrix(BODY_VECTOR)
     half = half_size(form)
     total = 0.0
     omega = y[half + form.places : 2 * half]
@@ -38,7 +38,7 @@ def kinetic_energy(form: GroundModel, y: Any) -> float:
 @kernel_part
 def potential_energy(form: GroundModel, y: Any) -> float:
     """Compute the potential energy of gravity (J), which is zero at the origin of the slope's frame."""
-    s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
+    s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
     projections(form.arm_x, form.arm_y, form.bodies, s, c, F, U)
     if form.places > 0:
@@ -67,8 +67,8 @@ def total_energy(system: OnGround, y: Any) -> float:
 def push_power(system: OnGround, t: float, y: Any) -> float:
     if system.form.push_off == 0.0:
         return 0.0
-    s = vector(OF_BODIES)
-    c = vector(OF_BODIES)
+    s = vector(BODY_VECTOR)
+    c = vector(BODY_VECTOR)
     foot = 1 - system.progress.stance
     sines_cosines(system.form, y, s, c)
     push = push_on(system, t, foot, s, c)

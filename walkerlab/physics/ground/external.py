@@ -8,7 +8,7 @@ from typing import Any
 
 from walkerlab.physics.ground.hinges import add_torques
 from walkerlab.physics.ground.motion import foot_wrench
-from walkerlab.physics.ground.walker import OF_BODIES, OF_STATES, OnGround, foot_motion, sines_cosines
+from walkerlab.physics.ground.walker import BODY_VECTOR, STATE_VECTOR, OnGround, foot_motion, sines_cosines
 from walkerlab.physics.kernels import kernel, kernel_part, vector
 
 
@@ -36,10 +36,10 @@ def feet_and_forces(system: OnGround, chain: Any, t: float, q: Any, v: Any, feet
     forces  (2 + links) generalised forces, N and N m; not computed if the array is empty
     """
     form = system.form
-    y = vector(OF_STATES)
-    s = vector(OF_BODIES)
-    c = vector(OF_BODIES)
-    torques = vector(OF_BODIES)
+    y = vector(STATE_VECTOR)
+    s = vector(BODY_VECTOR)
+    c = vector(BODY_VECTOR)
+    torques = vector(BODY_VECTOR)
     absolute_state(form.slope, chain, q, v, y)
     sines_cosines(form, y, s, c)
     for foot in range(2):

@@ -18,7 +18,7 @@ class FrictionLaw(Protocol):
     """Members that a friction law needs in addition to its coefficient."""
 
     @classmethod
-    def of(cls, contact: Any) -> Self:
+    def from_contact(cls, contact: Any) -> Self:
         """Create the law from the parameters (SI) of a contact block."""
 
     @property
@@ -33,10 +33,10 @@ class FrictionLaw(Protocol):
     def sliding_from(self) -> float:
         """Slip velocity (m/s) above which the coefficient is constant."""
 
-    def with_creep(self, factor: float) -> Self:
+    def scale_creep(self, factor: float) -> Self:
         """Return the law with its slip velocities multiplied by a factor."""
 
-    def in_words(self) -> str:
+    def describe(self) -> str:
         """Describe the law and its parameters as a phrase that can follow 'there is'."""
 
 
@@ -65,7 +65,7 @@ class Coulomb(NamedTuple):
     friction_velocity: float  # [v_d] m/s
 
     @classmethod
-    def of(cls, contact: Any) -> Coulomb:
+    def from_contact(cls, contact: Any) -> Coulomb:
         return cls(
             contact.static_friction,
             contact.dynamic_friction,
@@ -85,12 +85,12 @@ class Coulomb(NamedTuple):
     def sliding_from(self) -> float:
         return self.friction_velocity
 
-    def with_creep(self, factor: float) -> Coulomb:
+    def scale_creep(self, factor: float) -> Coulomb:
         return self._replace(
             stiction_velocity=factor * self.stiction_velocity, friction_velocity=factor * self.friction_velocity
         )
 
-    def in_words(self) -> str:
+    def describe(self) -> str:
         return (
             f"ADAMS's Coulomb friction, with a coefficient of {self.static:g} at a slip velocity of "
             f"{self.stiction_velocity:g} m/s and {self.dynamic:g} above {self.friction_velocity:g} m/s"
@@ -129,7 +129,7 @@ class Frictionless(NamedTuple):
     """Ground without tangential force."""
 
     @classmethod
-    def of(cls, contact: Any) -> Frictionless:  # noqa: ARG003
+    def from_contact(cls, contact: Any) -> Frictionless:  # noqa: ARG003
         return cls()
 
     @property
@@ -144,10 +144,10 @@ class Frictionless(NamedTuple):
     def sliding_from(self) -> float:
         return 0.0
 
-    def with_creep(self, factor: float) -> Frictionless:  # noqa: ARG002
+    def scale_creep(self, factor: float) -> Frictionless:  # noqa: ARG002
         return self
 
-    def in_words(self) -> str:
+    def describe(self) -> str:
         return "no friction"
 
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from walkerlab.physics.ground.knees import ahead
+from walkerlab.physics.ground.knees import angle_between
 from walkerlab.physics.ground.walker import FIRST_KNEE, STOPPING, OnGround, half_size
 from walkerlab.physics.kernels import kernel_part
 from walkerlab.physics.mechanics.hinges import (
@@ -30,7 +30,9 @@ def angle_at(system: OnGround, row: int, y: Any) -> tuple[float, float]:
     # At the hip the first body is that of the swing leg, so it changes when the legs exchange roles at a touch.
     form = system.form
     sign = hip_sign(system, row)
-    return sign * ahead(form, row, y, form.places), sign * ahead(form, row, y, half_size(form) + form.places)
+    return sign * angle_between(form, row, y, form.places), sign * angle_between(
+        form, row, y, half_size(form) + form.places
+    )
 
 
 @kernel_part
@@ -42,15 +44,15 @@ def is_stopping(system: OnGround, row: int) -> bool:
 def torque_at(system: OnGround, row: int, y: Any) -> HingeTorque:
     """Compute the torque of spring, damper and drive at a hinge, plus the torque of a knee's stop while it acts."""
     angle, rate = angle_at(system, row, y)
-    own = hinge_torque(hinge_law(system.form, row), angle, rate)
+    law = hinge_torque(hinge_law(system.form, row), angle, rate)
     if not is_stopping(system, row):
-        return own
+        return law
     stop = hinge_torque(system.stop, angle, rate)
     return HingeTorque(
-        own.resistance + stop.resistance,
-        own.elastic + stop.elastic,
-        own.by_angle + stop.by_angle,
-        own.by_rate + stop.by_rate,
+        law.resistance + stop.resistance,
+        law.elastic + stop.elastic,
+        law.by_angle + stop.by_angle,
+        law.by_rate + stop.by_rate,
     )
 
 
@@ -96,14 +98,14 @@ def hinge_energies(system: OnGround, y: Any) -> tuple[float, float]:
 
 @kernel_part
 def hinge_powers(system: OnGround, y: Any) -> tuple[float, float]:
-    """Compute the power (W) that drives and, negative, dampers supply at all hinges, and that lost in knees' stops."""
+    """Compute the power (W) supplied by drives and dampers at all hinges, and the power lost in the stops of knees."""
     supplied = 0.0
     lost = 0.0
     for row in range(len(system.form.hinges)):
         angle, rate = angle_at(system, row, y)
         if is_sprung(system.form, row):
-            own = hinge_torque(hinge_law(system.form, row), angle, rate)
-            supplied += (own.elastic - own.resistance) * rate
+            law = hinge_torque(hinge_law(system.form, row), angle, rate)
+            supplied += (law.elastic - law.resistance) * rate
         if is_stopping(system, row):
             stop = hinge_torque(system.stop, angle, rate)
             lost += (stop.resistance - stop.elastic) * rate

@@ -11,7 +11,7 @@ from walkerlab.physics.mechanics.hinges import HingeTorque, hinge_energy, hinge_
 from walkerlab.physics.mechanics.impact import RootedTree, lock
 from walkerlab.physics.solvers.system import Floats
 
-FLEXED = 0.01  # rad, flexion that a released knee must exceed before it can lock again
+MIN_FLEXION = 0.01  # rad, flexion that a released knee must exceed before it can lock again
 
 
 class IdealLock(NamedTuple):
@@ -19,7 +19,7 @@ class IdealLock(NamedTuple):
 
 
 @kernel_part
-def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
+def angle_between(form: GroundModel, row: int, y: Any, first: int) -> float:
     """Return the angle (rad) from a hinge's second body to its first, or its rate if y[first] is the first rate."""
     return y[first + form.hinges[row, 0]] - y[first + form.hinges[row, 1]]
 
@@ -27,12 +27,12 @@ def ahead(form: GroundModel, row: int, y: Any, first: int) -> float:
 @kernel_part
 def extension(form: GroundModel, knee: int, y: Any) -> float:
     """Return the angle (rad) of a knee beyond straight: negative while it is bent, zero for a leg without a knee."""
-    return ahead(form, FIRST_KNEE + knee, y, form.places)
+    return angle_between(form, FIRST_KNEE + knee, y, form.places)
 
 
 @kernel_part
 def extension_rate(form: GroundModel, knee: int, y: Any) -> float:
-    return ahead(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
+    return angle_between(form, FIRST_KNEE + knee, y, half_size(form) + form.places)
 
 
 @hinge_torque.case(Impact)

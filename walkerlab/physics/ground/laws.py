@@ -43,7 +43,7 @@ def create_law(key: str, word: str, contact: Any) -> Any:
     if missing:
         kind = key.replace("_", "-")
         raise TypeError(f"the {kind} law {law.__name__} ('{word}') is incomplete: it lacks {', '.join(missing)}")
-    return law.of(contact)
+    return law.from_contact(contact)
 
 
 def missing_members(law: type, kind: LawKind) -> list[str]:

@@ -5,7 +5,7 @@ from typing import Any
 from walkerlab.physics.ground.hinges import add_gradients, add_torques
 from walkerlab.physics.ground.pulse import push_gradient, push_on
 from walkerlab.physics.ground.walker import (
-    OF_BODIES,
+    BODY_VECTOR,
     GroundModel,
     OnGround,
     foot_force,
@@ -48,7 +48,7 @@ def foot_wrench(system: OnGround, t: float, foot: int, s: Any, c: Any, y: Any, r
             normal += force.normal.force
     if along == 0.0 and normal == 0.0:
         return 0.0, 0.0
-    F, U = vector(OF_BODIES), vector(OF_BODIES)
+    F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
     projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
     for k in range(form.bodies):
         r[k] += along * (form.rolling[foot, k] - U[k]) + normal * F[k]
@@ -69,7 +69,7 @@ def solve_motion(system: OnGround, t: float, y: Any, s: Any, c: Any, M: Any, r: 
     for k in range(n):
         r[k] = 0.0
     if form.places == 0:
-        F, U = vector(OF_BODIES), vector(OF_BODIES)
+        F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
         add_gravity(form, n, F, U, r)
     along = 0.0
@@ -92,7 +92,7 @@ def ground_derivative(system: OnGround, t: float, y: Any, f: Any) -> None:
     n = form.bodies
     half = half_size(form)
     first = form.places
-    s, c, r, M = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), matrix(OF_BODIES)
+    s, c, r, M = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), matrix(BODY_VECTOR)
     along, normal = solve_motion(system, t, y, s, c, M, r)
     for i in range(half):
         f[i] = y[half + i]
@@ -111,6 +111,7 @@ def motion_gradient(form: GroundModel, foot: int, F: Any, U: Any, y: Any, j: int
     moves = j >= half
     k = (j - half if moves else j) - p
     if k < 0:
+        # j is a coordinate or velocity of the root, normal to the slope (-1) or along it (-2)
         if k == -1:
             return (0.0, -1.0, 0.0) if moves else (-1.0, 0.0, 0.0)
         return 0.0, 0.0, 1.0 if moves else 0.0
@@ -130,8 +131,8 @@ def add_foot_gradients(system: OnGround, t: float, foot: int, s: Any, c: Any, y:
     pushed = push.above != 0.0
     if not inside and not pushed:
         return
-    F = vector(OF_BODIES)
-    U = vector(OF_BODIES)
+    F = vector(BODY_VECTOR)
+    U = vector(BODY_VECTOR)
     p = form.places
     half = half_size(form)
     projections(form.foot_x[foot], form.foot_y[foot], form.bodies, s, c, F, U)
@@ -172,7 +173,7 @@ def add_torque_gradients(system: OnGround, s: Any, c: Any, y: Any, alpha: Any, b
     p = form.places
     half = half_size(form)
     if p == 0:
-        F, U = vector(OF_BODIES), vector(OF_BODIES)
+        F, U = vector(BODY_VECTOR), vector(BODY_VECTOR)
         projections(form.arm_x, form.arm_y, n, s, c, F, U)
         add_gravity_gradient(form, n, F, U, by_angle)
     add_gradients(system, y, by_angle, by_rate)
@@ -186,11 +187,11 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
     n = form.bodies
     p = form.places
     half = half_size(form)
-    s = vector(OF_BODIES)
-    c = vector(OF_BODIES)
-    alpha = vector(OF_BODIES)
-    M = matrix(OF_BODIES)
-    by_torque = matrix(OF_BODIES)
+    s = vector(BODY_VECTOR)
+    c = vector(BODY_VECTOR)
+    alpha = vector(BODY_VECTOR)
+    M = matrix(BODY_VECTOR)
+    by_torque = matrix(BODY_VECTOR)
     for i in range(half):
         for j in range(2 * half):
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0

@@ -18,7 +18,7 @@ class NormalLaw(Protocol):
     """Members that a law of the normal force needs in addition to its formulas."""
 
     @classmethod
-    def of(cls, contact: Any) -> Self:
+    def from_contact(cls, contact: Any) -> Self:
         """Create the law from the parameters (SI) of a contact block."""
 
     @property
@@ -74,7 +74,7 @@ class Impact(NamedTuple):
     full_damping_penetration: float  # [d_max] m
 
     @classmethod
-    def of(cls, contact: Any) -> Impact:
+    def from_contact(cls, contact: Any) -> Impact:
         return cls(contact.stiffness, contact.exponent, contact.damping, contact.full_damping_penetration)
 
     def resting_foot(self, weight: float, mass: float) -> RestingFoot:
@@ -97,6 +97,7 @@ def impact_normal_force(law: Impact, penetration: float, penetration_rate: float
     c, c_slope = smooth_step(penetration, 0.0, 0.0, law.full_damping_penetration, law.damping)
     force = spring + c * penetration_rate
     if force <= 0.0:
+        # The elastic part stays: the energy balance needs it although the foot is released.
         return NormalForce(0.0, spring, 0.0, 0.0)
     return NormalForce(force, spring, law.exponent * spring / penetration + c_slope * penetration_rate, c)
 

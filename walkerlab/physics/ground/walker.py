@@ -21,8 +21,9 @@ from walkerlab.physics.mechanics.tree import lever_motion
 from walkerlab.physics.solvers.system import Floats, Integers, State
 
 MAX_BODIES = 8
-OF_BODIES = (0.0,) * MAX_BODIES  # templates for the length of scratch arrays
-OF_STATES = (0.0,) * (4 + 2 * MAX_BODIES)
+# Kernels read the length of scratch arrays from these tuples, since it must be known at compile time.
+BODY_VECTOR = (0.0,) * MAX_BODIES
+STATE_VECTOR = (0.0,) * (4 + 2 * MAX_BODIES)
 NO_FOOT = -1
 FIRST_KNEE = HIP_ROW + 1  # row of the first knee in `hinges` and `laws`
 # states of a knee
@@ -172,6 +173,7 @@ def place_on_ground(
     progress: WalkProgress | None = None,
 ) -> OnGround:
     """Return the walker in the form for its knees, by default on foot 1. `level` (2,) is the ground height (m)."""
+    # arrays of fixed types, because kernels would be compiled again for others
     memory = np.asarray(has_ground, np.int8), np.asarray(knee, np.int8), np.asarray(level, float)
     form = walker.forms[int(pinned), locked_knees(knee)]
     progress = new_progress() if progress is None else progress
@@ -226,14 +228,14 @@ def foot_motion(form: GroundModel, foot: int, s: Any, c: Any, y: Any) -> FootMot
 
 @kernel_part
 def one_foot_motion(form: GroundModel, foot: int, y: Any) -> FootMotion:
-    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
     return foot_motion(form, foot, s, c, y)
 
 
 @kernel_part
 def feet_motion(form: GroundModel, y: Any) -> tuple[FootMotion, FootMotion]:
-    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
     return foot_motion(form, 0, s, c, y), foot_motion(form, 1, s, c, y)
 
@@ -289,7 +291,7 @@ def store_whole(form: GroundModel, y: Any, whole: Any) -> None:
     if p > 0:
         whole[0], whole[1], whole[middle], whole[middle + 1] = y[0], y[1], y[half], y[half + 1]
         return
-    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
     along, height, speed, vertical_velocity = lever_motion(form.arm_x, form.arm_y, n, s, c, y[half : half + n])
     whole[0], whole[1] = form.root_along + along / form.mass, form.root_height + height / form.mass

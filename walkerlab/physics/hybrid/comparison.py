@@ -114,14 +114,14 @@ def add_strike_samples(motion: Motion) -> Motion:
     # jump.
     side = 0.5 * JUMP * (motion.time[-1] - motion.time[0])
     added = [
-        (end, slice(place - 3, place))
+        (end, slice(index - 3, index))
         for end in motion.step_ends
-        if end not in motion.time and (place := np.searchsorted(motion.time, end)) >= 3
+        if end not in motion.time and (index := np.searchsorted(motion.time, end)) >= 3
     ]
     for strike in motion.knee_strikes:
-        place = np.searchsorted(motion.time, strike)
-        if 3 <= place <= motion.time.size - 3 and strike not in motion.time:
-            added += [(strike - side, slice(place - 3, place)), (strike, slice(place, place + 3))]
+        index = np.searchsorted(motion.time, strike)
+        if 3 <= index <= motion.time.size - 3 and strike not in motion.time:
+            added += [(strike - side, slice(index - 3, index)), (strike, slice(index, index + 3))]
     strikes = np.concatenate((motion.step_ends, motion.knee_strikes))
     added = [(t, near) for t, near in added if not jumps_among(motion.time[near], t, strikes, 2.0 * side)]
     if not added:
@@ -143,7 +143,7 @@ def jumps_among(times: Array, time: float, strikes: Array, close: float) -> bool
 def extrapolate(motion: Motion, samples: slice, time: float) -> tuple[Array, Array]:
     """Extrapolate angles and velocities (leg,) to `time` (s) with a parabola through three samples."""
     times = motion.time[samples]
-    weights = [np.prod([(time - node) / (own - node) for node in times if node != own]) for own in times]
+    weights = [np.prod([(time - other) / (node - other) for other in times if other != node]) for node in times]
     return np.asarray(weights @ motion.angle[samples]), np.asarray(weights @ motion.velocity[samples])
 
 

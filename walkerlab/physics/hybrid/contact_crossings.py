@@ -13,7 +13,7 @@ from walkerlab.physics.ground.normal_force import release_function, switching_pe
 from walkerlab.physics.ground.terrain import cell_edges
 from walkerlab.physics.ground.walker import (
     BENT,
-    OF_BODIES,
+    BODY_VECTOR,
     STOPPING,
     FootMotion,
     GroundModel,
@@ -64,7 +64,7 @@ def sample_event_functions(system: OnGround, walk_state: WalkState, y: Any, node
     form = system.form
     ground = walk_state.ground
     values = finder.values
-    s, c = vector(OF_BODIES), vector(OF_BODIES)
+    s, c = vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(form, y, s, c)
     values[PASSING, node] = 0.0
     for foot in range(2):

@@ -9,7 +9,7 @@ from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.knees import lock_knee
 from walkerlab.physics.ground.motion import motion_gradient
 from walkerlab.physics.ground.walker import (
-    OF_BODIES,
+    BODY_VECTOR,
     STOPPING,
     ContactWalker,
     GroundModel,
@@ -47,7 +47,7 @@ def change_form(
     columns = to_full(before.form, Phi[: y.size], size)
     waits = np.zeros(Phi.shape[1])
     ends_step = event < PASSING and event % PER_FOOT == HEIGHT
-    if ends_step:  # before the touch the other leg stood
+    if ends_step:  # before the touch the other leg was the stance leg
         before = before._replace(progress=new_progress(stance=1 - after.progress.stance))
     if EXTENSION_RATE <= event < PULSE_END:
         stopping = before.knee.copy()
@@ -91,7 +91,7 @@ def event_gradient(whole: GroundModel, event: int, x: Floats) -> Floats:
         return gradient
     foot = event // PER_FOOT
     row = 0 if event % PER_FOOT == HEIGHT else 1
-    s, c, F, U = vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES), vector(OF_BODIES)
+    s, c, F, U = vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR), vector(BODY_VECTOR)
     sines_cosines(whole, x, s, c)
     projections(whole.foot_x[foot], whole.foot_y[foot], whole.bodies, s, c, F, U)
     return -np.array([motion_gradient(whole, foot, F, U, x, j)[row] for j in range(x.size)])

@@ -33,10 +33,12 @@ LONGEST_STEP = 10.0  # pendulum times within which a step must end
 LONGEST_FLIGHT = 0.25  # pendulum times for which both feet may be off the ground
 EVENT_TIME = 1e-12  # s, accuracy of event times
 EVENT_REFINEMENTS = 4
-# maximum per solver step; then that step's end counts as the event, because rounding moves the event each time
-REWINDS = 24
-# maximum number of rewinds for a doubtful event; then it is dropped unless it occurs at the solver step's end
-DOUBTS = 12
+# Maximum number of rewinds per solver step. After that, the end of the step counts as the event: rounding moves the
+# event slightly at each repetition, so the search might never end.
+MAX_REWINDS = 24
+# Maximum number of rewinds for an event that a solver step just missed. After that, the event is dropped unless it
+# occurs at the end of the step.
+MAX_DOUBTFUL_REWINDS = 12
 
 
 @kernel
@@ -146,9 +148,10 @@ def approach(
     """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already does."""
     latest = search.latest if search.approaching else end
     refinements = search.refinements if search.approaching and event == search.event else 0
+    # A solver step cannot have length zero.
     wait = max(fraction * (end - start), EVENT_TIME)
     early = start + wait < end - EVENT_TIME
-    if early and refinements <= EVENT_REFINEMENTS and search.rewinds < REWINDS:
+    if early and refinements <= EVENT_REFINEMENTS and search.rewinds < MAX_REWINDS:
         return EventSearch(
             start + wait,
             event,
@@ -161,7 +164,7 @@ def approach(
         )
     if early and is_switching(event):
         # the event function is too far from a polynomial on this solver step: try half of it
-        if search.rewinds < REWINDS:
+        if search.rewinds < MAX_REWINDS:
             return EventSearch(
                 0.5 * (start + end),
                 event,
@@ -193,7 +196,7 @@ def approach(
 def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     """Accept the event that a solver step just missed, extend that step by `wait` (s), or drop the event."""
     occurs = abs(wait) <= EVENT_TIME
-    doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < DOUBTS
+    doubtful = search.refinements <= EVENT_REFINEMENTS and search.rewinds < MAX_DOUBTFUL_REWINDS
     target = search.target + wait
     refinements = search.refinements + 1
     rewinds = search.rewinds + 1

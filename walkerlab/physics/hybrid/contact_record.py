@@ -19,7 +19,7 @@ from walkerlab.physics.energy_channels import (
 )
 from walkerlab.physics.ground.energy import dissipated_power, foot_elastic_energy, push_power, total_energy
 from walkerlab.physics.ground.hinges import hinge_energies, hinge_powers
-from walkerlab.physics.ground.walker import OF_STATES, OnGround, one_foot_motion, relative_to_ground, store_whole
+from walkerlab.physics.ground.walker import STATE_VECTOR, OnGround, one_foot_motion, relative_to_ground, store_whole
 from walkerlab.physics.hybrid.contact_events import HEIGHT, LEGS_TURN, PER_FOOT, VERTICAL_VELOCITY
 from walkerlab.physics.hybrid.contact_state import WalkState
 from walkerlab.physics.hybrid.contact_tangent import Tangent, carry_tangent
@@ -38,13 +38,13 @@ from walkerlab.physics.solvers.events import RISING, CrossingFinder, first_cross
 from walkerlab.physics.solvers.radau5 import Radau5
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate, sample
 
-# nodes of a Radau quadrature on a solver step, preceded by the step's start, and their weights
+# nodes of a Radau quadrature rule over a solver step, preceded by the start of the step, and their weights
 Quadrature = tuple[tuple[float, ...], tuple[float, ...]]
-OF_ORDER_5: Quadrature = (
+RADAU_ORDER_5: Quadrature = (
     (0.0, 0.15505102572168219, 0.6449489742783178, 1.0),
     (0.0, 0.37640306270046725, 0.5124858261884216, 0.1111111111111111),
 )
-OF_ORDER_9: Quadrature = (
+RADAU_ORDER_9: Quadrature = (
     (0.0, 0.05710419611451768, 0.2768430136381238, 0.5835904323689168, 0.8602401356562195, 1.0),
     (0.0, 0.14371356079122594, 0.28135601514946207, 0.31182652297574126, 0.22310390108357075, 0.04),
 )
@@ -119,7 +119,7 @@ def record_samples(observer: ContactObserver, method: Any, system: OnGround, wal
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     samples = observer.samples
     index = observer.tally.recorded
-    y = vector(OF_STATES)[: method.y.size]
+    y = vector(STATE_VECTOR)[: method.y.size]
     while index < samples.time_s.size and samples.time_s[index] <= method.clock[T]:
         fraction = (samples.time_s[index] - t) / h
         interpolate(method, system, fraction, y)
@@ -173,7 +173,7 @@ def note_depth(observer: ContactObserver, method: Any, system: OnGround, finder:
     deepest = -finder.values[first + HEIGHT, end]
     if finder.values[first + VERTICAL_VELOCITY, 0] < 0.0 < finder.values[first + VERTICAL_VELOCITY, end]:
         at = first_crossing(finder, first + VERTICAL_VELOCITY, RISING, 0.0, False)
-        y = vector(OF_STATES)[: method.y.size]
+        y = vector(STATE_VECTOR)[: method.y.size]
         interpolate(method, system, min(at, 1.0), y)
         deepest = max(deepest, -relative_to_ground(system, foot, one_foot_motion(system.form, foot, y)).height)
     observer.tally.max_penetration = max(observer.tally.max_penetration, deepest)
@@ -193,12 +193,12 @@ def end_energy(system: OnGround, y: Any) -> float:
 @dispatch_by_type_or_default
 def quadrature(method: Any) -> Quadrature:
     """Return the quadrature rule for powers over a method's step, as accurate as the best dense output."""
-    return OF_ORDER_9
+    return RADAU_ORDER_9
 
 
 @quadrature.case(Radau5)
 def collocation_rule(method: Radau5) -> Quadrature:
-    return OF_ORDER_5
+    return RADAU_ORDER_5
 
 
 @kernel_part
@@ -207,7 +207,7 @@ def add_work_until(method: Any, system: OnGround, fraction: float, account: Any)
     rule = quadrature(method)
     nodes, _ = rule
     fractions = vector(nodes)
-    states = matrix(OF_STATES)
+    states = matrix(STATE_VECTOR)
     for i in range(len(nodes)):
         fractions[i] = fraction * nodes[i]
     sample(method, system, fractions, states)

@@ -12,7 +12,7 @@ from walkerlab.physics.ground.energy import kinetic_energy, potential_energy, to
 from walkerlab.physics.ground.hinges import hinge_energies
 from walkerlab.physics.ground.terrain import is_uneven
 from walkerlab.physics.ground.walker import (
-    OF_BODIES,
+    BODY_VECTOR,
     ContactWalker,
     FootMotion,
     OnGround,
@@ -40,11 +40,11 @@ from walkerlab.physics.solvers.registry import Tolerances, finder_for, method_na
 from walkerlab.physics.solvers.stepping import BUDGET, RHS, T
 from walkerlab.physics.solvers.system import Floats, State
 
-USUAL_STEP = 3.0  # pendulum times; most steps are shorter
+EXPECTED_STEP = 3.0  # pendulum times; most steps are shorter
 # Limit for the residual of the energy balance, divided by rtol times (energy + work exchanged). In random walks this is
 # at most 0.5 with radau5 for rtol from 1e-2 to 1e-9 (scripts/contact_campaign.py prints it), and at most 9 with the
 # libraries' multistep methods. In the stability catalogue it is at most 9; the worst case is ground of 1e14 N/m.
-UNEXPLAINED = 100.0
+RESIDUAL_FACTOR = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
 FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
 
@@ -103,8 +103,8 @@ def fill_feet(walker: ContactWalker, samples: ContactSamples, feet: Any) -> None
 class ContactWalkResult(WalkRecord):
     """Result of a walk on compliant ground."""
 
-    slip_m: Floats  # (steps,) slip of the stance foot's material; without the last step if its foot did not lift
-    rolling_m: Floats  # (steps,) rolling of the stance foot, for the same steps
+    slip_m: Floats  # (steps,) material slip of the stance foot; the last step is missing if its foot has not lifted
+    rolling_m: Floats  # (steps,) rolling distance of the stance foot in these steps
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
@@ -193,6 +193,8 @@ def walk_on(
         tangent[: y.size] = to_form(system.form, tangent)
     lead = tolerances.new(y.size)
     lead.clock[T] = walk_state.progress.stopped_at
+    # Forms have states of different sizes, and each size needs a method with memory of that size. They share clock and
+    # counts, so that they act as one method.
     by_size = {y.size: lead}
     finder = finder_for(lead, EVENT_ROWS, walker.size)
     while True:
@@ -231,14 +233,15 @@ def walk_contact(
     A start whose hip is already too low is rejected.
     """
     frame = ground.frame
-    s = vector(OF_BODIES)
-    c = vector(OF_BODIES)
+    s = vector(BODY_VECTOR)
+    c = vector(BODY_VECTOR)
     sines_cosines(walker.whole, start, s, c)
     if hip_height(walker.whole, s, c, start) < FALLEN_HIP * frame.leg_length:
         walk_state = new_walk_state(walker, ground, stance, steps, start)
         stopped = Stopped(Outcome.REJECTED, 0.0, start, np.zeros(4, np.int64))
         return gather(stopped, walk_state, new_observer(walker, walk_state, start), walker, tolerances)
-    room = int(USUAL_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
+    # The number of samples is not known in advance. If the memory fills up, the walk is repeated with twice as much.
+    room = int(EXPECTED_STEP * steps * frame.pendulum_time / sampling) + 2 if isinstance(sampling, float) else 0
     while True:
         walk_state = new_walk_state(walker, ground, stance, steps, start)
         times = sampling * np.arange(room, dtype=np.float64) if isinstance(sampling, float) else sampling
@@ -280,7 +283,7 @@ def run_parts(
 def losses_by_channel(walker: ContactWalker, dissipated: Floats) -> dict[str, float]:
     """Return the dissipated energies (J) by channel, without the knees' channels for a walker without knees."""
     pairs = zip(LOSSES, dissipated.tolist(), strict=True)
-    return {loss.key: joules for place, (loss, joules) in enumerate(pairs) if walker.kneed or place < KNEE_STRIKES}
+    return {loss.key: joules for index, (loss, joules) in enumerate(pairs) if walker.kneed or index < KNEE_STRIKES}
 
 
 def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
@@ -296,7 +299,7 @@ def release_pin(walker: ContactWalker, walk_state: WalkState, y: State) -> None:
 def explained_residual(observer: ContactObserver, tolerances: Tolerances) -> float:
     """Compute the largest residual of the energy balance (J) that the tolerance explains. A larger one is a fault."""
     exchanged = observer.tally.energy_below + np.abs(observer.account[:TORQUE]).sum()
-    return float(UNEXPLAINED * max(tolerances.rtol, FINEST_RTOL) * exchanged)
+    return float(RESIDUAL_FACTOR * max(tolerances.rtol, FINEST_RTOL) * exchanged)
 
 
 def check_balance(ended: int, observer: ContactObserver, tolerances: Tolerances) -> Outcome:

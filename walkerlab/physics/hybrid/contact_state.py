@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.physics.ground.knees import FLEXED, extension, extension_rate
+from walkerlab.physics.ground.knees import MIN_FLEXION, extension, extension_rate
 from walkerlab.physics.ground.terrain import cell_at, has_ground_in_cell, starts_with_ground
 from walkerlab.physics.ground.walker import (
     BENT,
@@ -113,7 +113,7 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
     whole = walker.whole
     if walker.kneed:
         knee[stance] = LOCKED
-        if extension(whole, swing, y) < -FLEXED:
+        if extension(whole, swing, y) < -MIN_FLEXION:
             knee[swing] = BENT
         straight = max(abs(extension(whole, swing, y)), abs(extension_rate(whole, swing, y))) < STRAIGHT_KNEE
         heights = [foot.height for foot in feet_motion(whole, y)]
@@ -148,7 +148,10 @@ def initial_sides(
 
 
 def zero_side(value_and_rate: tuple[float, float], scales: tuple[float, float], otherwise: int) -> tuple[int, bool]:
-    """Return the sign of a value, of its rate (if the value is zero) or `otherwise`, and whether the value is zero."""
+    """Return the sign of a value, and whether the value is zero.
+
+    If it is, the sign is that of its rate, and if that is zero as well, `otherwise`.
+    """
     for value, scale in zip(value_and_rate, scales, strict=True):
         if abs(value) > START_ROUNDING * scale:
             return (1 if value > 0.0 else -1), value is not value_and_rate[0]

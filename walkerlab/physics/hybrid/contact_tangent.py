@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkerlab.physics.ground.walker import OF_STATES
+from walkerlab.physics.ground.walker import STATE_VECTOR
 from walkerlab.physics.kernels import kernel_part, pass_by_reference, vector
 from walkerlab.physics.solvers.linear import factor, solve
 from walkerlab.physics.solvers.radau5 import RADAU_NODES
 from walkerlab.physics.solvers.stepping import T_OLD, T, interpolate
 from walkerlab.physics.solvers.system import jacobian
 
-THIS_SIDE = 4e-12  # s, a few times the uncertainty of event times
+SIDE_OFFSET = 4e-12  # s, a few times the uncertainty of event times
 ROOT6 = 6.0**0.5
 # coefficients of Radau IIA: Hairer and Wanner II, (5.6)
 RADAU_WEIGHTS = np.array(
@@ -55,7 +55,7 @@ def new_tangent(n: int, directions: int) -> Tangent:
 
 @kernel_part
 def jacobian_at(method: Any, system: Any, fraction: float, J: Any) -> None:
-    y = vector(OF_STATES)[: method.y.size]
+    y = vector(STATE_VECTOR)[: method.y.size]
     interpolate(method, system, fraction, y)
     jacobian(system, method.clock[T_OLD] + fraction * (method.clock[T] - method.clock[T_OLD]), y, J)
 
@@ -84,7 +84,7 @@ def carry_tangent(tangent: Tangent, method: Any, system: Any) -> None:
 def jacobian_at_end(tangent: Tangent, method: Any, system: Any) -> None:
     """Compute the Jacobian at the solver step's end, extrapolated from two states shortly before the end."""
     # A solver step up to a switching point of the force law may end on either side of it, where the Jacobian jumps.
-    near = min(0.25, THIS_SIDE / (method.clock[T] - method.clock[T_OLD]))
+    near = min(0.25, SIDE_OFFSET / (method.clock[T] - method.clock[T_OLD]))
     for i in range(2):
         jacobian_at(method, system, 1.0 - (1 + i) * near, tangent.stages[2 + i])
     n = method.y.size

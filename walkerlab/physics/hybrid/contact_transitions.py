@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from walkerlab.physics.ground.knees import FLEXED, IdealLock, extension
+from walkerlab.physics.ground.knees import MIN_FLEXION, IdealLock, extension
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import (
     foothold_height,
@@ -91,6 +91,7 @@ def apply_event(
             return touch(system.form, walk_state, feet, foot, t, y)
     elif kind == LEFT_EDGE or kind == RIGHT_EDGE:
         walk_state.at_zero[event] = 0
+        # One edge of the old cell is the opposite edge of the new one, so that event function is now zero.
         walk_state.at_zero[foot * PER_FOOT + (LEFT_EDGE if kind == RIGHT_EDGE else RIGHT_EDGE)] = 1
         walk_state.cells[foot] += 1 if kind == RIGHT_EDGE else -1
         if not has_ground_in_cell(walk_state.cells[foot]):
@@ -273,5 +274,5 @@ def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> No
 def note_flexion(form: GroundModel, walk_state: WalkState, y: Any) -> None:
     """Mark a released knee as bent once it has flexed, so that it locks when it straightens."""
     for knee in range(2):
-        if walk_state.knee[knee] == RELEASED and extension(form, knee, y) < -FLEXED:
+        if walk_state.knee[knee] == RELEASED and extension(form, knee, y) < -MIN_FLEXION:
             walk_state.knee[knee] = BENT

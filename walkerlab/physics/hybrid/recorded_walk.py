@@ -32,7 +32,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     Mode,
     RigidModel,
     apply_couplings,
-    by_turns,
+    compute_in_turns,
     energies,
     energy_at_touch,
     models_in_turn,
@@ -143,14 +143,14 @@ def take_walk(
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)
     if hip_above_fall(walker, start) < 0.0:
-        return recorder.finished(Outcome.REJECTED)
+        return recorder.build_result(Outcome.REJECTED)
     status = Outcome.WALKED
     while recorder.steps < steps and status == Outcome.WALKED:
         before = recorder.steps
         status = recorder.walk_on(rises[before : before + STEPS_AT_ONCE + 1])
         if advance is not None:
             advance(recorder.steps - before)
-    return recorder.finished(status)
+    return recorder.build_result(status)
 
 
 def is_straight(walker: RigidModel, start: State) -> bool:
@@ -196,9 +196,9 @@ class Recorder:
         steps = rises.size - 1
         seen = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
         times = np.zeros(0)
-        if self.sampled:  # enough samples for the longest steps
-            most = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
-            times = self.interval * np.arange(self.grid_index, self.grid_index + most, dtype=np.float64) - self.time
+        if self.sampled:
+            room = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+            times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
         if self.locked and self.steps == 0:
             seen.knee_time[0] = -1.0
         observer = new_observer(times, self.numbers)
@@ -235,7 +235,7 @@ class Recorder:
     def _mean_energy(self, strikes: Array, after: Array) -> float:
         """Compute the mean energy over time (J). Heights are from the contact point at the touch before each step."""
         touched = np.append(self.start[STANCE], after[:, STANCE])
-        zeros = by_turns(self.walker, np.arange(touched.size), energy_at_touch, touched)
+        zeros = compute_in_turns(self.walker, np.arange(touched.size), energy_at_touch, touched)
         if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
         durations = np.diff(strikes, prepend=0.0, append=max(float(self.tally.duration), self.time))
@@ -265,7 +265,7 @@ class Recorder:
         hip = hip + residual if laws[HIP_ROW].damping else hip
         residual = 0.0 if knees is not None or laws[HIP_ROW].damping else residual
         pushed = walker.push_off or walker.exchanged.push_off
-        push = float(by_turns(walker, np.arange(len(before)), push_off_work, before).sum()) if pushed else 0.0
+        push = float(compute_in_turns(walker, np.arange(len(before)), push_off_work, before).sum()) if pushed else 0.0
         weight = float(walker.mass * walker.gravity)
         forward = float(self.tally.forward_work)
         return DrivenWork(weight, gravity, push, hip, torque, forward, knees), abs(residual)
@@ -278,6 +278,7 @@ class Recorder:
         events = np.append(strikes, self.time) if self.steps else strikes
         kept = far_from(grid, np.sort(events), CLOSEST_SAMPLES * self.interval)
         swing = self.steps + np.arange(strikes.size)
+        # A strike has two states, before and after. Adjacent floats as times keep the samples in order.
         time = np.concatenate((grid[kept], np.nextafter(strikes, -np.inf), strikes))
         state = np.concatenate((observer.states[:count][kept], before, after))
         step = np.concatenate((self.steps + observer.steps[:count][kept], swing, swing + 1))
@@ -287,7 +288,7 @@ class Recorder:
         order = np.argsort(time)
         return Samples(time[order], state[order], step[order], bent[order])
 
-    def finished(self, outcome: Outcome) -> RigidWalkResult:
+    def build_result(self, outcome: Outcome) -> RigidWalkResult:
         if self.tally.duration == 0.0:  # no swing has begun, so the start has not been observed yet
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
@@ -295,7 +296,7 @@ class Recorder:
             outcome = Outcome.LIFTED_OFF
         strikes, before, after = (np.concatenate(blocks) for blocks in (self.strikes, self.before, self.after))
         steps = np.arange(len(before))
-        lengths = by_turns(self.walker, steps, step_lengths, np.vstack((self.start, after))[:-1], before)
+        lengths = compute_in_turns(self.walker, steps, step_lengths, np.vstack((self.start, after))[:-1], before)
         climbed = 0.0 if self.heights is None else float(self.heights[self.steps])
         gravity = float(self.walker.mass) * float(
             self.walker.gravity_along * lengths.sum() - self.walker.gravity_down * climbed
@@ -329,7 +330,7 @@ class Recorder:
 def scale_rates(walker: RigidModel, state: State, swing: float, stance: float) -> State:
     """Return a state just after heel strike with the velocities of swing and stance leg scaled."""
     n = len(state) // 2
-    rates = [(stance if place == STANCE else swing) * rate for place, rate in enumerate(state[n:])]
+    rates = [(stance if body == STANCE else swing) * rate for body, rate in enumerate(state[n:])]
     return (*state[:n], *apply_couplings(walker, AT_STRIKE, rates).tolist())
 
 

@@ -110,6 +110,7 @@ def swing_derivative(system: TwoLegs, t: float, y: Any) -> Any:
     r_1 = -along * U_1 - down * F_1
     r_2 = -along * U_2 - down * F_2
     M_12 = system.A[2] * cos_d + system.B[2] * sin_d
+    # Adding zero lanes makes lanes of a number: both branches below must give the variable one type.
     M_22 = system.A[3] + 0.0 * cos_d
     if R != 0.0:
         pulled = system.mass * along + squared_1 * F_1 + squared_2 * F_2
@@ -229,6 +230,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     h = min(load_lanes(rows, NEXT_STEP), left)
     stages, end, end_rate = run_stages(walker, 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(LANE_ERROR_5, stages), combine(LANE_ERROR_3, stages))
+    # Lanes cannot branch, so TINY_ERROR prevents a division by zero here and below.
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + TINY_ERROR)
     change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
     change = min(GROW_MOST, max(SHRINK_MOST, change))

@@ -17,7 +17,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     SWING,
     Mode,
     RigidModel,
-    by_turns,
+    compute_in_turns,
     ground_reaction,
 )
 
@@ -97,7 +97,7 @@ def places(
         ]
         return np.stack((contact, hip, foot, *knees), axis=1)
 
-    at = by_turns(walker, step, points, angle, step)
+    at = compute_in_turns(walker, step, points, angle, step)
     return Places(at[:, 0], at[:, 1], at[:, 2], at[:, 3:] if knees_m else None)
 
 

@@ -154,6 +154,7 @@ def events_in_step(system: Mode, finder: CrossingFinder, at_start: bool) -> tupl
         sample_events(system, finder.states[node], node, finder)
     on_ground = at_start and system.behind == system.rise
     strike = first_crossing(finder, HEEL_STRIKE, FALLING, 0.0, on_ground)
+    # A foot that comes down behind the stance foot scuffs, which the model ignores.
     while strike <= 1.0 and value_at(finder, AHEAD, strike) <= 0.0:
         strike = first_crossing(finder, HEEL_STRIKE, FALLING, strike + 1e-12, on_ground)
     fall = first_crossing(finder, HIP_FALL, FALLING, 0.0, False)

@@ -36,7 +36,7 @@ class DrivenWork(NamedTuple):
         """Net work of gravity, push-off, hip and knees (J)."""
         return self.gravity + self.push_off + self.hip + (self.knees or 0.0)
 
-    def per_step(self, steps: int) -> dict[str, float]:
+    def work_per_step(self, steps: int) -> dict[str, float]:
         """Compute the mean work per step (J) by source. The hip's work includes the work of its torque."""
         works = {name: getattr(self, name) for name in self._fields if name != "weight"}
         return {name: work / steps for name, work in works.items() if work is not None}

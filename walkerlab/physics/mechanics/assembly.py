@@ -31,7 +31,7 @@ class Tree(NamedTuple):
     arm_x: Floats  # (n,) c, kg m: first moments about the root; zero if the root is the centre of mass
     arm_y: Floats
 
-    def merged(self, members: Floats) -> dict[str, Any]:
+    def merge_bodies(self, members: Floats) -> dict[str, Any]:
         """Return the fields of a Mechanism for grouped bodies. `members` (bodies, n) is 1 where a body belongs to a
         group.
         """

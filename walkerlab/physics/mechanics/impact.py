@@ -67,8 +67,8 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
             along -= foot_U[l] * y[n + l]
             upward += foot_F[l] * y[n + l]
     for k in range(n):
-        place = model.roles[k] if other_foot else k
-        new[k], new[n + k] = y[place], y[n + place]
+        body = model.roles[k] if other_foot else k
+        new[k], new[n + k] = y[body], y[n + body]
     equations(model, new, s, c, F, U, M, p)
     for k in range(n):
         for l in range(n):
@@ -92,8 +92,8 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
                 along -= foot_F[l] * y[at + l] * y[n + l] + foot_U[l] * y[at + n + l]
                 upward += foot_F[l] * y[at + n + l] - foot_U[l] * y[at + l] * y[n + l]
         for k in range(n):
-            place = model.roles[k] if other_foot else k
-            new[at + k], new[at + n + k] = y[at + place], y[at + n + place]
+            body = model.roles[k] if other_foot else k
+            new[at + k], new[at + n + k] = y[at + body], y[at + n + body]
         twist = 0.0
         if pushed:
             push = push_off(model, new)
@@ -137,10 +137,10 @@ def lock(
     factors = M.copy()
     factor_linked(E, n, factors)
     constraints = Constraints(E, M, factors, F, U)
-    project(tree, constraints, omega, 0.0, 0.0, 0.0, np.zeros(n), p)
+    project(tree, constraints, omega, along=0.0, upward=0.0, twist=0.0, turned=np.zeros(n), p=p)
     if rates.shape[1] > 0:
         mass_change(tree, s, c, turns, p - omega, 0.0, 0.0, turned)
-        project(tree, constraints, rates, 0.0, 0.0, 0.0, turned, changes)
+        project(tree, constraints, rates, along=0.0, upward=0.0, twist=0.0, turned=turned, p=changes)
     return p, float(0.5 * (M @ omega) @ (omega - p)), changes
 
 
@@ -190,12 +190,12 @@ def push_off_work(model: RigidModel, before: Floats) -> Floats:
     # the trailing leg carries no other body; its constants about the hip are those with which it swings next
     following = model.exchanged
     leg = [SWING] if following.shank == NO_SHANK else [SWING, int(following.shank)]
-    own = following.A[np.ix_(leg, leg)].sum()
+    inertia_leg = following.A[np.ix_(leg, leg)].sum()
     moment_x = following.arm_x[leg].sum()
     moment_y = following.arm_y[leg].sum()
     for pairs in (A, B):
         pairs[STANCE, :], pairs[:, STANCE] = 0.0, 0.0
-    A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = own, moment_x, moment_y
+    A[STANCE, STANCE], arm_x[STANCE], arm_y[STANCE] = inertia_leg, moment_x, moment_y
     psi = before[:, :n] + model.slope
     s = np.sin(psi)
     c = np.cos(psi)

@@ -93,6 +93,7 @@ class Assembly:
         coupled = [body for coupling in self.couplings for body in (coupling.body, *coupling.of)]
         for body in (*placed, *locked, *coupled, *self.legs[0], *self.legs[1]):
             self.index(body)
+        # Bodies that are connected so far have the same group, so a hinge within a group would close a loop.
         group = list(range(len(names)))
         for joint in self.joints:
             one = group[self.index(joint.parent)]

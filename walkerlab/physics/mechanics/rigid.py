@@ -23,18 +23,18 @@ SYMMETRY_TOLERANCE = 1e-12  # relative difference up to which two legs count as 
 
 
 @dataclass(frozen=True)
-class BodyPlaces:
+class BodyGroups:
     """Mapping of an assembly's bodies to those of the rigid model, where the straight stance leg is one body."""
 
     names: tuple[str, ...]  # names of the angles, without the prefix 'theta_'
     members: Floats  # (bodies, n) 1 where an assembly's body is part of a model's body, otherwise 0
     roles: tuple[int, ...]  # body k after a heel strike is body roles[k] before it
     knees: tuple[tuple[int, int], ...]  # indices (shank, thigh) of the swing knee; empty for straight legs
-    lower: int  # number of lower bodies of the swing leg; of unequal legs, the larger number
+    lower: int  # number of bodies of the swing leg below its uppermost one; for unequal legs, the larger number
 
 
 def rigid_on_slope(assembly: Assembly, gravity: float, slope: float, knee_locked_at_strike: bool = True) -> RigidModel:
-    """Build the rigid model of an assembly on a slope (rad). The other arguments are as in `on_level_ground`."""
+    """Build the rigid model of an assembly on a slope (rad). The other arguments are as in `rigid_on_level_ground`."""
     return change_slope(rigid_on_level_ground(assembly, gravity, knee_locked_at_strike), slope)
 
 
@@ -60,35 +60,35 @@ def rigid_on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_str
 
 
 def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bool) -> RigidModel:
-    """Build the model of the steps in which an assembly's first leg swings. Arguments as in `on_level_ground`."""
+    """Build the model of the steps in which an assembly's first leg swings. Arguments as in `rigid_on_level_ground`."""
     hip = find_hip(assembly)
-    places = group_bodies(assembly)
+    groups = group_bodies(assembly)
     swing_foot, foot = assembly.feet
     swing_root, root = (Anchor(each.body, each.centre_m) for each in assembly.feet)
-    to_foot = places.members.T @ levers(assembly, root, swing_root)
-    # of straight legs, from the centre of each foot's arc
+    to_foot = groups.members.T @ levers(assembly, root, swing_root)
+    # for straight legs, measured from the centre of each foot's arc
     to_hip = levers(assembly, root, Anchor(hip.parent, hip.parent_point_m)).sum(axis=0)
     swing_to_hip = levers(assembly, swing_root, Anchor(hip.child, hip.child_point_m)).sum(axis=0)
     soles = np.array([[foot.radius_m, *to_hip], [swing_foot.radius_m, *swing_to_hip]])
-    n = len(places.names)
-    members = places.members
+    n = len(groups.names)
+    members = groups.members
     coupled = {int(np.argmax(members[body])): row @ members for body, row in followers(assembly).items()}
-    knees = {shank: np.eye(n)[thigh] for shank, thigh in places.knees}
-    # the place of a shank in a straight leg beside a kneed one stays in line with the leg
-    coupled |= {place: np.eye(n)[SWING] for place in range(n) if not members[:, place].any()}
+    knees = {shank: np.eye(n)[thigh] for shank, thigh in groups.knees}
+    # If only the other leg has a knee, this leg still has an index for a shank, which stays in line with the leg.
+    coupled |= {body: np.eye(n)[SWING] for body in range(n) if not members[:, body].any()}
     free = () if knee_locked_at_strike else tuple(knees)
     section_indices = (STANCE, n + SWING, n + STANCE, *(n + shank for shank in free))
     in_line = {**coupled, **knees}
     reductions = [reduction(rows, n) for rows in (coupled, in_line, coupled if free else in_line)]
-    shank, thigh = places.knees[0] if places.knees else (NO_SHANK, NO_SHANK)
+    shank, thigh = groups.knees[0] if groups.knees else (NO_SHANK, NO_SHANK)
     return new_rigid_model(
         n,
-        **tree_about(assembly, root).merged(members),
+        **tree_about(assembly, root).merge_bodies(members),
         foot_x=to_foot[:, 0],
         foot_y=to_foot[:, 1],
         E=reductions,
-        hinges=[(SWING, STANCE), *((place, SWING) for place in range(2, 2 + places.lower))],
-        roles=places.roles,
+        hinges=[(SWING, STANCE), *((body, SWING) for body in range(2, 2 + groups.lower))],
+        roles=groups.roles,
         section=[*section_indices, *[0] * (n + 1 - len(section_indices))],
         coordinates=len(section_indices),
         thigh=thigh,
@@ -107,7 +107,7 @@ def swinging_first(assembly: Assembly, gravity: float, knee_locked_at_strike: bo
     )
 
 
-def group_bodies(assembly: Assembly) -> BodyPlaces:
+def group_bodies(assembly: Assembly) -> BodyGroups:
     """Group the bodies in the model's order: swing leg (or thigh), straight stance leg, swing shank, shared bodies."""
     swinging, stance = assembly.legs
     shared = tuple(body.name for body in assembly.bodies if body.name not in (*swinging, *stance))
@@ -115,12 +115,12 @@ def group_bodies(assembly: Assembly) -> BodyPlaces:
     below = [*((name,) for name in swinging[1:]), *[()] * (more + 1 - len(swinging))]
     groups: list[tuple[str, ...]] = [(swinging[0],), stance, *below, *((name,) for name in shared)]
     members = np.zeros((len(assembly.bodies), len(groups)))
-    for place, group in enumerate(groups):
+    for index, group in enumerate(groups):
         for name in group:
-            members[assembly.index(name), place] = 1.0
+            members[assembly.index(name), index] = 1.0
     longer = max(swinging, stance, key=len)
     knee_position = {knee.shank: knee.thigh for knee in assembly.knees}
-    return BodyPlaces(
+    return BodyGroups(
         names=("1", "2", *(f"1_{name.split()[0]}" for name in longer[1:]), *(name.split()[0] for name in shared)),
         members=members,
         roles=(STANCE, SWING, *((STANCE,) * more), *range(2 + more, len(groups))),
@@ -130,7 +130,7 @@ def group_bodies(assembly: Assembly) -> BodyPlaces:
 
 
 def group_index(groups: list[tuple[str, ...]], name: str) -> int:
-    return next(place for place, group in enumerate(groups) if name in group)
+    return next(index for index, group in enumerate(groups) if name in group)
 
 
 def find_hip(assembly: Assembly) -> Revolute:
@@ -190,8 +190,8 @@ def leg_measures(assembly: Assembly, k: int) -> tuple[Floats, ...]:
     foot = assembly.feet[k]
     hip = find_hip(assembly)
     at_hip = Anchor(hip.parent, hip.parent_point_m) if k == 1 else Anchor(hip.child, hip.child_point_m)
-    own = [assembly.index(name) for name in leg]
-    sole = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[own].ravel()]
+    bodies = [assembly.index(name) for name in leg]
+    sole = [foot.radius_m, *levers(assembly, at_hip, Anchor(foot.body, foot.centre_m))[bodies].ravel()]
     tree = tree_about(assembly, at_hip)
-    pairs, arms = (np.stack(each)[..., own] for each in ((tree.A, tree.B), (tree.arm_x, tree.arm_y)))
-    return np.array(sole), pairs[:, own], arms
+    pairs, arms = (np.stack(each)[..., bodies] for each in ((tree.A, tree.B), (tree.arm_x, tree.arm_y)))
+    return np.array(sole), pairs[:, bodies], arms

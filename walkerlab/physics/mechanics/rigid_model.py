@@ -122,11 +122,11 @@ class RigidModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     def changed(self, **fields: Any) -> "RigidModel":
         """Return a read-only copy with some fields changed. Of legs that differ, both models are changed."""
-        model = with_fields(self, fields)
-        return model if self.paired_with is None else pair(model, with_fields(self.paired_with, fields))
+        model = replace_fields(self, fields)
+        return model if self.paired_with is None else pair(model, replace_fields(self.paired_with, fields))
 
 
-def with_fields(model: Any, fields: Any) -> RigidModel:
+def replace_fields(model: Any, fields: Any) -> RigidModel:
     """Return a read-only copy of a model without a partner, with some fields changed."""
     memory: Any = np.empty((), model.dtype)
     memory[()] = model
@@ -137,28 +137,29 @@ def with_fields(model: Any, fields: Any) -> RigidModel:
 
 
 def pair(first: RigidModel, second: RigidModel) -> RigidModel:
-    """Return `first`, in which leg 1 swings, with the model `second`, in which leg 2 swings."""
-    model = with_fields(first, {})
-    other = with_fields(second, {})
+    """Return a copy of `first`, in which leg 1 swings, paired with `second`, in which leg 2 swings."""
+    model = replace_fields(first, {})
+    other = replace_fields(second, {})
+    # NumPy would look for a field of this name in the record.
     object.__setattr__(model, "paired_with", other)
     return model
 
 
 def restored(record: Any, paired_with: RigidModel | None) -> RigidModel:
     """Return the model of a pickled record."""
-    model = with_fields(record, {})
+    model = replace_fields(record, {})
     return model if paired_with is None else pair(model, paired_with)
 
 
 def models_in_turn(model: RigidModel) -> Any:
-    """Return an array of the models of one step after the other, one for equal legs and two otherwise, for kernels."""
+    """Return the models of successive steps as an array for kernels: one model for equal legs, otherwise two."""
     models = np.array([model] if model.paired_with is None else [model, model.paired_with], model.dtype)
     models.flags.writeable = False
     return models
 
 
-def by_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> Floats:
-    """Return compute(model, *rows) of rows (n, ...) in steps (n,). The models of legs that differ take turns."""
+def compute_in_turns(model: RigidModel, step: Any, compute: Any, *rows: Any) -> Floats:
+    """Return compute(model, *rows) for rows (n, ...) in steps (n,). Odd steps use the other leg's model."""
     if model.paired_with is None:
         return np.asarray(compute(model, *rows))
     parts = [(step % 2 == k, each) for k, each in enumerate((model, model.exchanged))]

@@ -76,8 +76,8 @@ class Mechanism(np.record):  # type: ignore[misc]  # NumPy's stubs call one of i
     @property
     def hip(self) -> Floats:
         """Parameters (LAW_NUMBERS,) of the SpringDamper between the legs."""
-        numbers: Floats = self.laws[HIP_ROW]
-        return numbers
+        parameters: Floats = self.laws[HIP_ROW]
+        return parameters
 
     @property
     def sprung(self) -> bool:
@@ -174,17 +174,17 @@ def add_inertia_gradients(
 ) -> None:
     """Add the derivatives of (centrifugal torques - M alpha) at fixed alpha to by_angle and by_rate (n, n)."""
     for k in range(n):
-        own = 0.0
+        diagonal = 0.0
         for l in range(n):
             A, B = tree.A[k, l], tree.B[k, l]
             cos_d = c[l] * c[k] + s[l] * s[k]
             sin_d = s[l] * c[k] - c[l] * s[k]
             turning = A * sin_d - B * cos_d
-            between = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
-            own -= between
-            by_angle[k, l] += between
+            change = omega[l] * omega[l] * (A * cos_d + B * sin_d) + alpha[l] * turning
+            diagonal -= change
+            by_angle[k, l] += change
             by_rate[k, l] += 2.0 * omega[l] * turning
-        by_angle[k, k] += own
+        by_angle[k, k] += diagonal
 
 
 @forced_inline

@@ -51,7 +51,7 @@ def straight_legs(leg: Limb, hip_mass_kg: float, foot: Arc) -> Assembly:
     )
 
 
-def with_second_leg(walker: Assembly, other: Assembly) -> Assembly:
+def replace_second_leg(walker: Assembly, other: Assembly) -> Assembly:
     """Return `walker` with the second leg of `other`. The hip mass is that of `walker`."""
     legs = walker.legs[0], other.legs[1]
     sources = (walker, legs[0]), (other, legs[1])

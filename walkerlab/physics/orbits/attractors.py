@@ -135,6 +135,7 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
     # Just beyond a flip a walk leaves the unstable gait as slowly as its tangent grows. A walk that repeats while its
     # tangent grows is therefore pushed off the gait, and a walk whose halves differ in mean growth is continued.
     for _ in range(MAX_WALKS):
+        # Any initial direction will do: the one that grows fastest soon dominates.
         walk = step_map.iterate(z, value, transient + steps, np.full(z.size, 1.0 / math.sqrt(z.size)))
         if walk.outcome is not Outcome.WALKED:
             return None
@@ -156,6 +157,7 @@ def largest_exponent(step_map: StepMap, z: Floats, value: float, transient: int,
 
 def independent_blocks(series: Floats) -> int:
     """Count the blocks of BLOCK_LENGTH correlation times that fit into a series (n,)."""
+    # Padding with zeros to twice the length keeps the transform from correlating the end of the series with its start.
     # The correlation time is the sum of the autocorrelation over all lags before the first non-positive value.
     off = series - series.mean()
     spectrum = np.abs(np.fft.rfft(off, 2 * off.size)) ** 2

@@ -36,11 +36,10 @@ CAPTURE = 1e-3  # largest distance at which an attractor counts as reached
 NARROWING = 0.25
 NARROWINGS = 6
 STARTS_PER_POINT = 24  # test walks started around each point of an attractor; all must return to it
-# steps between checks for capture; maximum number of right-hand-side evaluations per step
-STEPS_PER_LOOK = 16
-BATCH_BUDGET = 4_000_000
+STEPS_PER_LOOK = 16  # steps between checks for capture
+BATCH_BUDGET = 4_000_000  # right-hand-side evaluations per step
 
-# Unit walker. Two equal straight legs walk from many starts simultaneously, in lanes; others from one at a time.
+# Unit walker. Walks of two equal straight legs run side by side in lanes, those of other walkers one by one.
 Walker = TwoLegs | RigidModel
 
 
@@ -182,6 +181,7 @@ def find_cycles(walker: Walker, starts: Floats, attractors: Attractors) -> tuple
     rough = walk_to_attractor(walker, attractors, starts, SETTLING_STEPS)
     elsewhere = np.flatnonzero((rough.outcome == Outcome.WALKED) & (rough.attractor == UNREACHED))
     points = rough.last[elsewhere]
+    # Most walks end on the same few cycles, so walks that end at the same point are continued only once.
     _, first = np.unique(np.round(points / (10.0 * CYCLE_DISTANCE)), axis=0, return_index=True)
     distinct = points[np.sort(first)][:MAX_SETTLED_WALKS]
     settled = walk_to_attractor(walker, Attractors(), distinct, RESETTLING_STEPS, tolerances=tight)
@@ -263,10 +263,10 @@ class Window:
         inside  (n, axes) position within each cell, in cell widths from -1/2 to 1/2; cell centres by default
         """
         z = np.tile(np.array(self.rest), (len(cells), 1))
-        for place, (axis, index) in enumerate(zip(self.axes, np.unravel_index(cells, self.cells), strict=True)):
-            width = (self.upper[place] - self.lower[place]) / self.cells[place]
-            offset = 0.0 if inside is None else inside[:, place]
-            z[:, axis] = self.lower[place] + width * (index + 0.5 + offset)
+        for k, (axis, index) in enumerate(zip(self.axes, np.unravel_index(cells, self.cells), strict=True)):
+            width = (self.upper[k] - self.lower[k]) / self.cells[k]
+            offset = 0.0 if inside is None else inside[:, k]
+            z[:, axis] = self.lower[k] + width * (index + 0.5 + offset)
         return z
 
     def draw(self, n: int, generator: np.random.Generator) -> Floats:

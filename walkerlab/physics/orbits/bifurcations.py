@@ -167,8 +167,9 @@ def _cubic(equations: GaitEquations, flip: Bifurcation, v: Floats, w: Floats, h:
 
 
 def predict_doubled(flip: Bifurcation, form: FlipForm, share: float = 1.0) -> tuple[Floats, Floats, float]:
-    """Predict a point x (d + 1,) of the doubled branch, and also return the correction plane's normal and
-    the amplitude.
+    """Predict a point x (d + 1,) of the doubled branch.
+
+    Return it, the normal of the correction plane, and the amplitude.
     """
     xi = share * form.amplitude
     s = form.cubic * xi * xi / form.rate

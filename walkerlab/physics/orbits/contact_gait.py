@@ -16,7 +16,7 @@ from walkerlab.physics.ground.walker import ContactWalker
 from walkerlab.physics.hybrid.contact_events import PASSING, JudgedGround
 from walkerlab.physics.hybrid.contact_result import new_observer, walk_on
 from walkerlab.physics.hybrid.contact_state import new_walk_state
-from walkerlab.physics.orbits.contact_map import OwnPads, coordinates_of
+from walkerlab.physics.orbits.contact_map import AdaptivePads, coordinates_of
 from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides
 from walkerlab.physics.orbits.newton import Effort, NotConverged
 from walkerlab.physics.orbits.step_map import Cycle, gait_near
@@ -52,7 +52,7 @@ def find_gait_from(
     tolerances = replace(tolerances, budget=SEARCH_STEP_BUDGET)
     failure = "from the start, the feet do not even pass each other"
     for steps, z in section_points(walker, ground, tolerances, start):
-        gait = solve_gait_on(OwnPads(lambda _: walker, ground, tolerances, *pitches_m), z, len(pitches_m))
+        gait = solve_gait_on(AdaptivePads(lambda _: walker, ground, tolerances, *pitches_m), z, len(pitches_m))
         if isinstance(gait, Cycle):
             return GaitAnswer(gait, f"Newton's method after {steps} steps from the start")
         failure = f"Newton's method found no gait after {steps} steps from the start: {gait}"
@@ -97,7 +97,7 @@ def section_points(
             return
 
 
-def solve_gait_on(pads: OwnPads, z: Floats, steps: int, rigidity: float = 0.0) -> Cycle | str:
+def solve_gait_on(pads: AdaptivePads, z: Floats, steps: int, rigidity: float = 0.0) -> Cycle | str:
     """Solve for a gait of some steps near z (d,), or return why there is none."""
     gait = gait_near(pads, z, rigidity, CONTACT_EFFORT, steps)
     if isinstance(gait, NotConverged):
@@ -117,7 +117,7 @@ def scale_laws(walker: ContactWalker, stiffness: float, damping: float, creep: f
     """Return the walker with the ground's stiffness, damping and friction velocities multiplied by these factors."""
     # The full-damping penetration shrinks like the static penetration, so that the damping ratio is unchanged.
     normal = walker.normal.stiffen(stiffness, damping, stiffness ** (-1.0 / walker.normal.exponent))
-    return walker._replace(normal=normal, friction=walker.friction.with_creep(creep))
+    return walker._replace(normal=normal, friction=walker.friction.scale_creep(creep))
 
 
 def set_rigidity(walker: ContactWalker, rigidity: float) -> ContactWalker:
@@ -132,7 +132,9 @@ def follow_from_rigid(
     count = len(pitches_m)
 
     def gait_at(rigidity: float, z: Floats, pitches_m: Sequence[float]) -> Cycle | str:
-        return solve_gait_on(OwnPads(partial(set_rigidity, walker), ground, tolerances, *pitches_m), z, count, rigidity)
+        return solve_gait_on(
+            AdaptivePads(partial(set_rigidity, walker), ground, tolerances, *pitches_m), z, count, rigidity
+        )
 
     points = section_points(set_rigidity(walker, 1.0), ground, tolerances, start)
     hint = "" if walker.whole.push_off == 0.0 else "Shorten the push-off (push_off.duration_s). "
@@ -155,13 +157,13 @@ def follow_from_rigid(
 
     state = Follower(
         evaluate_softer, FollowerState(0.0, FIRST_STRIDE, ((0.0, append_length(last)),)), RIGIDITY_STRIDES
-    ).to(1.0)
+    ).follow_to(1.0)
     if state.value == 1.0:
         return GaitAnswer(gaits[1.0], "followed from nearly rigid ground")
     rigidity = 1.0 - state.value
     return GaitAnswer(
         None,
-        f"followed from nearly rigid ground the gait is lost at {MAX_STIFFENING**rigidity:.3g} times the stiffness "
+        f"followed from nearly rigid ground, the gait is lost at {MAX_STIFFENING**rigidity:.3g} times the stiffness "
         f"and creep {MAX_CREEP_FACTOR**rigidity:.3g} times slower than requested",
         f"{hint}Stiffen or damp the contact, lower its stiction velocity, or choose a gentler slope.",
     )

@@ -174,7 +174,7 @@ def section_tangents(walker: ContactWalker, state: State, stance: int) -> Floats
 
 
 def stance_of(swing: int) -> int:
-    """Return the foot that stands in a walk's step of this number. In step 0 leg 1 swings."""
+    """Return the stance foot of a step, counted from 0. In step 0 leg 1 swings."""
     return STANCE_FOOT if swing % 2 == 0 else 1 - STANCE_FOOT
 
 
@@ -217,7 +217,7 @@ def step_from_section(
         Phi = observer.tangent.Phi
         on_section = Phi - np.outer(rate, gradient @ Phi) / (gradient @ rate)
         DP = np.column_stack([coordinates_of(walker, column, landed) for column in on_section.T])
-    advance, rose = (float(end[place] - start[place]) for place in (ALONG, HEIGHT))
+    advance, rose = (float(end[index] - start[index]) for index in (ALONG, HEIGHT))
     spacing = float(walk_state.touch_along[0] - walk_state.foothold[stance] - walk_state.slip[0])
     half = min(1.0, max(-1.0, 0.5 * spacing / ground.frame.leg_length))
     pulse = walker.whole.push_off_duration if walker.whole.push_off != 0.0 else 0.0
@@ -273,9 +273,9 @@ def walk_from_section(
         stopped = go_on(walk_state, stopped.state)
     touched = int(walk_state.progress.steps)
     times = walk_state.touch_time[:touched]
-    places = walk_state.touch_along[:touched]
-    angles = touch_angles(walker, ground.frame.leg_length, np.diff(places), np.diff(walk_state.touch_height[:touched]))
-    return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(places), angles, z)
+    along = walk_state.touch_along[:touched]
+    angles = touch_angles(walker, ground.frame.leg_length, np.diff(along), np.diff(walk_state.touch_height[:touched]))
+    return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(along), angles, z)
 
 
 def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
@@ -284,7 +284,7 @@ def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Fl
     return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
 
-def legs_sampled_from_section(
+def sample_legs_from_section(
     walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats
 ) -> Floats:
     """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
@@ -428,7 +428,9 @@ class ContactMap(StepMap):
                 tripped = float(self._walk(on_pads, z, False).outcome is not Outcome.WALKED)
         return np.array([slip, tripped])
 
-    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0) -> DisturbedWalk:
+    def take_disturbed_walk(
+        self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
+    ) -> DisturbedWalk:
         """Walk over foothold heights (m) from the touchdown after z, at which the push is applied."""
         site = valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
@@ -436,16 +438,16 @@ class ContactMap(StepMap):
         walk = walk_from_section(*scene, z * self._units, heights_m, push_N_s, stance_of(swing))
         return replace(walk, z=walk.z / self._units)
 
-    def settled(self, z: Floats, p: float) -> Floats:
+    def rest_on_ground(self, z: Floats, p: float) -> Floats:
         site = self._at(p)
         return z if site is None else stand(site.walker, z * self._units, STANCE_FOOT) / self._units
 
-    def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
+    def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         site = valid(self._at(p))
         touch = self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
-        return legs_sampled_from_section(site.walker, site.ground, endless, z * self._units, heights_m, times)
+        return sample_legs_from_section(site.walker, site.ground, endless, z * self._units, heights_m, times)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         stride = walk_steps(self, z, p, self.stride, derived=False)
@@ -460,13 +462,13 @@ class ContactMap(StepMap):
         site = valid(self._at(p))
         return site.ground.frame.leg_length, site.ground.frame.pendulum_time
 
-    def at(self, tolerances: Tolerances) -> ContactMap:
+    def replace_tolerances(self, tolerances: Tolerances) -> ContactMap:
         changed = copy(self)
         changed.tolerances = tolerances
         return changed
 
 
-class OwnPads(Stepper):
+class AdaptivePads(Stepper):
     """Stepper (SI) of a walker on compliant ground that sets the pitch of the pads to the length of the last step.
 
     pitches_m  initial pitch for each step of a gait; legs that differ have one for the steps of each leg
@@ -485,12 +487,12 @@ class OwnPads(Stepper):
         self.pitches_m = [*pitches_m]
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
-        place = swing % len(self.pitches_m)
+        index = swing % len(self.pitches_m)
         walker = self.walker_at(p)
-        pitch_m = self.pitches_m[place]
+        pitch_m = self.pitches_m[index]
         step = step_from_section(walker, self.ground, self.tolerances, z, pitch_m, derived, stance_of(swing))
         if step.outcome is Outcome.WALKED:
-            self.pitches_m[place] = step.length_m if len(self.pitches_m) == 1 else step.spacing_m
+            self.pitches_m[index] = step.length_m if len(self.pitches_m) == 1 else step.spacing_m
         return step
 
 

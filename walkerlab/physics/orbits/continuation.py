@@ -65,7 +65,7 @@ class Follower:
         self._abscissa = abscissa
         self._states = [first]
 
-    def to(self, target: float) -> FollowerState:
+    def follow_to(self, target: float) -> FollowerState:
         """Follow the solution to the parameter value `target`, or until it is lost."""
         # Only the last stride depends on the target, so the cached strides serve every target.
         state = self._states[0]
@@ -118,6 +118,8 @@ def correct(
     if isinstance(solution, NotConverged):
         return solution
     try:
+        # The equations do not change along the solution of this system, and it leaves the plane on the side of its
+        # normal.
         direction = np.linalg.solve(solution.evaluated.jacobian, np.eye(guess.size)[-1])
     except np.linalg.LinAlgError:
         return NotConverged(Outcome.WALKED, singular=True)
@@ -141,7 +143,10 @@ def step_along(
     acceptable: Callable[[CurvePoint[Data]], bool] = lambda _: True,
     before: CurvePoint[Data] | None = None,
 ) -> tuple[CurvePoint[Data], float] | NotConverged:
-    """Find the next `acceptable` point of a curve and the next step length. The point `before` gives the curvature."""
+    """Find the next point that passes `acceptable`, and the next step length.
+
+    The point `before` supplies the curvature.
+    """
     lost = NotConverged(Outcome.WALKED)
     bend = np.zeros_like(last.x)  # curvature: change of the tangent per arclength
     if before is not None:

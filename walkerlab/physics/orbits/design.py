@@ -107,14 +107,12 @@ def is_feasible(problem: DesignProblem, point: Point) -> bool:
 
 
 def search_from_starts(
-    problem: DesignProblem, own: Floats, starts: int, seed: int, search: Searcher | None = None
+    problem: DesignProblem, current: Floats, starts: int, seed: int, search: Searcher | None = None
 ) -> list[DesignSearch]:
-    """Search from the walker's parameters and from random ones, and return successful searches, best
-    feasible one first.
-    """
+    """Search from the `current` parameters and from random ones, and return the successful searches, best first."""
     search = search or (lambda _, start: minimise(problem, start))
-    random_starts = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (starts - 1, own.size))
-    all_starts = (np.clip(own, problem.lower, problem.upper), *random_starts)
+    random_starts = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (starts - 1, current.size))
+    all_starts = (np.clip(current, problem.lower, problem.upper), *random_starts)
     searches = [search(number, start) for number, start in enumerate(all_starts)]
     successful = [search_end for search_end in searches if search_end.point is not None]
 

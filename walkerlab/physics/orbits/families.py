@@ -128,7 +128,7 @@ class GaitBranch:
 
     @property
     def flipped_outside(self) -> bool:
-        """Whether the whole branch lies beyond a flip outside the span, so that one multiplier stays below -1."""
+        """Whether a multiplier is below -1 along the whole branch, because the flip lies outside the span."""
         on_it = any(bifurcation.kind == "flip" for bifurcation in self.bifurcations)
         return not on_it and critical_value("flip", self.points[0].DP) < 0.0
 
@@ -288,7 +288,7 @@ class BranchFollower:
         # long step may reach it. Its branch meets this one only at a flip, where a multiplier of the cycle is 1.
         critical = [m for m in last.evaluated.data.multipliers if 1.0 / CRITICAL_RANGE < abs(m) < CRITICAL_RANGE]
 
-        def near(point: CurvePoint[Cycle]) -> bool:
+        def is_acceptable(point: CurvePoint[Cycle]) -> bool:
             gait = point.evaluated.data
             moves = (min(abs(m - new) for new in gait.multipliers) for m in critical)
             if any(move >= MAX_MULTIPLIER_CHANGE for move in moves):
@@ -297,7 +297,7 @@ class BranchFollower:
             at_flip = bool(np.abs(gait.multipliers - 1.0).min() < MAX_MULTIPLIER_CHANGE)
             return repeats_after == len(gait.steps) or (2 * repeats_after == len(gait.steps) and at_flip)
 
-        return near
+        return is_acceptable
 
     def steps_to_repeat(self, gait: Cycle) -> int:
         """Return the number of steps after which a gait repeats, a divisor of the number of steps that it has."""
@@ -318,7 +318,7 @@ class BranchFollower:
         if edge != equations.value(ahead):
             if abs(edge - equations.value(last.x)) <= EDGE_TOLERANCE * self.span.size:
                 return BranchEnd(edge, END_OF_SPAN)
-            at_edge = self.at_edge(equations, last, ahead)
+            at_edge = self.solve_at_edge(equations, last, ahead)
             if at_edge is not None and at_edge.tangent @ last.tangent > self.control.turn and acceptable(at_edge):
                 return at_edge, step, BranchEnd(edge, END_OF_SPAN)
         following = step_along(equations, last, step, self.control, acceptable, before)
@@ -328,12 +328,14 @@ class BranchFollower:
         value = equations.value(solved.x)
         if value in self.span:
             return solved, step, None
-        at_edge = self.at_edge(equations, last, solved.x)
+        at_edge = self.solve_at_edge(equations, last, solved.x)
         if at_edge is None:
             return solved, step, BranchEnd(value, END_OF_SPAN)
         return at_edge, step, BranchEnd(self.span.nearest(value), END_OF_SPAN)
 
-    def at_edge(self, equations: GaitEquations, last: CurvePoint[Cycle], beyond: Floats) -> CurvePoint[Cycle] | None:
+    def solve_at_edge(
+        self, equations: GaitEquations, last: CurvePoint[Cycle], beyond: Floats
+    ) -> CurvePoint[Cycle] | None:
         """Solve for the gait at the span's edge, between `last` and a point `beyond` (d + 1,), or return None if that
         fails.
         """
@@ -381,8 +383,8 @@ def halves_meet(last: Cycle, gait: Cycle) -> bool:
 def close_on_flips(branch: GaitBranch, branches: Iterable[GaitBranch]) -> GaitBranch:
     flips = [b for parent in branches for b in parent.bifurcations if 2 * parent.period == branch.period]
     ends = []
-    for place, end in enumerate(branch.ends):
-        near = [flip.value for flip in flips if branch.closes_on(flip)[place]]
+    for index, end in enumerate(branch.ends):
+        near = [flip.value for flip in flips if branch.closes_on(flip)[index]]
         ends.append(replace(end, value=min(near, key=lambda value: abs(value - end.value))) if near else end)
     return branch if tuple(ends) == branch.ends else replace(branch, ends=(ends[0], ends[1]))
 

@@ -67,9 +67,30 @@ class Thoroughness:
 # The tolerance suits the contact model's derivatives, which are accurate to about 1e-8.
 CURVES_ON_GROUND = StepControl(first=0.03, shortest=1e-4, longest=0.1, turn=0.95, tolerance=1e-8)
 THOROUGHNESS = {
-    RIGID: Thoroughness(240, 500, 96, 16, 1500, StepControl(), CURVE_CONTROL, 64, 4, other_gaits=True),
+    RIGID: Thoroughness(
+        values=240,
+        transient=500,
+        samples=96,
+        exponents=16,
+        averaged=1500,
+        branch_control=StepControl(),
+        curve_control=CURVE_CONTROL,
+        periods=64,
+        curve_periods=4,
+        other_gaits=True,
+    ),
+    # a step on compliant ground takes a thousand times as long, so there are far fewer of them
     CONTACT: Thoroughness(
-        24, 40, 16, 4, 100, StepControl(tolerance=1e-9, shortest=1e-4), CURVES_ON_GROUND, 4, 1, other_gaits=False
+        values=24,
+        transient=40,
+        samples=16,
+        exponents=4,
+        averaged=100,
+        branch_control=StepControl(tolerance=1e-9, shortest=1e-4),
+        curve_control=CURVES_ON_GROUND,
+        periods=4,
+        curve_periods=1,
+        other_gaits=False,
     ),
 }
 
@@ -163,15 +184,16 @@ class FamilySearch:
         return replace(family, attractors=attractors, exponents=measured)
 
     def doubled_outside(self, family: Family) -> tuple[Family, Attractor | None]:
-        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span, and return the attractor at the
-        smallest value.
+        """Add gaits of 2, 4, 8, ... steps beyond flips outside the span.
+
+        Also return the attractor at the smallest value.
         """
         # A walk from an end of the branch leaves the gait for the attractor; its nearly repeating points are the seeds.
         how = self.thoroughness
         self.announce("gaits of {model} beyond flips outside the span")
         ends = [
-            branch.points[place] for branch in family.branches if branch.period == 1 and branch.flipped_outside
-            for place in (0, -1)
+            branch.points[end] for branch in family.branches if branch.period == 1 and branch.flipped_outside
+            for end in (0, -1)
         ]  # fmt: skip
         reached = [leave_by_flip(self.step_map, end, how.transient, how.samples) for end in ends]
         attractors = [attractor for attractor in reached if isinstance(attractor, Attractor) and attractor.period != 1]

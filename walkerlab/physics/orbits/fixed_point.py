@@ -21,8 +21,8 @@ from walkerlab.physics.mechanics.rigid_model import (
     change_slope,
     feet_on_slope,
     pair,
+    replace_fields,
     swing_foot_motion,
-    with_fields,
 )
 from walkerlab.physics.orbits.continuation import Follower, FollowerState, Strides, interpolate
 from walkerlab.physics.orbits.newton import Effort, NotConverged
@@ -44,7 +44,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
 RANDOM_START = "random start"
-# rad, half the angle between the legs; on level ground or from a random start, a smaller angle counts as standing
+# rad, half the angle between the legs. On level ground, or from a random start, a smaller angle means standing still.
 SMALLEST_ANGLE = 1e-5
 ANGLE_NOISE = 1e-3  # relative to the angle between the legs at heel strike; samples do not resolve smaller angles
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
@@ -76,9 +76,8 @@ class RigidGait:
     state: State  # just after the heel strike
     period: float  # s
     step_length: float  # m
-    multipliers: tuple[
-        complex, ...
-    ]  # eigenvalues of the step map's derivative, largest first; empty if the legs differ
+    # eigenvalues of the step map's derivative, largest first; empty if the legs differ
+    multipliers: tuple[complex, ...]
     stride_multipliers: tuple[complex, ...]  # the same of a stride
     steps: tuple[tuple[float, float], ...]  # period (s) and length (m) of both steps; leg 1 swings in the first
     residual: float  # rad, largest component of P(x) - x, computed in a separate step, with velocities times sqrt(L/g)
@@ -110,7 +109,7 @@ class RigidGait:
 
     @property
     def asymmetry(self) -> dict[str, float]:
-        """Differences between the second and the first step over their mean."""
+        """Second step minus first step, divided by their mean."""
         (first_period, first_length), (second_period, second_length) = self.steps
         return {
             "step_length": (second_length - first_length) / self.step_length,
@@ -144,7 +143,7 @@ def feet_meet(walker: RigidModel, swing: Floats) -> bool:
     return bool(np.any(np.abs(where) < ANGLE_NOISE * abs(ahead[-1])))
 
 
-def straight_only(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
+def select_straight(swing: Floats, bent: NDArray[np.bool_]) -> Floats:
     return swing[~bent]
 
 
@@ -185,11 +184,11 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
         min_normal_impulse=(step.min_normal_impulse or 0.0) * units.force * units.time,
         max_impulse_ratio=step.max_impulse_ratio or None,
         trailing_foot_rises=bool(min(rates) >= 0.0),
-        work={name: work * units.energy for name, work in step.driven.per_step(count).items()},
+        work={name: work * units.energy for name, work in step.driven.work_per_step(count).items()},
         cost_of_transport=step.driven.cost_of_transport(float(step.lengths_m.sum())),
         froude=float(step.lengths_m.sum() / step.periods_s.sum()),
         swings=max(int(np.count_nonzero(np.diff(np.signbit(each)))) for each in apart),
-        feet_meet=any(feet_meet(*each) for each in zip(models, map(straight_only, swings, bent), strict=True)),
+        feet_meet=any(feet_meet(*each) for each in zip(models, map(select_straight, swings, bent), strict=True)),
         knee_strike=None if step.knee_strike_time_s is None else float(step.knee_strike_time_s[0]) * units.time,
         z=tuple(gait.z.tolist()),
     )
@@ -256,7 +255,20 @@ NO_SEED_TEXT = {
 MAX_DRIVE_POINTS = 60
 STRIDE = 2  # steps
 # fields of a model that depend on its legs
-OF_LEGS = ("A", "B", "arm_x", "arm_y", "foot_x", "foot_y", "laws", "push_off", "radius", "swing_radius", "lean", *HIPS)
+LEG_FIELDS = (
+    "A",
+    "B",
+    "arm_x",
+    "arm_y",
+    "foot_x",
+    "foot_y",
+    "laws",
+    "push_off",
+    "radius",
+    "swing_radius",
+    "lean",
+    *HIPS,
+)
 DIFFERENCE_STRIDES = Strides(0.25, 1e-3, 3)
 MAX_DIFFERENCE_JUMP = 0.05  # distance from the prediction; beyond it the gait belongs to another branch
 
@@ -278,7 +290,7 @@ class SlopeBranch:
         follower = self.seed_follower if s > np.cbrt(self.seed.slope) else self.start_follower(s)
         if follower is None:
             return 0.0, None
-        state = follower.to(math.log(s))
+        state = follower.follow_to(math.log(s))
         if state.value < math.log(s):
             return math.exp(3.0 * state.value), None
         return slope, unscale(s, state.points[-1][1])
@@ -336,19 +348,19 @@ def map_over_slope(walker: RigidModel, tolerances: Tolerances) -> RigidMap:
     return RigidMap(partial(change_slope, walker), 1.0, walker, tolerances)
 
 
-def with_mean_legs(walker: RigidModel, share: float) -> RigidModel:
+def average_legs(walker: RigidModel, share: float) -> RigidModel:
     """Return the walker with its legs' differences from their mean times `share`. At 0 it has equal legs."""
     # The constants of both models enter the equations linearly, so all walkers between them are possible.
     models = walker, walker.exchanged
 
-    def between(k: int) -> RigidModel:
-        own = models[k]
+    def blend_models(k: int) -> RigidModel:
+        model = models[k]
         other = models[1 - k]
-        parts = {name: 0.5 * ((1.0 + share) * own[name] + (1.0 - share) * other[name]) for name in OF_LEGS}
+        parts = {name: 0.5 * ((1.0 + share) * model[name] + (1.0 - share) * other[name]) for name in LEG_FIELDS}
         alike = walker.alike or share == 0.0
-        return with_fields(own, {**parts, "alike": alike})
+        return replace_fields(model, {**parts, "alike": alike})
 
-    return between(0) if share == 0.0 else pair(between(0), between(1))
+    return blend_models(0) if share == 0.0 else pair(blend_models(0), blend_models(1))
 
 
 def scale_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
@@ -390,10 +402,10 @@ class Search:
         """Follow the gaits of the walker with two mean legs as the difference between the legs grows."""
         goal = self.walker
         if goal.shank != goal.exchanged.shank:
-            self.lost.append("one knee alone leaves no mean of the two legs to begin with")
+            self.lost.append("only one leg has a knee, so there is no walker with two mean legs to start from")
             return
-        even = with_mean_legs(goal, 0.0)
-        family = RigidMap(partial(with_mean_legs, goal), 1.0, goal, SEARCH_TOLERANCES)
+        even = average_legs(goal, 0.0)
+        family = RigidMap(partial(average_legs, goal), 1.0, goal, SEARCH_TOLERANCES)
 
         def gait_at(share: float, expected: Floats) -> Floats | None:
             effort = Effort(FOLLOWING_TOLERANCE, FOLLOWING_EVALUATIONS, SHORTEST_MOVE)
@@ -404,7 +416,7 @@ class Search:
 
         for k, gait in enumerate(find_gaits(even, seed, settings).gaits):
             first = FollowerState(0.0, DIFFERENCE_STRIDES.widest, ((0.0, np.array(gait.z)),))
-            state = Follower(gait_at, first, DIFFERENCE_STRIDES).to(1.0)
+            state = Follower(gait_at, first, DIFFERENCE_STRIDES).follow_to(1.0)
             name = f"gait {k + 1} of the walker with two mean legs"
             if state.value < 1.0 or not self.keep(state.points[-1][1], name):
                 self.lost.append(f"the {name} is lost at {state.value:.0%} of the difference between the legs")
@@ -414,8 +426,8 @@ class Search:
         from walkerlab.physics.orbits.families import BranchFollower, Seed, ValueSpan
 
         goal = self.walker
-        own = (goal.slope,) if goal.slope > 0.0 else ()
-        for slope in (*own, *PASSIVE_SLOPES):
+        slopes = (goal.slope, *PASSIVE_SLOPES) if goal.slope > 0.0 else PASSIVE_SLOPES
+        for slope in slopes:
             passive = Search(scale_drive(goal, slope, 0.0))
             passive.follow_seeds()
             passive.draw(generator, starts)

@@ -86,9 +86,9 @@ def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
 
     If the legs differ, it is the root mean square over the drops under each foot.
     """
-    answers = [response(each, "floor-drop") for each in gait.by_leg()]
-    norms = [float(answer[0][0]) for answer in answers if answer is not None]
-    if len(norms) < len(answers):
+    responses = [response(each, "floor-drop") for each in gait.by_leg()]
+    norms = [float(result[0][0]) for result in responses if result is not None]
+    if len(norms) < len(responses):
         return None
     norm = math.hypot(*norms) / math.sqrt(len(norms))
     length, time = gait.step_map.leg_and_pendulum(gait.p)

@@ -74,6 +74,7 @@ def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solutio
             ahead = equations(x + share * move)
             evaluations += 1
             remaining = ahead.residual
+            # The residual is as small as rounding errors allow, so the better of the two points is the solution.
             if 0.5 * residual <= remaining < np.inf and min(residual, remaining) <= rounding * tolerance:
                 better = remaining < residual
                 return (

@@ -25,7 +25,7 @@ from walkerlab.physics.hybrid.comparison import (
 from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, walk_contact
 from walkerlab.physics.orbits.contact_gait import CONTACT_EFFORT, scale_laws
-from walkerlab.physics.orbits.contact_map import OwnPads, contact_step
+from walkerlab.physics.orbits.contact_map import AdaptivePads, contact_step
 from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
@@ -154,7 +154,7 @@ class Limit:
 
     def gait(self, walker: ContactWalker, near: Cycle, tolerance: float) -> Cycle | None:
         """Solve for the gait of this walker near the gait of another setting, or return None if it fails."""
-        pads = OwnPads(lambda _: walker, self.ground, solver_settings(tolerance), near.step.length_m)
+        pads = AdaptivePads(lambda _: walker, self.ground, solver_settings(tolerance), near.step.length_m)
         solution = gait_near(pads, near.z, 0.0, SERIES_EFFORT)
         return solution if isinstance(solution, Cycle) else None
 

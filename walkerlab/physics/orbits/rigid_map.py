@@ -28,7 +28,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     STRAIGHT,
     SWING,
     RigidModel,
-    by_turns,
+    compute_in_turns,
     feet_on_slope,
     hip_height,
     mass_matrix,
@@ -424,7 +424,9 @@ class RigidMap(StepMap):
         extremes = (walk.min_normal_force, walk.max_friction_ratio, walk.max_scuff_depth)
         return np.array(extremes) * (units.force, 1.0, units.length)
 
-    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0) -> DisturbedWalk:
+    def take_disturbed_walk(
+        self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
+    ) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
         unit = valid(self._unit_at(p))
         walker, section = unit.swinging(swing)
@@ -434,19 +436,19 @@ class RigidMap(StepMap):
         walk = self._exact.walk(section, z, heights_m.size - 1, False, unit.floor(z, heights_m), start)
         before, after = (states[: len(walk.time)] for states in (walk.strikes.before, walk.strikes.after))
         starts = np.vstack((start, after))[:-1]
-        lengths = by_turns(walker, np.arange(len(before)), step_lengths, starts, before)
+        lengths = compute_in_turns(walker, np.arange(len(before)), step_lengths, starts, before)
         durations = np.diff(walk.time, prepend=0.0) * units.time
         last = walk.z[-1] if walk.z.size else z
         return DisturbedWalk(walk.outcome, durations, lengths * units.length, after[:, STANCE], last)
 
-    def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
+    def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         unit = valid(self._unit_at(p))
         observer = new_observer(times_s / unit.units.time, len(unit.walker.zero_state))
         floor = unit.floor(z, heights_m)
         self._exact.walk(unit.section, z, heights_m.size - 1, False, floor, observer=observer)
         return reorder_by_leg(observer.states[:, [SWING, STANCE]], observer.steps)
 
-    def varied(
+    def differentiate_walk(
         self,
         z: Floats,
         p: float,
@@ -528,7 +530,7 @@ class RigidMap(StepMap):
         unit = valid(self._unit_at(p))
         return unit.units.length, unit.units.time
 
-    def at(self, tolerances: Tolerances) -> RigidMap:
+    def replace_tolerances(self, tolerances: Tolerances) -> RigidMap:
         changed = copy(self)
         changed.tolerances, changed._exact = tolerances, RigidStepper(self._like, tolerances)
         return changed

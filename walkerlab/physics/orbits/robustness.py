@@ -41,9 +41,9 @@ LARGEST: Final[Mapping[str, tuple[Disturbance, float]]] = {
 """Disturbance and sign of each largest disturbance that a gait survives."""
 INDICATORS = ("step_period", "step_length", "speed")
 DIRECT_STEPS = 2  # steps whose responses are difference quotients of exact walks: a stride, if the legs differ
+# Offsets and weights of fourth-order formulas for a first derivative, the most accurate first.
 CENTRAL_4TH = ((-2, 1.0 / 12.0), (-1, -8.0 / 12.0), (1, 8.0 / 12.0), (2, -1.0 / 12.0))
 FORWARD_4TH = ((0, -25.0 / 12.0), (1, 4.0), (2, -3.0), (3, 4.0 / 3.0), (4, -0.25))
-# Offsets and weights of fourth-order formulas for a first derivative.
 FORMULAS = (CENTRAL_4TH, FORWARD_4TH, tuple((-offset, -weight) for offset, weight in FORWARD_4TH))
 # grid of the search and accuracy of its bisection, as multiples of `unit_of`
 SEARCH_GRID = 1.0 / 5000.0
@@ -123,14 +123,12 @@ def indicators(walk: DisturbedWalk) -> Floats:
 def walk_disturbed(gait: GaitOnMap, disturbance: Disturbance, size: float, steps: int) -> DisturbedWalk:
     """Walk from the gait with a disturbed first step: a lasting drop (m) of the floor, or a push (N s)."""
     if disturbance == "hip-push":
-        return gait.step_map.disturbed(gait.z, gait.p, np.zeros(steps + 1), size, gait.swing)
-    return gait.step_map.disturbed(gait.z, gait.p, np.append(0.0, np.full(steps, -size)), swing=gait.swing)
+        return gait.step_map.take_disturbed_walk(gait.z, gait.p, np.zeros(steps + 1), size, gait.swing)
+    return gait.step_map.take_disturbed_walk(gait.z, gait.p, np.append(0.0, np.full(steps, -size)), swing=gait.swing)
 
 
 def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None:
-    """Return a gait's sensitivity to a disturbance, or None if the gait is unstable or a slightly disturbed
-    step fails.
-    """
+    """Return a gait's sensitivity to a disturbance, or None if it is unstable or a slightly disturbed step fails."""
     fine, coarse = (response(gait, disturbance, times) for times in (1.0, 2.0))
     return None if fine is None or coarse is None else Sensitivity(*fine, np.abs(fine[0] - coarse[0]))
 
@@ -145,7 +143,7 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
 
     def next_stride(move: Floats) -> Floats | None:
         even = np.zeros(gait.step_map.stride + 1)
-        walk = gait.step_map.disturbed(gait.z + move, gait.p, even, swing=gait.swing)
+        walk = gait.step_map.take_disturbed_walk(gait.z + move, gait.p, even, swing=gait.swing)
         return indicators(walk).ravel() if walk.outcome is Outcome.WALKED else None
 
     changed = derivative(step_after, h * gait.unit_of(disturbance))
@@ -188,7 +186,7 @@ def largest_disturbance(
 def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
     """Count the steps of a walk from the gait over normally distributed heights, stopping at `most` steps."""
     heights = rough_heights(roughness_m, seed, most)
-    return int(gait.step_map.disturbed(gait.z, gait.p, heights, swing=gait.swing).durations_s.size)
+    return int(gait.step_map.take_disturbed_walk(gait.z, gait.p, heights, swing=gait.swing).durations_s.size)
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ class StartTrial(NamedTuple):
 class ScaledStarts:
     walker: ContactWalker
     ground: JudgedGround
-    place: State  # (2 + n) position and angles of the start
+    pose: State  # (2 + n) position and angles of the start
     by_swing: State  # (2 + n) velocities due to the swing leg's angular velocity
     by_stance: State  # (2 + n) velocities due to the stance leg's angular velocity
     steps: int
@@ -61,7 +61,7 @@ class ScaledStarts:
 
     def start(self, swing: float, stance: float) -> State:
         rates = (swing * a + stance * b for a, b in zip(self.by_swing, self.by_stance, strict=True))
-        return (*self.place, *rates)
+        return (*self.pose, *rates)
 
     def walk(self, swing: float, stance: float) -> StartTrial:
         walk = self.walk_from(self.start(swing, stance))

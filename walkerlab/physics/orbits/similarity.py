@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkerlab.physics.mechanics.hinges import SpringDamper
-from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, with_fields
+from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 
 HIPS = ("hip_x", "hip_y", "swing_hip_x", "swing_hip_y")
 
@@ -31,7 +31,7 @@ class Units(NamedTuple):
     def impulse(self) -> float:
         return self.mass * self.length / self.time
 
-    def of(self, unit: str) -> float:
+    def size_of(self, unit: str) -> float:
         """Return the walker's unit, in SI, with the dimension of `unit` (as in the config).
 
         Raises KeyError if unknown.
@@ -62,7 +62,9 @@ def unit_walker(walker: RigidModel) -> tuple[RigidModel, Units]:
 
     def similar(model: RigidModel) -> RigidModel:
         scaled = {name: scale * model[name] for name, scale in scales.items()}
-        return change_slope(with_fields(model, {"mass": 1.0, "leg_length": 1.0, "gravity": 1.0, **scaled}), model.slope)
+        return change_slope(
+            replace_fields(model, {"mass": 1.0, "leg_length": 1.0, "gravity": 1.0, **scaled}), model.slope
+        )
 
     unit = similar(walker)
     return unit if walker.paired_with is None else pair(unit, similar(walker.paired_with)), units

@@ -92,9 +92,7 @@ def leg_columns(walker: RigidModel) -> Floats:
 
 
 def seeds(walker: RigidModel) -> tuple[SmallSlopeSeed, ...]:
-    """Return the small-slope gaits of `walker`, for any slope of its own. Only walkers that balance upright
-    have them.
-    """
+    """Return the small-slope gaits of `walker`, whatever its slope. Only walkers that balance upright have them."""
     modes = None if walker.kneed or walker.lean != 0.0 or walker.arm_x.any() else linear_modes(walker)
     try:
         long = None if modes is None else long_period_seed(walker, modes)

@@ -23,8 +23,8 @@ from walkerlab.physics.solvers.system import Floats
 Walker = TypeVar("Walker")
 PARAMETER_STEP = 1e-3  # relative step of the parameter in difference formulas
 CACHE_SIZE = 4096  # walkers cached per step map
-CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 # Offsets and weights of second-order formulas for a first derivative.
+CENTRAL_2ND: tuple[tuple[int, float], ...] = ((-1, -0.5), (1, 0.5))
 FORWARD_2ND: tuple[tuple[int, float], ...] = ((0, -1.5), (1, 2.0), (2, -0.5))
 identity = lru_cache(np.eye)  # shared, so never written to
 no_values = partial(np.zeros, 0)
@@ -81,7 +81,7 @@ class VariedWalk:
     durations_s: Floats  # (steps, columns)
     lengths_m: Floats  # (steps, columns)
     angles_rad: Floats  # (steps, columns), as in `DisturbedWalk`
-    rates: Floats  # (times, 2) angular velocities of the legs (rad/s), ordered as in `StepMap.sampled`
+    rates: Floats  # (times, 2) angular velocities of the legs (rad/s), ordered as in `StepMap.sample_legs`
     samples_rad: Floats  # (times, columns, 2) derivatives of the legs' angles, in the same order
 
 
@@ -107,24 +107,26 @@ class StepMap(Stepper, Protocol):
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         """Return the worst value (monitors,) of each monitored quantity over `steps` steps from z."""
 
-    def disturbed(self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0) -> DisturbedWalk:
+    def take_disturbed_walk(
+        self, z: Floats, p: float, heights_m: Floats, push_N_s: float = 0.0, swing: int = 0
+    ) -> DisturbedWalk:
         """Walk from z (d,) over heights (steps + 1,) from the present foothold on, after a hip push along the slope.
 
         swing  as in `Stepper.step`
         """
 
-    def settled(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
+    def rest_on_ground(self, z: Floats, p: float) -> Floats:  # noqa: ARG002
         """Return z (d,) with the stance foot at rest on the ground."""
         # A foot stands in compliant ground at a depth that depends on the parameters; at another depth it would bounce.
         return z
 
-    def sampled(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        """Sample both legs' angles (times, 2) from the vertical in the walk of `disturbed`, first swing leg first.
+    def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
+        """Sample both legs' angles (times, 2) from the vertical in a disturbed walk, first swing leg first.
 
         times_s  increasing times from the first heel strike on, all before the last heel strike
         """
 
-    def varied(
+    def differentiate_walk(
         self,
         z: Floats,
         p: float,
@@ -133,7 +135,7 @@ class StepMap(Stepper, Protocol):
         times_s: Floats = NO_TIMES,
         kicked: bool = False,  # noqa: ARG002
     ) -> VariedWalk | None:
-        """Differentiate `disturbed` and its samples along columns (d + steps + 1, columns) of z and heights (m).
+        """Differentiate a disturbed walk and its samples along columns (d + steps + 1, columns) of z and heights (m).
 
         kicked  whether columns for changes of the rates at heel strikes follow, for each strike between two steps as
                 many as rates are free there
@@ -146,7 +148,8 @@ class StepMap(Stepper, Protocol):
             return None
         rates = np.zeros((0, 2))
         if times_s.size:
-            later, earlier = (self.sampled(z, p, heights_m, times_s + sign * INSTANT_S) for sign in (0.0, -1.0))
+            later = self.sample_legs(z, p, heights_m, times_s)
+            earlier = self.sample_legs(z, p, heights_m, times_s - INSTANT_S)
             rates = (later - earlier) / INSTANT_S
         durations, lengths, angles, samples = (np.stack(parts, axis=1) for parts in zip(*columns, strict=True))
         return VariedWalk(durations, lengths, angles, rates, samples)
@@ -157,7 +160,7 @@ class StepMap(Stepper, Protocol):
     def leg_and_pendulum(self, p: float) -> tuple[float, float]:
         """Return leg length (m) and pendulum time (s) of the walker at p."""
 
-    def at(self, tolerances: Tolerances) -> StepMap: ...
+    def replace_tolerances(self, tolerances: Tolerances) -> StepMap: ...
 
     def iterate(self, z: Floats, p: float, steps: int, tangent: Floats | None) -> Iterates:
         """Walk up to `steps` steps, transporting a tangent (d,) if there is one."""
@@ -202,18 +205,18 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: in
 def differentiate_along(
     step_map: StepMap, z: Floats, p: float, heights_m: Floats, along: Floats, times_s: Floats
 ) -> tuple[Floats, ...] | None:
-    """Differentiate step quantities (steps,) and samples (times, 2) in direction `along`, or None if a walk
-    ends early.
+    """Differentiate step quantities (steps,) and samples (times, 2) in direction `along`, or return None if a walk
+    fails.
     """
     ends = []
     h = VARIATION / np.abs(along).max()
     for offset, weight in CENTRAL_2ND:
         moved = z + offset * h * along[: z.size]
         heights = heights_m + offset * h * along[z.size :]
-        walk = step_map.disturbed(moved, p, heights)
+        walk = step_map.take_disturbed_walk(moved, p, heights)
         if walk.outcome is not Outcome.WALKED:
             return None
-        samples = step_map.sampled(moved, p, heights, times_s) if times_s.size else np.zeros((0, 2))
+        samples = step_map.sample_legs(moved, p, heights, times_s) if times_s.size else np.zeros((0, 2))
         parts = (walk.durations_s, walk.lengths_m, walk.angles_rad, samples)
         ends.append([weight / h * part for part in parts])
     return tuple(first + second for first, second in zip(*ends, strict=True))
@@ -225,7 +228,7 @@ def valid(walker: Walker | None) -> Walker:
 
 
 def failed_step(outcome: Outcome | None, d: int) -> MappedStep:
-    return MappedStep(outcome, np.zeros(d), np.eye(d), 0.0, 0.0, 0.0, 0.0)
+    return MappedStep(outcome, np.zeros(d), np.eye(d), period_s=0.0, length_m=0.0, angle=0.0, strike_s=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,6 +274,7 @@ class Cycle:
     def periods_s(self) -> Floats:
         """Durations (n,) of a gait's steps from heel strike to heel strike, independent of the section."""
         waits = [step.period_s - step.strike_s for step in self.steps]
+        # A gait repeats, so the last step precedes the first one.
         return np.array([waits[k - 1] + step.strike_s for k, step in enumerate(self.steps)])
 
     @property

@@ -42,7 +42,7 @@ MapAt = Callable[[float], StepMap | None]
 
 
 class Plane(NamedTuple):
-    """Second parameter of a family: function from its value to the step map, its span, and the family's own value."""
+    """Second parameter of a family: the step map as a function of it, its span, and its value in the family."""
 
     map_at: MapAt
     span: ValueSpan

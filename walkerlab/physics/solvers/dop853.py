@@ -195,6 +195,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     limit = GROW_MOST
     outcome = OUT_OF_BUDGET
     while counts[RHS] < counts[BUDGET]:
+        # stretch a step that nearly reaches the end, rather than leave a tiny one
         last = t + 1.01 * h >= t_end
         if last:
             h = t_end - t

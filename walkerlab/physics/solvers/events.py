@@ -51,6 +51,7 @@ def new_crossing_finder(degree: int, event_functions: int = 1, state_size: int =
 def sampling(degree: int) -> tuple[Any, Any]:
     """Compute the nodes (degree + 1,) and the matrix that maps values at the nodes to Bernstein coefficients."""
     size = degree + 1
+    # Chebyshev points: equidistant ones would amplify rounding errors at this degree.
     nodes = 0.5 * (1.0 - np.cos(np.pi * np.arange(size) / degree))
     basis = np.zeros((size, size))
     constant = np.array([1.0])

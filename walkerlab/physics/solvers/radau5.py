@@ -51,7 +51,8 @@ RADAU_SAFETY = 0.9
 RADAU_SHRINK = 0.125
 RADAU_GROWTH = 8.0
 KEEP_LOW, KEEP_HIGH = 1.0, 1.2  # range of step ratios in which the factored matrices are kept
-FRESH_RATE = 1e-3  # the Jacobian is kept if Newton converges faster
+# rate of convergence of Newton's method below which the Jacobian is kept
+FRESH_RATE = 1e-3
 FIRST_RADAU_STEP = 1e-6
 MAX_NEWTON = 7
 
@@ -189,6 +190,7 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
     rate = method.control[RATE]
     for iteration in range(1, MAX_NEWTON + 1):
         size = newton_move(method, system, t, h)
+        # also true for NaN
         if not size < 1e100:
             return 0
         if iteration > 1:
@@ -220,8 +222,8 @@ def begin_radau5(method: Radau5, system: Any, t: float, y: Any, h: float) -> Non
 
 
 @kernel_part
-def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> float:
-    """Compute the error relative to the tolerance by (8.19). If `again`, an error over 1 is filtered by (8.20)."""
+def step_error(method: Radau5, system: Any, t: float, h: float, filtered: bool) -> float:
+    """Compute the error relative to the tolerance by (8.19). If `filtered`, an error over 1 is filtered by (8.20)."""
     n = method.y.size
     error = method.f[0]
     z = method.z
@@ -230,7 +232,7 @@ def step_error(method: Radau5, system: Any, t: float, h: float, again: bool) -> 
         error[i] = method.slope[0, i] + method.f[1, i]
     solve_real(method, error)
     size = error_size(method, error)
-    if size >= 1.0 and again:
+    if size >= 1.0 and filtered:
         for i in range(n):
             method.at[i] = method.y[i] + error[i]
         derivative(system, t, method.at, error)
@@ -263,6 +265,7 @@ def advance_radau5(method: Radau5, system: Any, t_end: float) -> int:
     while method.counts[RHS] < method.counts[BUDGET]:
         if h <= SMALLEST_STEP * max(abs(t), 1e-3):
             return STEP_TOO_SMALL
+        # stretch a step that nearly reaches the end, rather than leave a tiny one
         last = t + 1.0001 * h >= t_end
         if last:
             h = t_end - t

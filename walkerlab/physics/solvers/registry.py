@@ -19,7 +19,7 @@ class Method:
     new: Callable[[int, float, float, int], Any]
     stiff: bool  # whether the method suits stiff problems
     orders: tuple[int, int]  # minimum and maximum order; equal unless the method varies its order
-    compiled: bool = False  # whether walks compile as a whole; with a library's method, they run in Python
+    compiled: bool = False  # whether whole walks are compiled; with the method of another library they run in Python
 
 
 def scipy_factory(class_name: str, takes_jacobian: bool = True) -> Callable[[int, float, float, int], ScipyMethod]:
@@ -39,7 +39,7 @@ def cvode_factory(family: str) -> Callable[[int, float, float, int], ScipyMethod
     return partial(ScipyMethod, partial(cvode.CvodeSolver, family), True)
 
 
-OWN_METHODS = (
+BUILT_IN_METHODS = (
     Method("dop853", new_dop853, stiff=False, orders=(8, 8), compiled=True),
     Method("radau5", new_radau5, stiff=True, orders=(5, 5), compiled=True),
 )
@@ -55,7 +55,8 @@ CVODE_METHODS = (
     Method("cvode-adams", cvode_factory("Adams"), stiff=False, orders=(1, 12)),
 )
 METHODS = {
-    method.name: method for method in (*OWN_METHODS, *SCIPY_METHODS, *(CVODE_METHODS if cvode.is_installed() else ()))
+    method.name: method
+    for method in (*BUILT_IN_METHODS, *SCIPY_METHODS, *(CVODE_METHODS if cvode.is_installed() else ()))
 }
 
 

@@ -103,6 +103,7 @@ def begin_scipy(method: ScipyMethod, system: Any, t: float, y: Any, h: float) ->
     n = method.y.size
     method.y[:] = y
     method.clock[T_OLD] = method.clock[T] = t
+    # SciPy warns about a smaller relative tolerance and replaces it.
     options: dict[str, Any] = {"rtol": max(method.rtol, 2.3e-14), "atol": method.atol}
     if method.takes_jacobian:
         options["jac"] = counting_jacobian(method, system, n)

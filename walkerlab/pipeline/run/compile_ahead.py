@@ -130,12 +130,12 @@ def build(folder: str) -> None:
 
 def write_machine_code(folder: Path, names: Iterable[str]) -> dict[str, Any]:
     """Copy files from the cache to the package's folder, with what they depend on, which is returned."""
-    from walkerlab.physics.compiler import stripped
+    from walkerlab.physics.compiler import strip_bitcode
 
     folder.mkdir(exist_ok=True)
     processor, features = kernel_cache.build_target() or ("", ())
     for name in sorted(names):
-        (folder / name).write_bytes(stripped(kernel_cache.cache_folder() / name))
+        (folder / name).write_bytes(strip_bitcode(kernel_cache.cache_folder() / name))
     about = {**kernel_cache.circumstances(), "processor": processor, "features": features}
     (folder / kernel_cache.ABOUT).write_text(json.dumps(about, indent=1))
     return about

@@ -180,14 +180,14 @@ def search_of(model: str, question: FamilyQuestion, progress: Progress) -> Famil
     if second is not None and second.touches(model):
         parameter = second.parameter
         config = question.config
-        plane = Plane(parameter.over(config, map_of), second.span, parameter.value_in(config))
+        plane = Plane(parameter.vary(config, map_of), second.span, parameter.value_in(config))
     periods = min(block.periods, THOROUGHNESS[model].periods)
     return FamilySearch(model, map_of(question.config), question.span, seeds, periods, block.points, progress, plane)
 
 
 def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
     """Find all one-step gaits of the rigid model at each start value."""
-    walker_at = question.parameter.over(question.config, rigid_walker)
+    walker_at = question.parameter.vary(question.config, rigid_walker)
     seeds = list[Seed]()
     progress.start("continuation: gaits of the rigid model")
     for value in question.start_values():
@@ -317,7 +317,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
     if step_map is None or not every:
         return None
     tighter, by = tightened(step_map.tolerances)
-    otherwise = step_map.at(tighter)
+    otherwise = step_map.replace_tolerances(tighter)
     again = [
         (point, gait_near(otherwise, point.z, point.value, TIGHTEST, branch.period))
         for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))

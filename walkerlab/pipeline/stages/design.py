@@ -205,7 +205,7 @@ class Gaits:
     def gait_of(self, config: Config) -> Point | None:
         """Find the gait of a config near the last gait, or by a search from scratch."""
         subject = ModelUnderTest(self.model, config, self.z, self.length)
-        standpoint = subject.at()
+        standpoint = subject.gait_on_map()
         match = self.gait_near(standpoint, self.z)
         # the parameters may be too far from those of the last gait for Newton's method, so search from scratch
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
@@ -265,7 +265,7 @@ class Gaits:
         for off in (-gap, gap):
             changed = parameter.config_at(subject.config, parameter.value_in(subject.config) + off)
             beside = None if changed is None else replace(subject, config=changed)
-            match = None if beside is None else self.gait_near(beside.at(), subject.z)
+            match = None if beside is None else self.gait_near(beside.gait_on_map(), subject.z)
             if beside is not None and match is not None:
                 places[off] = self.largest_disturbances(replace(beside, z=match[0].z), self.largest)
         first, last = min(places), max(places)
@@ -279,7 +279,7 @@ class Gaits:
         config = config_with(self.config, self.parameters, x.tolist())
         assert config is not None, "a walker with a gait is valid"
         subject = ModelUnderTest(self.model, config, self.sections[x.tobytes()], self.length)
-        numbers = gait_quantities(subject.at(), ROBUSTNESS) or {}
+        numbers = gait_quantities(subject.gait_on_map(), ROBUSTNESS) or {}
         if ROBUSTNESS[0] not in numbers:
             return {}
         return {ROBUSTNESS[0]: numbers[ROBUSTNESS[0]], **self.largest_disturbances(subject, LARGEST)}

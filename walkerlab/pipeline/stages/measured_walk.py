@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import RecordedWalk, as_walk, named_column, plain, refuse_gaps, refuse_units, unit_value
+from walkerlab.exchange.columns import (
+    RecordedWalk,
+    as_walk,
+    named_column,
+    normalise_name,
+    refuse_gaps,
+    refuse_units,
+    unit_value,
+)
 from walkerlab.exchange.leg_angles import mend_angles
 from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
@@ -203,7 +211,7 @@ def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, f
 
     Raises ConfigError for gaps and bad values.
     """
-    by_name = {plain(column): column for column in table.columns}
+    by_name = {normalise_name(column): column for column in table.columns}
     stem = name.rpartition("_")[0]
     source = block.columns.get(name) or by_name.get(name) or by_name.get(stem)
     if source is None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from walkerlab.config.reads import RecordedWalkConfig
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.columns import OF_LEG, OF_WALKER, RecordedWalk, as_walk
+from walkerlab.exchange.columns import LEG_QUANTITIES, WALKER_QUANTITIES, RecordedWalk, as_walk
 from walkerlab.exchange.leg_angles import mend_angles
 from walkerlab.exchange.rate_jumps import noise_of
 from walkerlab.exchange.recording import NO_FILE, TIME, Recording, read_file, read_recording
@@ -115,7 +115,7 @@ def read_artifact(path: Path) -> Recording:
     columns = {TIME: np.asarray(group["time"], float)}
     units = {TIME: "s"}
     for name, variable in group.variables.items():
-        if variable.dims[:1] != ("time",) or name not in (*OF_LEG, *OF_WALKER) or name == TIME:
+        if variable.dims[:1] != ("time",) or name not in (*LEG_QUANTITIES, *WALKER_QUANTITIES) or name == TIME:
             continue
         for place, values in enumerate(np.atleast_2d(np.asarray(variable.values, float).T)):
             column = f"{name} {place + 1}" if variable.values.ndim > 1 else name

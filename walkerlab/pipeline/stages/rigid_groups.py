@@ -6,7 +6,7 @@ import numpy as np
 
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
-from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, by_turns, energy_at_touch
+from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, compute_in_turns, energy_at_touch
 from walkerlab.pipeline.stages.walk import COORDINATE, legs, steps_of, turning, variables_over_time
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.rigid import RigidScene
@@ -18,7 +18,7 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
     if walk.steps:
         set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
         turned = set_down - walk.before[:, STANCE]
-        rolling = by_turns(scene.walker, np.arange(walk.steps), rolled, turned)
+        rolling = compute_in_turns(scene.walker, np.arange(walk.steps), rolled, turned)
         columns = steps_of(walk, rolling_m=rolling, state_before=walk.before, state_after=walk.after)
         names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
         stored["steps"] = Group({**columns, COORDINATE: names})
@@ -43,14 +43,14 @@ def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples)
         positions = places(scene.walker, scene.knees_m, footholds_of(walk), samples.state[:, :n], samples.step)
         variables |= place_variables(positions, stance)
     if "energies" in scene.outputs:
-        kinetic, potential = by_turns(scene.walker, samples.step, energies, samples.state).T
+        kinetic, potential = compute_in_turns(scene.walker, samples.step, energies, samples.state).T
         touched = np.append(walk.start[STANCE], walk.after[:, STANCE])
-        potential -= by_turns(scene.walker, np.arange(touched.size), energy_at_touch, touched)[samples.step]
+        potential -= compute_in_turns(scene.walker, np.arange(touched.size), energy_at_touch, touched)[samples.step]
         variables |= variables_over_time(kinetic_J=kinetic, potential_J=potential, mechanical_J=kinetic + potential)
     if "forces" in scene.outputs:
         friction, normal = (
             reorder_by_leg(np.column_stack((np.zeros_like(force), force)), stance)
-            for force in by_turns(scene.walker, samples.step, reactions, samples.state, samples.bent).T
+            for force in compute_in_turns(scene.walker, samples.step, reactions, samples.state, samples.bent).T
         )
         variables |= variables_over_time(normal_force_N=normal, friction_force_N=friction)
     return Group(variables)

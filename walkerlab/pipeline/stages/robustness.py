@@ -118,7 +118,7 @@ def run(
     unstable = []
     steps = {}
     for subject in subjects(config, inputs, progress):
-        gait = subject.at()
+        gait = subject.gait_on_map()
         # the rigid model's gradients and largest disturbances take less time than the start of a process
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
         numbers = gait_quantities(gait)
@@ -233,7 +233,7 @@ def single_of(subject: ModelUnderTest, leg: int, disturbance: Any, sign: float, 
     reactions.
     """
     size = largest_disturbance(subject.quick_by_leg()[leg], disturbance, sign, steps)
-    gait = subject.at().by_leg()[leg]
+    gait = subject.gait_on_map().by_leg()[leg]
     if disturbance == "hip-push" and isinstance(gait.step_map, RigidMap):
         return [size, *gait.step_map.ground_after_push(gait.z, gait.p, sign * size, steps, gait.swing)]
     return [size]

@@ -240,7 +240,10 @@ def driven_by(walk: WalkRecord) -> dict[str, Any]:
     if distance <= 0.0:
         return {}
     driven = walk.driven
-    return {"work_per_step_J": driven.per_step(walk.steps), "cost_of_transport": driven.cost_of_transport(distance)}
+    return {
+        "work_per_step_J": driven.work_per_step(walk.steps),
+        "cost_of_transport": driven.cost_of_transport(distance),
+    }
 
 
 def settling(walk: WalkRecord) -> dict[str, int | None]:

@@ -74,11 +74,11 @@ def list_extensions(request: Request) -> None:
             "source": each.origin,
             "code": each.code,
             "adds": each.adds,
-            "left_out": each.why,
+            "left_out": each.reason,
         }
         rows.append(said)
         added = [f"{kind}: {', '.join(names)}" for kind, names in each.adds.items() if names and kind != "views"]
-        lines.append(f"{each.name} ({each.origin}): {f'left out, {each.why}' if each.why else '; '.join(added)}")
+        lines.append(f"{each.name} ({each.origin}): {f'left out, {each.reason}' if each.reason else '; '.join(added)}")
     print_result(request, {"extensions": rows}, lines)
 
 

@@ -15,14 +15,14 @@ class Tanh(NamedTuple):
     sliding_from: float  # m/s, slip velocity beyond which the foot slides
 
     @classmethod
-    def of(cls, contact):
+    def from_contact(cls, contact):
         v = contact.stiction_velocity
         return cls(contact.dynamic_friction, v, 3 * v, 3 * v)
 
-    def with_creep(self, factor):
+    def scale_creep(self, factor):
         return Tanh(self.largest, *(factor * v for v in self[1:]))
 
-    def in_words(self):
+    def describe(self):
         return f"friction of {self.largest:g} tanh(v / {self.velocity:g} m/s)"
 
 

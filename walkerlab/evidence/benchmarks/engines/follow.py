@@ -13,7 +13,7 @@ import numpy as np
 from walkerlab.exchange.engine_scene import EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.external import feet_and_forces
-from walkerlab.physics.ground.knees import FLEXED, lock_knee
+from walkerlab.physics.ground.knees import MIN_FLEXION, lock_knee
 from walkerlab.physics.ground.pulse import pulse_left
 from walkerlab.physics.ground.terrain import STANCE_FOOT, cell_at, cell_edges, has_ground_in_cell
 from walkerlab.physics.ground.walker import BENT, LOCKED, RELEASED, FootMotion, locked_knees, place_on_ground
@@ -94,7 +94,7 @@ class RuleFollower:
 
     def _bends_in(self, q: Floats, v: Floats) -> list[tuple[float, float]]:
         """Return the extension (rad) of each knee and its rate (rad/s). Both are zero for a locked knee."""
-        return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self.scene.knee_places]
+        return [(float(q[place]), float(v[place])) if place >= 0 else (0.0, 0.0) for place in self.scene.knee_indices]
 
     def _edges_of(self, foot: int) -> tuple[float, float]:
         """Return the edges (m) of the pad or gap under a foot. They are infinite on ground without pads."""
@@ -183,7 +183,7 @@ class RuleFollower:
             share = sinking / (sinking + now[stance].vertical_velocity) if sinking > 0.0 else 0.0
             turns.append(Turn(share, int(stance) * contact_events.PER_FOOT + contact_events.VERTICAL_VELOCITY))
         for knee, (old, bend) in enumerate(zip(self._bends, bends, strict=True)):
-            if walk_state.knee[knee] == RELEASED and bend[0] < -FLEXED:
+            if walk_state.knee[knee] == RELEASED and bend[0] < -MIN_FLEXION:
                 walk_state.knee[knee] = BENT
             elif walk_state.knee[knee] == BENT and bend[0] >= 0.0:
                 turns.append(Turn(crossing(*old, *bend, h), contact_events.EXTENSION + knee))
