@@ -1,83 +1,170 @@
 """Plant mistakes into gaits of random walkers and count how often `walkerlab check` names them.
 
-    python scripts/check_campaign.py [WALKERS [RIGHT [UNLISTED]]]
+    python scripts/check_campaign.py PART [COUNT [FIRST]]
 
-WALKERS random walkers for each mistake (5), printed to 4, 6 and 10 digits; RIGHT right gaits printed to 3 to 12 digits
-(100); UNLISTED gaits with mistakes that no list has (100). Exits 1 if an answer is wrong.
+PART is one of
+    straight, kneed     planted mistakes, COUNT walkers (5) for each, printed to 4, 6 and 10 digits
+    right               COUNT right gaits (100) printed to 3 to 12 digits
+    unlisted            COUNT gaits (100) with mistakes that no list has
+    conventions         COUNT gaits (50) in conventions that are not stated
+    combined            COUNT gaits (20) with a mistake, in conventions that are not stated
+    odd                 COUNT odd files (200)
+
+FIRST skips the mistakes before it. Exits 1 if an answer is wrong. States with mistakes come from the integration in
+tests/evidence/check, not from the code that judges.
 """
 
+import random
 import sys
-from dataclasses import replace
+import tempfile
+from collections import Counter
 from itertools import islice
 from pathlib import Path
 
+from typer.testing import CliRunner
+
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "evidence" / "check"))
 
-from mistaken_walks import MISTAKES, UNLISTED, answer_to, gait, gait_with, walkers
+import mistaken_knees
+import mistaken_walks
+from mistaken_walks import UNLISTED, answer_to, checked_config, gait, gait_with, walkers
+from printed_forms import odd_file, printed_in, random_convention
+
+from walkerlab.evidence.check.answer import check_gait
+from walkerlab.views.cli.main import program
+
+KINDS = {
+    "straight": (mistaken_walks.MISTAKES, mistaken_walks.step, mistaken_walks.random_legs, mistaken_walks.config_of),
+    "kneed": (mistaken_knees.MISTAKES, mistaken_knees.step, mistaken_knees.random_knees, mistaken_knees.config_of),
+}
+DIGITS = (4, 6, 10)
+MOST_WALKERS = 25  # to look for gaits with a mistake; some mistakes leave few walkers one
 
 
-def named(words: str, digits: int, answer: dict) -> bool:
-    """Whether an answer names a planted mistake, alone unless few digits are printed."""
-    told = [each["what"] for each in answer["explanations"]]
-    return any(words in what for what in told) and (digits == 4 or len(told) == 1)
+def report(*words) -> None:
+    print(*words, flush=True)
 
 
-def planted(count: int) -> int:
+def causes(answer: dict) -> list[str]:
+    return [each["what"] for each in answer["explanations"]]
+
+
+def mistaken_gaits(kind: str, place: int, mistake: dict):
+    """Yield random walkers' gaits with a mistake, where they have one."""
+    _, step, make, config_of = KINDS[kind]
+    for legs, start in islice(walkers(place, make, config_of), MOST_WALKERS):
+        found = gait_with(legs, start, mistake, step)
+        if found is not None:
+            yield config_of(legs), found
+
+
+def planted(kind: str, count: int, first: int) -> int:
     wrong = 0
-    for place, (words, mistake) in enumerate(MISTAKES.items()):
-        done = 0
-        for legs, start in walkers(place) if count else ():
-            factor = {"hip": mistake["hip"] * legs.hip} if "hip" in mistake else {}
-            found = gait_with(legs, start, {**mistake, **factor})
-            if found is None:
-                continue
-            for digits in (4, 6, 10):
-                answer = answer_to(legs, *found, digits)
-                if not named(words, digits, answer):
-                    wrong += 1
-                    print(
-                        words, digits, answer["finding"], [e["what"] for e in answer["explanations"]], legs, flush=True
-                    )
-            done += 1
-            if done == count:
-                break
+    for place, (words, mistake) in [*enumerate(KINDS[kind][0].items())][first:]:
+        tally = Counter()
+        gaits = [*islice(mistaken_gaits(kind, place, mistake), count)]
+        for config, found in gaits:
+            for digits in DIGITS:
+                answer = answer_to(config, *found, digits)
+                told = causes(answer)
+                # with few digits, several causes may fit
+                named = any(words in what for what in told) and (digits == min(DIGITS) or len(told) == 1)
+                tally[digits] += named
+                if not named:
+                    report("  missed:", digits, answer["finding"], told, answer["closest"], found, config)
+        wrong += len(DIGITS) * len(gaits) - tally.total()
+        report(place, words, {digits: f"{tally[digits]} of {len(gaits)}" for digits in DIGITS})
     return wrong
 
 
 def right(count: int) -> int:
     wrong = 0
-    for place, (legs, start) in enumerate(islice(walkers(100), count)):
-        state, period = gait(legs, start)
-        answer = answer_to(legs, state, period, 3 + place % 10)
-        if answer["finding"] != "reproduced" or answer["explanations"]:
-            wrong += 1
-            print("right:", 3 + place % 10, answer["finding"], answer["explanations"], legs)
+    for place, kind in enumerate((*KINDS,)):
+        _, step, make, config_of = KINDS[kind]
+        for number, (legs, start) in enumerate(islice(walkers(100, make, config_of), count // 2)):
+            answer = answer_to(config_of(legs), *gait(legs, start, step), 3 + (number + place) % 10)
+            if answer["finding"] != "reproduced" or answer["explanations"]:
+                wrong += 1
+                report("right:", number, answer["finding"], causes(answer), legs)
     return wrong
 
 
 def unlisted(count: int) -> int:
-    wrong = done = 0
-    for place, (legs, start) in enumerate(walkers(200) if count else ()):
-        name = (*UNLISTED,)[place % 2]
-        found = gait(replace(legs, **{name: UNLISTED[name]}), start)
-        if found is None:
-            continue
-        digits = (4, 6, 10)[place % 3]
-        answer = answer_to(legs, *found, digits)
-        if answer["finding"] != "different, unexplained" or answer["explanations"]:
-            wrong += 1
-            print(name, digits, answer["finding"], [e["what"] for e in answer["explanations"]], legs)
-        done += 1
-        if done == count:
-            break
+    wrong = 0
+    for kind in KINDS:
+        for place, (name, size) in enumerate(UNLISTED.items()):
+            found = mistaken_gaits(kind, 200 + place, {name: size})
+            for number, (config, printed) in enumerate(islice(found, count // (2 * len(UNLISTED)) + 1)):
+                digits = DIGITS[number % 3]
+                answer = answer_to(config, *printed, digits)
+                if answer["finding"] != "different, unexplained" or answer["explanations"]:
+                    wrong += 1
+                    report("unlisted:", kind, name, digits, answer["finding"], causes(answer), config)
     return wrong
 
 
+def in_conventions(count: int, mistakes: bool) -> int:
+    """Print gaits in random conventions, with a planted mistake or without, and look for them in the answers."""
+    wrong = 0
+    generator = random.Random(300)
+    words, mistake = "", {}
+    tally = Counter()
+    for number in range(count):
+        if mistakes:
+            words, mistake = [*mistaken_walks.MISTAKES.items()][number % len(mistaken_walks.MISTAKES)]
+        config, (state, period) = next(mistaken_gaits("straight", 300 + number, mistake))
+        convention = random_convention(generator, changes=1 + number % (2 if mistakes else 6))
+        texts = printed_in(convention, config, state, period, digits=generator.choice((6, 8)))
+        answer = check_gait(checked_config(config, {"angles": {}, "printed": texts}))
+        told = causes(answer)
+        kinds = {each["kind"] for each in answer["explanations"]}
+        found = bool(told) and (any(words in what for what in told) if mistakes else kinds == {"convention"})
+        found = found and (len(told) == 1 or bool(answer["undecided"]))
+        tally["found" if found else "missed", len(convention.changes)] += 1
+        if not found:
+            wrong += 1
+            report("conventions:", convention.changes, words, answer["finding"], told, answer["closest"], config)
+    report(dict(sorted(tally.items())))
+    return wrong
+
+
+def odd(count: int) -> int:
+    wrong = 0
+    generator = random.Random(400)
+    tally = Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(count):
+            file = Path(folder) / f"odd-{number}.yaml"
+            file.write_bytes(odd_file(generator))
+            done = CliRunner().invoke(program(), ["check", str(file)])
+            tally[done.exit_code] += 1
+            if done.exit_code not in (0, 3) or "Traceback" in done.output or not done.output.strip():
+                wrong += 1
+                report("odd:", done.exit_code, file.read_bytes(), done.output[-600:], done.exception)
+    report("exit codes:", dict(tally))
+    return wrong
+
+
+PARTS = {
+    "straight": (lambda count, first: planted("straight", count, first), 5),
+    "kneed": (lambda count, first: planted("kneed", count, first), 5),
+    "right": (lambda count, _: right(count), 100),
+    "unlisted": (lambda count, _: unlisted(count), 100),
+    "conventions": (lambda count, _: in_conventions(count, mistakes=False), 50),
+    "combined": (lambda count, _: in_conventions(count, mistakes=True), 20),
+    "odd": (lambda count, _: odd(count), 200),
+}
+
+
 def main() -> int:
-    counts = [int(word) for word in sys.argv[1:]] + [5, 100, 100][len(sys.argv) - 1 :]
-    totals = {"planted": planted(counts[0]), "right": right(counts[1]), "unlisted": unlisted(counts[2])}
-    print("wrong answers:", totals)
-    return int(any(totals.values()))
+    part = PARTS.get(sys.argv[1] if len(sys.argv) > 1 else "")
+    if part is None:
+        sys.exit(f"usage: check_campaign.py {'|'.join(PARTS)} [COUNT [FIRST]]")
+    run, usual = part
+    count, first = (*map(int, sys.argv[2:]), *(usual, 0)[len(sys.argv) - 2 :])
+    wrong = run(count, first)
+    report("wrong answers:", wrong)
+    return int(wrong > 0)
 
 
 if __name__ == "__main__":

@@ -18,9 +18,8 @@ from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 
 UNITS = np.eye(4)
-MISTAKES = {
-    "swing leg's squared rate in the equation of the stance leg": {"stance_sign": -1.0},
-    "stance leg's squared rate in the equation of the swing leg": {"swing_sign": -1.0},
+FALLEN = 1.2  # rad, of the stance leg
+STRIKE_MISTAKES = {
     "also subtracts I times the rate between the legs": {"extra": (1.0, -1.0)},
     "also subtracts I times the trailing leg's rate": {"extra": (1.0, 0.0)},
     "trailing leg keeps its rate": {"keeps_rate": True},
@@ -28,11 +27,20 @@ MISTAKES = {
     "inertia is left out of the strike": {"strike_inertia": 0.0},
     "the legs' inertia is left out": {"inertia": 0.0},
     "hip's mass counts once for each leg": {"hip": 2.0},
+}
+SIZED_MISTAKES = {
     "is within 0.001 rad of a touch": {"window": 1e-3},
     "Euler's method with a step of 0.002 s": {"euler": 2e-3},
 }
+MISTAKES = {
+    "swing leg's squared rate in the equation of the stance leg": {"stance_sign": -1.0},
+    "stance leg's squared rate in the equation of the swing leg": {"swing_sign": -1.0},
+    "all velocity terms have the wrong sign": {"velocity_sign": -1.0},
+    **STRIKE_MISTAKES,
+    **SIZED_MISTAKES,
+}
 """Planted mistakes, by words of the sentence that must name them; the hip's is a factor."""
-UNLISTED = {"leak": 0.02, "drag": 0.01}
+UNLISTED = {"leak": 0.02, "drag": 0.01, "spring": 0.05, "bounce": 0.97}
 """Mistakes that no list has."""
 
 
@@ -51,14 +59,18 @@ class Legs:
     # mistakes
     stance_sign: float = 1.0  # of the swing leg's centripetal term in the equation of the stance leg
     swing_sign: float = 1.0  # of the stance leg's in that of the swing leg
+    velocity_sign: float = 1.0  # of all velocity terms
     extra: tuple = (0.0, 0.0)  # weights of I times trailing and leading rate, subtracted about the hip
     keeps_rate: bool = False
     strike_radius: float | None = None  # of the foot in the strike only
     strike_inertia: float | None = None
+    spin: float | None = None  # inertia in the extra term, if it is not the leg's
     window: float = 0.0
     euler: float = 0.0
     leak: float = 0.0  # a mistake that no list has: part of the hip's momentum lost in each strike
     drag: float = 0.0  # another one: torque on the swing leg in proportion to its rate
+    spring: float = 0.0  # between the legs
+    bounce: float = 1.0  # factor on the leading leg's rate after each strike
 
 
 def rates(legs, state):
@@ -78,10 +90,13 @@ def rates(legs, state):
     by_a = m * c * (d * math.sin(a - b) + R * math.sin(a))  # dA_ab/da
     force_b = -legs.stance_sign * by_a * da * da - half_slope * db * db
     force_a = legs.swing_sign * by_b * db * db
+    force_b *= legs.velocity_sign
+    force_a *= legs.velocity_sign
     tilt = legs.slope
     force_b += hips * g * (d * math.sin(b - tilt) - R * math.sin(tilt))
     force_b += own * g * (e * math.sin(b - tilt) - R * math.sin(tilt))
-    force_a += -m * g * c * math.sin(a - tilt) - legs.drag * da
+    force_a += -m * g * c * math.sin(a - tilt) - legs.drag * da - legs.spring * (a - b)
+    force_b += legs.spring * (a - b)
     det = A_aa * A_bb - A_ab * A_ab
     return np.array([da, db, (A_bb * force_a - A_ab * force_b) / det, (A_aa * force_b - A_ab * force_a) / det])
 
@@ -125,71 +140,103 @@ def strike(legs, before):
     whole = m * cross(landing, landing_before) + m * cross(trailing, trailing_before)
     whole += M * cross(hip, hip_before) * (1.0 - legs.leak) + I * (da + db)
     about_hip = m * cross(trailing - hip, trailing_before) + I * db
-    about_hip -= legs.inertia * (legs.extra[0] * db + legs.extra[1] * da)
+    about_hip -= (legs.inertia if legs.spin is None else legs.spin) * (legs.extra[0] * db + legs.extra[1] * da)
     if legs.keeps_rate:
         columns[1], about_hip = [0.0, 1.0], db
     lead, trail = np.linalg.solve(columns, [whole, about_hip])
-    return np.array([b, a, trail, lead])
+    return np.array([b, a, trail, legs.bounce * lead])
+
+
+def fallen(_t, state):
+    return abs(state[1]) - FALLEN
+
+
+fallen.terminal = True
+
+
+def euler(legs, state, derivative, event, counts, limit):
+    """Time and state at which an event that counts falls to zero, by Euler's method and a straight line."""
+    before = event(state)
+    for count in range(int(limit / legs.euler)):
+        old, state = state, state + legs.euler * derivative(state)
+        if fallen(0.0, state) > 0.0:
+            break
+        now = event(state)
+        if before > 0.0 >= now and counts(state):
+            share = before / (before - now)
+            return legs.euler * (count + share), old + share * (state - old)
+        before = now
+    raise ValueError("the event does not come")
 
 
 def step(legs, start):
-    """State just after the next heel strike, and the period."""
+    """State just after the next heel strike, the period, and the state before the strike."""
 
     def touch(_t, state):
         return state[0] + state[1] - legs.window
 
+    def ahead(state):
+        return state[0] > state[1]
+
     limit = 12.0 * math.sqrt(legs.length / legs.gravity)
     if legs.euler:
-        state, before = np.array(start), touch(0.0, start)
-        for count in range(int(limit / legs.euler)):
-            old, state = state, state + legs.euler * rates(legs, state)
-            now = touch(0.0, state)
-            if before > 0.0 >= now and state[0] > state[1]:
-                share = before / (before - now)
-                return strike(legs, old + share * (state - old)), legs.euler * (count + share)
-            before = now
-        raise ValueError("no heel strike")
+        start = np.array(start)
+        time, before = euler(
+            legs, start, lambda state: rates(legs, state), lambda state: touch(0.0, state), ahead, limit
+        )
+        return strike(legs, before), time, before
     touch.direction = -1
     course = solve_ivp(
         lambda _t, state: rates(legs, state), (0.0, limit), start, method="DOP853", rtol=1e-12, atol=1e-14,
-        events=touch, max_step=limit / 50,
+        events=(touch, fallen), max_step=limit / 50,
     )  # fmt: skip
     for time, state in zip(course.t_events[0], course.y_events[0], strict=True):
-        if state[0] > state[1] and time > 0.0:
-            return strike(legs, state), float(time)
+        if ahead(state) and time > 0.0:
+            return strike(legs, state), float(time), state
     raise ValueError("no heel strike")
 
 
-def gait(legs, guess):
+def gait(legs, guess, step=step):
     """State just after the heel strike of the gait near a guess, and its period; None if there is none."""
-    state = np.array(guess)
-    for _ in range(12):
+    state, move, error, slopes = np.array(guess), None, None, None
+    for _ in range(25):
         try:
-            error = step(legs, state)[0] - state
+            after, period, _ = step(legs, state)
+            last, error = error, after - state
             if np.abs(error).max() < 1e-12:
-                return state, step(legs, state)[1]
-            columns = [
-                (step(legs, state + 1e-6 * unit)[0] - step(legs, state - 1e-6 * unit)[0]) / 2e-6 for unit in UNITS
-            ]
+                return state, period
+            if slopes is None:
+                columns = [(step(legs, state + 1e-6 * unit)[0] - after) / 1e-6 for unit in UNITS]
+                slopes = np.array(columns).T - np.eye(4)
+            else:
+                # Broyden's update
+                slopes += np.outer(error - last - slopes @ move, move) / (move @ move)
         except ValueError:
             return None
-        move = np.linalg.solve(np.array(columns).T - np.eye(4), error)
-        state = state - move * min(1.0, 0.05 / np.abs(move).max())
+        move = -np.linalg.solve(slopes, error)
+        move *= min(1.0, 0.05 / np.abs(move).max())
+        state = state + move
     return None
 
 
-def gait_with(legs, start, mistake, parts=4):
-    """Gait with a mistake, followed from the right one as the walker's numbers change in parts; None if it is lost."""
-    found = start, 0.0
-    sized = {name: value for name, value in mistake.items() if name in ("hip", "inertia", "strike_inertia")}
-    for part in range(1, parts + 1) if sized else (1,):
-        share = part / parts if sized else 1.0
-        begin = {"hip": legs.hip, "inertia": legs.inertia, "strike_inertia": legs.inertia}
-        between = {name: begin[name] + share * (value - begin[name]) for name, value in sized.items()}
-        found = gait(replace(legs, **{**mistake, **between}), found[0])
-        if found is None:
-            return None
-    return found
+def gait_with(legs, start, mistake, step=step):
+    """Gait with a mistake, also followed from the right one as the walker's numbers change; None if it is lost.
+
+    mistake  keys of `legs`; the hip's mass is a factor
+    """
+    ends = {**mistake, **({"hip": mistake["hip"] * legs.hip} if "hip" in mistake else {})}
+    begin = {name: getattr(legs, name) for name in ("hip", "inertia", "strike_inertia") if name in mistake}
+    begin |= {"strike_inertia": legs.inertia} if begin.get("strike_inertia", 0.0) is None else {}
+    signs = mistake.get("signs", {})
+    for parts in (1, 4) if begin or signs else (1,):
+        found = start, 0.0
+        for share in np.arange(1, parts + 1) / parts:
+            between = {name: value + share * (ends[name] - value) for name, value in begin.items()}
+            between |= {"signs": {term: 1.0 + share * (sign - 1.0) for term, sign in signs.items()}} if signs else {}
+            found = found and gait(replace(legs, **{**ends, **between}), found[0], step)
+        if found is not None:
+            return found
+    return None
 
 
 def random_legs(generator):
@@ -228,30 +275,33 @@ def printed(numbers, digits):
     return [f"{number:.{digits - 1 - math.floor(math.log10(abs(number)))}f}" for number in numbers]
 
 
-def right_gait(legs):
-    """State of the right gait that the package chooses, and its whole config; None if the walker has none."""
-    config = checked_config(legs, None)
-    chosen = find_gaits(rigid_walker(config), 0).gait
-    return (
-        None if chosen is None else np.array([*(angle + legs.slope for angle in chosen.state[:2]), *chosen.state[2:]])
-    )
+def right_gait(config):
+    """State of the right gait that the package chooses; None if the walker has none."""
+    checked = checked_config(config, {})
+    chosen = find_gaits(rigid_walker(checked), 0).gait
+    if chosen is None:
+        return None
+    state = np.array(chosen.state)
+    half = len(state) // 2
+    return np.array([*(state[:2] + checked.slope_rad), *state[half : half + 2]])
 
 
-def checked_config(legs, check):
-    block = {} if check is None else {"check": {"angles": {"from": "slope-normal"}, "printed": check}}
-    return validate_tree(tree_of({**config_of(legs), "contact": None, **block}, NOWHERE))
+def checked_config(config, check):
+    block = {"check": {"angles": {"from": "slope-normal"}, **check}} if check else {}
+    return validate_tree(tree_of({**config, "contact": None, **block}, NOWHERE))
 
 
-def answer_to(legs, state, period, digits):
+def answer_to(config, state, period, digits):
     """Answer of the check to a gait of which state and period are printed to some digits."""
-    return check_gait(checked_config(legs, {"state": printed(state, digits), "period_s": printed([period], digits)[0]}))
+    values = {"state": printed(state, digits), "period_s": printed([period], digits)[0]}
+    return check_gait(checked_config(config, {"printed": values}))
 
 
-def walkers(seed):
+def walkers(seed, random=random_legs, config_of=config_of):
     """Random walkers that have a gait, with its state."""
     generator = np.random.default_rng(seed)
     while True:
-        legs = random_legs(generator)
-        state = right_gait(legs)
+        legs = random(generator)
+        state = right_gait(config_of(legs))
         if state is not None:
             yield legs, state

@@ -1,13 +1,21 @@
-"""Mistakes planted into gaits are named; right gaits are reproduced; unknown mistakes stay unexplained."""
+"""Planted mistakes are named, right gaits are reproduced, and unknown mistakes stay unexplained."""
 
-from dataclasses import replace
+import random
 from itertools import islice
 
+import mistaken_knees
+import mistaken_walks
 import numpy as np
 import pytest
-from mistaken_walks import MISTAKES, UNLISTED, answer_to, gait, gait_with, walkers
+from mistaken_walks import MISTAKES, UNLISTED, answer_to, checked_config, config_of, gait, gait_with, walkers
+from printed_forms import odd_file, printed_in, random_convention
+from typer.testing import CliRunner
+
+from walkerlab.evidence.check.answer import check_gait
+from walkerlab.views.cli.main import program
 
 SAMPLE = [(words, (6, 10, 4)[place % 3]) for place, words in enumerate([*MISTAKES][::3])]
+KNEED_SAMPLE = [(words, (6, 10)[place % 2]) for place, words in enumerate([*mistaken_knees.MISTAKES][::5])]
 
 
 @pytest.fixture(scope="module")
@@ -16,38 +24,74 @@ def walker():
     return next(walkers(7))
 
 
+def first_gait_with(mistake, found, step=mistaken_walks.step):
+    """The first walker that has a gait with a mistake, and that gait."""
+    gaits = ((legs, gait_with(legs, state, mistake, step)) for legs, state in found)
+    return next((legs, each) for legs, each in gaits if each is not None)
+
+
 def test_a_hand_written_walker_has_the_same_gait(walker):
     legs, state = walker
     found, _ = gait(legs, state)
     np.testing.assert_allclose(found, state, rtol=0, atol=1e-11)
 
 
+def test_a_hand_written_kneed_walker_has_the_same_gait():
+    legs, state = next(walkers(1, mistaken_knees.random_knees, mistaken_knees.config_of))
+    found, _ = gait(legs, state, mistaken_knees.step)
+    np.testing.assert_allclose(found, state, rtol=0, atol=1e-11)
+
+
 @pytest.mark.parametrize(("words", "digits"), SAMPLE)
 def test_a_planted_mistake_is_named(words, digits):
-    for legs, state in walkers(7):
-        mistake = dict(MISTAKES[words])
-        mistake |= {"hip": mistake["hip"] * legs.hip} if "hip" in mistake else {}
-        found = gait_with(legs, state, mistake)
-        if found is not None:  # with some mistakes, some walkers have no gait
-            break
-    answer = answer_to(legs, *found, digits)
-    told = [each["what"] for each in answer["explanations"]]
+    legs, found = first_gait_with(MISTAKES[words], walkers(7))
+    answer = answer_to(config_of(legs), *found, digits)
+    causes = [each["what"] for each in answer["explanations"]]
     assert answer["finding"] == "explained"
-    assert any(words in what for what in told)
-    assert digits == 4 or len(told) == 1
+    assert any(words in cause for cause in causes)
+    assert digits == 4 or len(causes) == 1
+
+
+@pytest.mark.parametrize(("words", "digits"), KNEED_SAMPLE)
+def test_a_mistake_planted_into_a_walker_with_knees_is_named(words, digits):
+    found = walkers(1, mistaken_knees.random_knees, mistaken_knees.config_of)
+    legs, printed = first_gait_with(mistaken_knees.MISTAKES[words], found, mistaken_knees.step)
+    answer = answer_to(mistaken_knees.config_of(legs), *printed, digits)
+    (cause,) = [each["what"] for each in answer["explanations"]]
+    assert words in cause
 
 
 @pytest.mark.parametrize("digits", [3, 6, 12])
 def test_a_right_gait_is_reproduced_without_an_explanation(digits):
     for legs, state in islice(walkers(digits), 2):
-        answer = answer_to(legs, *gait(legs, state), digits)
+        answer = answer_to(config_of(legs), *gait(legs, state), digits)
         assert (answer["finding"], answer["explanations"]) == ("reproduced", [])
         assert answer["routes"]["agree"]
 
 
-@pytest.mark.parametrize(("name", "digits"), [("leak", 4), ("drag", 10)])
+@pytest.mark.parametrize(("name", "digits"), [("leak", 4), ("drag", 10), ("spring", 6), ("bounce", 4)])
 def test_a_mistake_that_is_on_no_list_stays_unexplained(walker, name, digits):
     legs, state = walker
-    found = gait(replace(legs, **{name: UNLISTED[name]}), state)
-    answer = answer_to(legs, *found, digits)
+    found = gait_with(legs, state, {name: UNLISTED[name]})
+    answer = answer_to(config_of(legs), *found, digits)
     assert (answer["finding"], answer["explanations"]) == ("different, unexplained", [])
+
+
+@pytest.mark.parametrize("changes", [2, 5])
+def test_conventions_that_differ_in_several_ways_are_found(walker, changes):
+    legs, state = walker
+    form = random_convention(random.Random(changes), changes)
+    texts = printed_in(form, config_of(legs), *gait(legs, state), 8)
+    answer = check_gait(checked_config(config_of(legs), {"angles": {}, "printed": texts}))
+    assert answer["finding"] == "explained"
+    assert {each["kind"] for each in answer["explanations"]} == {"convention"}
+
+
+def test_damaged_files_are_refused_or_answered(tmp_path):
+    generator = random.Random(5)
+    for number in range(8):
+        file = tmp_path / f"odd-{number}.yaml"
+        file.write_bytes(odd_file(generator))
+        done = CliRunner().invoke(program(), ["check", str(file)])
+        assert done.exit_code in (0, 3), done.output
+        assert "Traceback" not in done.output

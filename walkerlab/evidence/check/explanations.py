@@ -68,14 +68,19 @@ class Question:
         reproduced = items or self.items
         return Explanation(kind, what, tuple(each.name for each in reproduced), min(each.digits for each in reproduced))
 
-    def reproduced(self, walk: CheckedStep, convention: Convention | None = None) -> list[Item]:
+    def reproduced(
+        self, walk: CheckedStep, convention: Convention | None = None, items: Sequence[Item] | None = None
+    ) -> list[Item]:
         """Return the printed numbers of which a gait has every digit."""
-        values = walk.values(self.items, convention or self.convention)
-        return [item for item in self.items if item.fits(values[item.name])]
+        items = self.items if items is None else items
+        values = walk.values(items, convention or self.convention)
+        return [item for item in items if item.fits(values[item.name])]
 
     def fits(self, walk: CheckedStep, convention: Convention | None = None) -> bool:
-        """Whether a gait has every printed digit."""
-        return len(self.reproduced(walk, convention)) == len(self.items)
+        """Whether a gait has every printed digit. What needs no derivative is compared first."""
+        return all(
+            len(self.reproduced(walk, convention, items)) == len(items) for items in (self.quick_items, self.items)
+        )
 
     def explained_by(self, attempt: Attempt) -> Explanation | None:
         """Return what the gait of an attempt explains, or None if it explains too little.
@@ -83,12 +88,13 @@ class Question:
         The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
         right.
         """
+        if len(self.reproduced(attempt.gait, items=self.state_items)) < len(self.state_items):
+            return None
         reproduced = self.reproduced(attempt.gait)
         others = [item for item in self.items if item not in reproduced]
-        states = len(reproduced) >= FEW and not any(item.quantity.startswith("state") for item in others)
         kind = attempt.candidate.kind
         what = attempt.candidate.what
-        return self.explanation(kind, what, reproduced) if not others or states else None
+        return self.explanation(kind, what, reproduced) if not others or len(reproduced) >= FEW else None
 
     @cached_property
     def right_items(self) -> list[Item]:
@@ -101,10 +107,15 @@ class Question:
         return max((item.miss(values[item.name]) for item in self.quick_items), default=math.inf)
 
     @cached_property
+    def state_items(self) -> list[Item]:
+        """Printed numbers of states."""
+        return [item for item in self.items if item.quantity.startswith("state")]
+
+    @cached_property
     def quick_items(self) -> list[Item]:
         """Printed numbers of states or, if none is printed, all that need no derivative."""
-        quick = [item for item in self.items if item.quantity not in ("multipliers", "spectral_radius")]
-        return [item for item in quick if item.quantity.startswith("state")] or quick
+        slow = ("multipliers", "spectral_radius")
+        return self.state_items or [item for item in self.items if item.quantity not in slow]
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a walk near a walker's gait: a Newton step from the printed state, or from the right gait."""

@@ -63,15 +63,11 @@ def wrong_signs(right: PlainWalker) -> Iterator[Mistake]:
         swing = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if right.kneed else ""}[phase]
         for row, column in pairs:
             signs = {(phase, row, column): -1.0}
-            if right.kneed and phase == STRAIGHT:
-                # a locked leg is one body, so its terms are one
-                rows, columns = ([SWING, SHANK] if body == SWING else [body] for body in (row, column))
-                signs = {(phase, k, l): -1.0 for k in rows for l in columns}
             what = (
                 f"the term of the {names[column]}'s squared rate in the equation of the {names[row]} has the wrong sign"
             )
             yield Mistake(what + swing, changed_signs(right, signs))
-        everything = {(phase, row, column): -1.0 for row in range(right.bodies) for column in range(right.bodies)}
+        everything = {(phase, row, column): -1.0 for row in range(4) for column in range(4)}
         yield Mistake(f"all velocity terms have the wrong sign{swing}", changed_signs(right, everything))
 
 

@@ -29,10 +29,11 @@ Event = Callable[[Floats], float]
 SWING = 0
 STANCE = 1
 SHANK = 2
-EXACT, QUICK = 1e-12, 1e-9  # relative tolerances of gaits and of first looks
+EXACT, QUICK = 1e-12, 1e-7  # relative tolerances of gaits and of first looks
 LONGEST_SWING = 12.0  # sqrt(L/g)
+FALLEN = 1.5  # rad, angle of the stance leg
 MAX_EULER_STEPS = 400_000
-LARGEST_STEP = 0.1  # sqrt(L/g)
+LARGEST_STEP = 0.3  # sqrt(L/g)
 LOCATING_ROUNDS, TINY = 2, 1e-7  # s
 STRAIGHT = "straight"
 BENT = "bent"
@@ -95,21 +96,14 @@ class PlainWalker:
     def leg_inertia(self) -> float:
         return sum(part.inertia for part in self.parts)
 
-    @cached_property
-    def bodies(self) -> int:
-        """Number of bodies that turn on their own or follow others: swing leg, stance leg, shank, torso."""
-        return 2 + int(self.kneed) + int(self.torso is not None)
-
     def reduction(self, phase: str) -> Floats:
         """Return the matrix (bodies, coordinates) from the rates of the coordinates to those of all bodies."""
-        independent = 3 if self.kneed and phase == BENT else 2
-        Z = np.zeros((self.bodies, independent))
-        Z[:2, :2] = np.eye(2)
-        if self.kneed:
-            Z[SHANK, SHANK if independent == 3 else SWING] = 1.0
-        if self.torso is not None:
-            Z[-1, :2] = 0.5
-        return Z
+        coordinates = np.eye(3 if self.kneed and phase == BENT else 2)
+        return (
+            coordinates
+            if self.torso is None
+            else np.vstack((coordinates, np.resize([0.5, 0.5, 0.0], len(coordinates))))
+        )
 
     @cached_property
     def masses(self) -> Floats:
@@ -117,32 +111,24 @@ class PlainWalker:
         leg = [part.mass for part in self.parts]
         return np.array([*leg, *leg, self.hip_mass, *([] if self.torso is None else [self.torso.mass])])
 
-    @cached_property
-    def inertias(self) -> Floats:
-        """Inertias of all bodies."""
+    def inertias(self, phase: str) -> Floats:
+        """Return the inertias of all bodies."""
         leg = [part.inertia for part in self.parts]
-        return np.array([leg[0], sum(leg), *leg[1:], *([] if self.torso is None else [self.torso.inertia])])
+        swing = leg if phase == BENT else [sum(leg)]
+        return np.array([swing[0], sum(leg), *swing[1:], *([] if self.torso is None else [self.torso.inertia])])
 
-    def levers(self, foot: complex) -> Complex:
+    def levers(self, phase: str, foot: complex) -> Complex:
         """Return the levers (masses, bodies): position of each mass as a sum over bodies of lever times exp(i psi)."""
         n = len(self.parts)
-        levers = np.zeros((len(self.masses), self.bodies), complex)
+        levers = np.zeros((len(self.masses), len(self.reduction(phase))), complex)
         levers[:, STANCE] = -foot
-        upper = 0j
-        for place, part in enumerate(self.parts):
-            levers[n + place, STANCE] += upper + part.centre
-            body = SHANK if place else SWING
-            levers[place, body] = part.centre
-            if place:
-                levers[place, SWING] = upper
-            upper += self.knee
+        for place, (hinge, part) in enumerate(zip((0j, self.knee), self.parts, strict=False)):
+            levers[n + place, STANCE] += hinge + part.centre
+            levers[place, SWING] = hinge
+            levers[place, SHANK if place and phase == BENT else SWING] += part.centre
         if self.torso is not None:
             levers[-1, -1] = self.torso.centre
         return levers
-
-    @cached_property
-    def _levers(self) -> Complex:
-        return self.levers(self.foot)
 
     @cached_property
     def phases(self) -> dict[str, Phase]:
@@ -150,12 +136,14 @@ class PlainWalker:
         return {phase: self.sums(phase) for phase in (STRAIGHT, BENT)}
 
     def sums(self, phase: str) -> Phase:
-        levers = self._levers
-        inertias = self.inertias
+        levers = self.levers(phase, self.foot)
         moments = (levers.conj().T * self.masses) @ levers
-        signs = [[self.signs.get((phase, k, l), 1.0) for l in range(self.bodies)] for k in range(self.bodies)]
+        bodies = range(len(moments))
+        constant = np.diag(moments.real.diagonal() + self.inertias(phase))
+        constant[STANCE, STANCE] += self.radius**2 * self.mass
+        signs = [[self.signs.get((phase, k, l), 1.0) for l in bodies] for k in bodies]
         first = self.masses @ levers
-        return Phase(self.reduction(phase), moments.tolist(), first.tolist(), inertias.tolist(), signs)
+        return Phase(self.reduction(phase), levers, constant.tolist(), moments.tolist(), first.tolist(), signs)
 
     def motions(self, angles: Floats, levers: Complex, radius: float) -> Complex:
         """Return the velocities (masses, bodies) of all masses per unit rate of each body. The foot rolls."""
@@ -166,38 +154,39 @@ class PlainWalker:
     def rates(self, phase: str, state: Floats) -> Floats:
         """Return the derivative of a state by Lagrange's equations."""
         sums = self.phases[phase]
-        Z, R = sums.reduction, self.radius
+        Z = sums.reduction
         n = Z.shape[1]
-        bodies = range(self.bodies)
-        angles = (Z @ state[:n]).tolist()
-        omega = (Z @ state[n:]).tolist()
+        follows = n < len(Z)
+        rates = state[n:].tolist()
+        angles = (Z @ state[:n]).tolist() if follows else state[:n].tolist()
+        omega = (Z @ state[n:]).tolist() if follows else rates
         turns = [cmath.exp(1j * angle) for angle in angles]
         # velocity of all masses per unit rate: i lever turn, and -R for the stance leg, on which the foot rolls
-        M = [[0.0] * self.bodies for _ in bodies]
-        forces = [0.0] * self.bodies
-        for k in bodies:
-            back = turns[k].conjugate()
-            for l in bodies:
-                pull = sums.moments[k][l] * back * turns[l]
+        M = [row.copy() for row in sums.constant]
+        forces = [0.0] * len(omega)
+        for k, turn in enumerate(turns):
+            lever = sums.first[k] * turn
+            signs = sums.signs[k]
+            M[k][STANCE] += self.radius * lever.imag
+            M[STANCE][k] += self.radius * lever.imag
+            forces[STANCE] -= sums.signs[STANCE][k] * self.radius * lever.real * omega[k] ** 2
+            forces[k] += (-1j * lever.conjugate() * self.down).real
+            for l in range(k):
+                pull = sums.moments[k][l] * turn.conjugate() * turns[l]
                 M[k][l] += pull.real
-                # D^H m times the centripetal acceleration -lever turn omega^2
-                forces[k] -= sums.signs[k][l] * (1j * pull).real * omega[l] ** 2
-            along = (1j * sums.first[k] * turns[k]).real
-            M[k][STANCE] -= R * along
-            M[STANCE][k] -= R * along
-            forces[STANCE] -= sums.signs[STANCE][k] * R * (sums.first[k] * turns[k]).real * omega[k] ** 2
-            forces[k] += ((1j * sums.first[k] * turns[k]).conjugate() * self.down).real
-            M[k][k] += sums.inertias[k]
-        M[STANCE][STANCE] += R * R * self.mass
-        forces[STANCE] -= R * self.mass * self.down.real
+                M[l][k] += pull.real
+                # the centripetal acceleration is -lever turn omega^2
+                forces[k] += signs[l] * pull.imag * omega[l] ** 2
+                forces[l] -= sums.signs[l][k] * pull.imag * omega[k] ** 2
+        forces[STANCE] -= self.radius * self.mass * self.down.real
         spring, damper, torque = self.hip
         twist = torque - spring * (angles[SWING] - angles[STANCE]) - damper * (omega[SWING] - omega[STANCE])
         forces[SWING] += twist
         forces[STANCE] -= twist
-        if n < self.bodies:
+        if follows:
             M = (Z.T @ M @ Z).tolist()
             forces = (Z.T @ forces).tolist()
-        return np.array([*state[n:].tolist(), *eliminate(M, forces)])
+        return np.array(rates + eliminate(M, forces))
 
     @cached_property
     def mass(self) -> float:
@@ -223,13 +212,12 @@ class PlainWalker:
     def energy(self, phase: str, state: Floats) -> float:
         """Return kinetic plus potential energy (J). Heights are from where an upright stance leg touches the slope."""
         Z = self.reduction(phase)
-        n = Z.shape[1]
-        angles = Z @ state[:n]
-        omega = Z @ state[n:]
-        velocities = self.motions(angles, self._levers, self.radius) @ omega
+        angles, omega = np.reshape(state, (2, -1)) @ Z.T
+        levers = self.phases[phase].levers
+        velocities = self.motions(angles, levers, self.radius) @ omega
         rolled = 1j * self.radius - self.radius * angles[STANCE]
-        places = self._levers @ np.exp(1j * angles) + rolled
-        kinetic = 0.5 * (self.masses @ np.abs(velocities) ** 2 + self.inertias @ omega**2)
+        places = levers @ np.exp(1j * angles) + rolled
+        kinetic = 0.5 * (self.masses @ np.abs(velocities) ** 2 + self.inertias(phase) @ omega**2)
         return float(kinetic - self.masses @ (places * np.conj(self.down)).real)
 
     def balances(self) -> tuple[str, ...]:
@@ -244,21 +232,19 @@ class PlainWalker:
         """
         phase = BENT if self.free_at_strike else STRAIGHT
         Z = self.reduction(phase)
-        legs = len(self.parts)
-        Z_before = self.reduction(STRAIGHT)
-        old_angles = Z_before @ before[:2]
-        old = Z_before @ before[2:4]
+        old_angles, old = np.reshape(before[:4], (2, 2)) @ self.reduction(STRAIGHT).T
         foot, radius = (self.foot, self.radius) if self.strike_foot is None else (self.strike_foot, 0.0)
         pivot = (foot, radius) if self.turned_on_it else (self.foot, self.radius)
-        velocities = self.motions(old_angles, self.levers(pivot[0]), pivot[1]) @ old
+        velocities = self.motions(old_angles, self.levers(STRAIGHT, pivot[0]), pivot[1]) @ old
+        legs = len(self.parts)
         order = [*range(legs, 2 * legs), *range(legs), *range(2 * legs, len(velocities))]
-        bodies = [STANCE, SWING, *([STANCE] if self.kneed else []), *([len(old) - 1] if self.torso else [])]
+        bodies = [STANCE, SWING, *([STANCE] if phase == BENT else []), *([-1] if self.torso else [])]
         angles = old_angles[bodies]
         omega = old[bodies]
-        J = self.motions(angles, self.levers(foot), radius) @ Z
+        J = self.motions(angles, self.levers(phase, foot), radius) @ Z
         weighted = J.conj().T * self.masses
-        inertias = self.inertias.copy()
-        inertias[: 3 if self.kneed else 2] *= self.strike_inertia
+        inertias = self.inertias(phase)
+        inertias[: len(bodies) - int(self.torso is not None)] *= self.strike_inertia
         momentum = (weighted @ velocities[order]).real + Z.T @ (inertias * omega)
         if self.push_off:
             # the impulse acts along the trailing leg through the hip, so it turns only what moves with the hip
@@ -338,7 +324,7 @@ class PlainWalker:
 
         walk = solver(0.0, start, latest)
         before = event(start)
-        while walk.status == "running":
+        while walk.status == "running" and abs(walk.y[STANCE]) < FALLEN:
             old_time = walk.t
             old = walk.y
             walk.step()
@@ -369,6 +355,8 @@ class PlainWalker:
             old = state
             state = state + step * self.rates(phase, state)
             after = event(state)
+            if abs(state[STANCE]) > FALLEN:
+                return None
             if before > 0.0 >= after and counts(state):
                 share = before / (before - after) if self.interpolates else 1.0
                 return Piece(phase, start, step * (count - 1 + share), old + share * (state - old))
@@ -377,11 +365,11 @@ class PlainWalker:
 
     def after_knee_strike(self, state: Floats) -> Floats:
         """Return the state with a straight leg just after the knee has locked."""
-        Z = self.reduction(STRAIGHT)
-        Z_bent = self.reduction(BENT)
-        D = self.motions(Z_bent @ state[:3], self._levers, self.radius)
-        M = (D.conj().T * self.masses @ D).real + np.diag(self.inertias)
-        rates = np.linalg.solve(Z.T @ M @ Z, Z.T @ M @ Z_bent @ state[3:])
+        D = self.motions(self.reduction(BENT) @ state[:3], self.phases[BENT].levers, self.radius) @ self.reduction(BENT)
+        M = (D.conj().T * self.masses @ D).real
+        M += self.reduction(BENT).T * self.inertias(BENT) @ self.reduction(BENT)
+        locked = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+        rates = np.linalg.solve(locked.T @ M @ locked, locked.T @ M @ state[3:])
         return np.concatenate((state[:2], rates))
 
 
@@ -394,9 +382,10 @@ class Phase(NamedTuple):
     """Sums over the point masses of a walker in one phase."""
 
     reduction: Floats  # (bodies, coordinates)
+    levers: Complex  # m, (masses, bodies)
+    constant: list[list[float]]  # kg m^2, part of the mass matrix that no angle changes
     moments: list[list[complex]]  # kg m^2, of two levers
     first: list[complex]  # kg m, of one lever
-    inertias: list[float]
     signs: list[list[float]]  # factors on velocity terms
 
 
