@@ -27,7 +27,7 @@ from leaving_out import HEAD, leaving_out_rows
 from right_hand_sides import ONE_DEGREE, times_ns
 from whole_process import whole_process_times
 
-from walkerlab.config.basin import COORDINATES
+from walkerlab.config.analyses import COORDINATES
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.evidence.benchmarks.accuracy import START_RATE_FACTOR
@@ -56,7 +56,7 @@ from walkerlab.physics.orbits.step_map import Cycle, gait_near
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages.continuation import FamilyQuestion, search_of
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.parameter import parameter_of
 from walkerlab.scene.rigid import rigid_walker

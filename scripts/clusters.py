@@ -172,7 +172,7 @@ def swept(folder: Path, seeds: str, engine: str = "slurm", chunk_s: float = 600.
     from toy_sweep.sweep_pipeline import GRAPH
 
     from walkerlab.config.loader import load
-    from walkerlab.pipeline.store.runfolder import RunFolder
+    from walkerlab.pipeline.store.runs import RunFolder
     from walkerlab.pipeline.sweeps.engines import ENGINES, Order
     from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork

@@ -33,7 +33,7 @@ from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.errors import WalkerlabError
 from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 
 LONGEST_S = 20.0  # that a config may take to be refused or walked, once its models are compiled
 HANGS_S = 300.0  # after which the campaign ends with a traceback of where it hangs

@@ -23,8 +23,7 @@ from walkerlab.config.schema import Config
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.store.artifact import write
-from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.artifact import Identity, write
 from walkerlab.pipeline.store.provenance import Provenance, begin
 from walkerlab.scene.contact import contact_scene, start_state
 

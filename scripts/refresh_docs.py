@@ -39,7 +39,7 @@ from walkerlab.config.reference import KeyReference, keys
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.run.runner import execute
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 
 sys.path.insert(0, str(Path(__file__).parent))
 

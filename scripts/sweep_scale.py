@@ -72,7 +72,7 @@ def parsed() -> argparse.Namespace:
 def measure(points: int) -> None:
     """Sweep once, and say what it took."""
     from walkerlab.config.loader import load
-    from walkerlab.pipeline.store.runfolder import RunFolder
+    from walkerlab.pipeline.store.runs import RunFolder
     from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
 

@@ -11,8 +11,8 @@ from walkerlab.errors import ConfigError
 from walkerlab.evidence.verification.section import section
 from walkerlab.evidence.verification.stability import summarise
 from walkerlab.evidence.verification.verdict import CaseResult
+from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.page import Page, render
-from walkerlab.views.report.results import Results
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
 MARKUP = "<script>alert(1)</script>"

@@ -22,7 +22,7 @@ def hook(cls, module, compiled):
 codegen.CPUCodeLibrary._object_compiled_hook = classmethod(hook)
 
 import typer
-from walkerlab.views.cli.failures import exit_on_failure
+from walkerlab.views.cli.request import exit_on_failure
 from walkerlab.views.cli.request import Request
 from walkerlab.physics.kernels import kernel
 

@@ -11,6 +11,9 @@ UNITS: Final = {
     "N_m": "N m", "N_m_per_rad": "N m/rad", "N_m_s_per_rad": "N m s/rad",
 }  # fmt: skip
 """Units by name suffix."""
+RIGID_STAGE: Final = "simulate"
+CONTACT_STAGE: Final = "contact-sim"
+"""Stages that simulate a walk."""
 ERROR_OF_EACH_STEP: Final = {
     "step_periods_s": "step_period_s",
     "step_lengths_m": "step_length_m",

@@ -10,17 +10,21 @@ from typing import Protocol
 import pytest
 
 from walkerlab.config import reads, schema
-from walkerlab.config.basin import Basin
-from walkerlab.config.canonical import canonical_json, slice_of
-from walkerlab.config.continuation import Continuation
-from walkerlab.config.design import Design
+from walkerlab.config.analyses import Basin, Case, Continuation, Design, Robustness
 from walkerlab.config.drives import PushOff
 from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
-from walkerlab.config.reads import ContactConfig, SceneConfig, SimulateConfig, StartConfig, dotted_keys, only
-from walkerlab.config.robustness import Robustness
+from walkerlab.config.reads import (
+    ContactConfig,
+    SceneConfig,
+    SimulateConfig,
+    StartConfig,
+    canonical_json,
+    dotted_keys,
+    only,
+    slice_of,
+)
 from walkerlab.config.schema import Config, Contact
-from walkerlab.config.stability import Case
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from walkerlab.config.layers import apply_settings, parse_setting
+from walkerlab.config.files import apply_settings, parse_setting
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config, Contact
 from walkerlab.config.tree import plain

@@ -13,7 +13,7 @@ from walkerlab.config.loader import load
 from walkerlab.pipeline.plan.planner import Planner
 from walkerlab.pipeline.plan.results import FolderResults
 from walkerlab.pipeline.run.runner import Options, execute
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 
 HERE = Path(__file__).parent
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from walkerlab.pipeline.plan.survey import survey
+from walkerlab.pipeline.plan.planner import survey
 from walkerlab.pipeline.store.artifact import read
 from walkerlab.views.cli.stored import state_of
 

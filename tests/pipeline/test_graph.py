@@ -12,16 +12,23 @@ import pytest
 import walkerlab
 from walkerlab.code_digest import Sources
 from walkerlab.config import files
-from walkerlab.config.canonical import slice_of
 from walkerlab.config.fields import block_of
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
-from walkerlab.config.reads import CompassCasesConfig, ContactConfig, SceneCasesConfig, dotted_keys, keys_of, only
+from walkerlab.config.reads import (
+    CompassCasesConfig,
+    ContactConfig,
+    SceneCasesConfig,
+    dotted_keys,
+    keys_of,
+    only,
+    slice_of,
+)
 from walkerlab.config.schema import QUESTIONS, Config
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
-from walkerlab.pipeline.plan.keys import Keys, added_code
+from walkerlab.pipeline.plan.results import Keys, added_code
 from walkerlab.pipeline.plan.stage import Stage, results_of
-from walkerlab.pipeline.store.key import differences
+from walkerlab.pipeline.store.artifact import differences
 
 NAMES = [stage.name for stage in PIPELINE.stages]
 EXPLICIT = "start=[-0.2, 0.17, -0.6, -0.86]"

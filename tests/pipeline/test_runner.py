@@ -8,8 +8,8 @@ import pytest
 from walkerlab.config.reads import StartConfig
 from walkerlab.errors import ConfigError, LockedError, StorageError
 from walkerlab.pipeline.plan.graph import Graph
+from walkerlab.pipeline.plan.planner import survey
 from walkerlab.pipeline.plan.stage import Stage
-from walkerlab.pipeline.plan.survey import survey
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store.artifact import read
 
@@ -280,7 +280,7 @@ from toy.pipeline import GRAPH
 from walkerlab.config.loader import load
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.runner import execute
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 class Notes(Silent):
     def note(self, text):
         print(text, file=sys.stderr, flush=True)

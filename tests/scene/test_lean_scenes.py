@@ -20,7 +20,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages import contact_sim, simulate
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.scene import omissions
 from walkerlab.scene.contact import contact_scene, start_state
 from walkerlab.scene.rigid import rigid_scene

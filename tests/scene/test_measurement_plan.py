@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from walkerlab.api.memory import in_memory
+from walkerlab.config.analyses import Plan
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
-from walkerlab.config.plan import Plan
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.estimation.measurements import LEG_ANGLE, STEP_LENGTH, STEP_PERIOD
 from walkerlab.scene.measurement_plan import ANGLES, plan_measurements, predict_measured, walk_of

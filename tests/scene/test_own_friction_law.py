@@ -21,7 +21,7 @@ from walkerlab.physics.orbits.rigid_limit import STICTION_SERIES, series_setting
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages.contact_sim import tell_unresolved_slip
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.scene.contact import contact_scene, ground_laws, scene_measures, start_state
 
 START = (-0.2042, 0.1694, -0.605819, -0.861041)

@@ -12,10 +12,8 @@ from walkerlab.api.results import Gait, Result, Setting, result_of
 from walkerlab.api.runs import RUNS, check_stage, folder_of, warn
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import Block, block_of, kinds_of
-from walkerlab.config.files import DEFAULT, builtin_config, read_layers
-from walkerlab.config.layers import merge_layers
-from walkerlab.config.loader import suspicious_values
-from walkerlab.config.overlay import tree_of
+from walkerlab.config.files import DEFAULT, builtin_config, merge_layers, read_layers
+from walkerlab.config.loader import suspicious_values, tree_of
 from walkerlab.config.recording import Recorded
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import NOWHERE

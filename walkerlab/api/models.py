@@ -8,7 +8,7 @@ from walkerlab.api.results import Gait, Result, Setting
 from walkerlab.api.runs import Run
 from walkerlab.config.contact import Contact
 from walkerlab.config.files import DEFAULT
-from walkerlab.config.overlay import tree_of
+from walkerlab.config.loader import tree_of
 from walkerlab.config.schema import Config
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import validate_tree
@@ -16,9 +16,8 @@ from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import MemoryResults
-from walkerlab.pipeline.store.artifact import Identified
-from walkerlab.pipeline.store.key import Identity
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.artifact import Identified, Identity
+from walkerlab.pipeline.store.runs import RunFolder
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel

@@ -21,7 +21,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.headlines import headline_values
 from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.views.report.text import format_value
+from walkerlab.views.report.tables import format_value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -198,11 +198,11 @@ class Gait(Result):
 
         Raises NoAnswer if there is no gait.
         """
-        from walkerlab.views.figures.multipliers import draw_multipliers
+        from walkerlab.views.figures.families import draw_unit_circle
 
         if self.no_answer is not None:
             raise NoAnswer(self.no_answer)
-        return super().plot(figure) if figure else draw_multipliers(self.multipliers)
+        return super().plot(figure) if figure else draw_unit_circle(self.multipliers)
 
     @property
     def multipliers(self) -> tuple[complex, ...]:

@@ -11,19 +11,18 @@ from types import NoneType
 from typing import TYPE_CHECKING, TypedDict, Unpack
 
 from walkerlab.api.results import Result, Setting, dataset, result_of, xarray_here
+from walkerlab.config.analyses import Sweep as SweepBlock
 from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
-from walkerlab.config.sweep import Sweep as SweepBlock
 from walkerlab.errors import ConfigError, NoAnswer, StaleError
 from walkerlab.pipeline.plan.graph import PIPELINE
+from walkerlab.pipeline.plan.planner import result_in
 from walkerlab.pipeline.plan.resolve import resolve
-from walkerlab.pipeline.plan.survey import result_in
 from walkerlab.pipeline.run.runner import Options, run_and_write
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.store.runs import config_of, run_named
+from walkerlab.pipeline.store.runs import RunFolder, config_of, run_named
 
 if TYPE_CHECKING:
     from xarray import Dataset

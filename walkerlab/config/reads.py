@@ -1,12 +1,13 @@
 """Types for the parts of a config that stages and their helpers may read, which mypy enforces.
 
 Each type lists its keys, and a config satisfies all types. A stage gets an object with only the keys of its type, and
-their values determine the key of its result. Meaning, unit and bounds of the keys are in config/schema.py.
+their values, as canonical JSON, make up the key of its result. Meaning, unit and bounds of the keys: config/schema.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from functools import cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -14,18 +15,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 # The command line's help uses types of this module and must load neither the schema nor pydantic.
 if TYPE_CHECKING:
     from walkerlab.config import schema
-    from walkerlab.config.basin import Basin
+    from walkerlab.config.analyses import Basin, Case, Continuation, Design, Plan, Robustness
     from walkerlab.config.check import Check
     from walkerlab.config.contact import Contact
-    from walkerlab.config.continuation import Continuation
-    from walkerlab.config.design import Design
     from walkerlab.config.drives import PushOff
     from walkerlab.config.ground import Footholds
     from walkerlab.config.identify import Identify
-    from walkerlab.config.plan import Plan
     from walkerlab.config.recording import RecordedFile
-    from walkerlab.config.robustness import Robustness
-    from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
 
 
@@ -261,3 +257,34 @@ if TYPE_CHECKING:
     def check_every_type(config: schema.Config) -> OfEachType:
         """Let mypy check that a config satisfies every type."""
         return (config,) * 14
+
+
+def slice_of(config: schema.Config, takes: type | None) -> dict[str, Any]:
+    """Return the keys of a config that a type of `config.reads` lists, as nested JSON data. None returns all keys.
+
+    Raises KeyError if a key is not in the schema.
+    """
+
+    def part(data: Any, takes: type | None) -> Any:
+        return data if takes is None else {name: part(data[name], inner) for name, inner in keys_of(takes).items()}
+
+    selected: dict[str, Any] = part(config.model_dump(mode="json"), takes)
+    return selected
+
+
+def flatten(block: Mapping[str, Any], lists: bool = False, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted names and values of nested objects. `lists` also splits lists into items, named by their index."""
+    for name, value in block.items():
+        inner = {str(place): item for place, item in enumerate(value)} if lists and isinstance(value, list) else value
+        if isinstance(inner, Mapping):
+            yield from flatten(inner, lists, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def canonical_json(data: Any) -> str:
+    """Serialise so that equal content gives equal text: sorted keys, no blanks, ASCII, shortest floats.
+
+    Raises ValueError if a number is not finite.
+    """
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -17,7 +17,7 @@ from walkerlab.config.problems import nearest
 from walkerlab.config.schema import Config, SlopeInDegrees
 from walkerlab.errors import ConfigError
 
-COLUMNS: Final = 79
+TEXT_WIDTH: Final = 79
 SHOWN_KEYS: Final = 4  # largest number of keys that a message suggests
 KIND_SUFFIX: Final = re.compile(r"\([a-z-]+\)")
 """Kind in parentheses in a key's name, such as `(kneed)`: only blocks of that kind have the key."""
@@ -80,7 +80,7 @@ def as_paragraphs(selection: str = "") -> str:
     for key in select_keys(selection):
         what = [key.type, f"in {key.unit}" if key.unit not in ("", "1") else "", key.bounds]
         facts = [", ".join(filter(None, what)), f"default: {key.default}", key.meaning, f"source: {key.source}"]
-        wrapped = [textwrap.fill(fact, COLUMNS, initial_indent="    ", subsequent_indent="      ") for fact in facts]
+        wrapped = [textwrap.fill(fact, TEXT_WIDTH, initial_indent="    ", subsequent_indent="      ") for fact in facts]
         paragraphs.append("\n".join([key.key, *filter(None, wrapped)]))
     return "\n\n".join(paragraphs)
 

@@ -7,20 +7,14 @@ from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field_validator
 
-from walkerlab.config.basin import Basin
+from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustness, Stability, Sweep
 from walkerlab.config.check import Check
 from walkerlab.config.contact import Contact
-from walkerlab.config.continuation import Continuation
-from walkerlab.config.design import Design
 from walkerlab.config.drives import PushOff, acting_on
 from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
-from walkerlab.config.plan import Plan
 from walkerlab.config.recording import RecordedFile
-from walkerlab.config.robustness import Robustness
-from walkerlab.config.stability import Stability
-from walkerlab.config.sweep import Sweep
 from walkerlab.config.walkers import (
     CompassWalker,
     Walker,

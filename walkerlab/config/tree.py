@@ -1,7 +1,5 @@
 """Untyped tree of a config text: scalars, lists and blocks, each with its position."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -38,7 +36,7 @@ class Scalar:
 @dataclass(frozen=True, slots=True)
 class ListNode:
     position: Position
-    items: list[Node] = field(default_factory=list)
+    items: list["Node"] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +44,14 @@ class BlockNode:
     """Block of keys: `entries` has the value of each key, `keys` the position of the key itself."""
 
     position: Position
-    entries: dict[str, Node] = field(default_factory=dict)
+    entries: dict[str, "Node"] = field(default_factory=dict)
     keys: dict[str, Position] = field(default_factory=dict)
 
-    def put(self, name: str, node: Node, position: Position) -> None:
+    def put(self, name: str, node: "Node", position: Position) -> None:
         self.entries[name] = node
         self.keys[name] = position
 
-    def without(self, *names: str) -> BlockNode:
+    def without(self, *names: str) -> "BlockNode":
         entries = {name: node for name, node in self.entries.items() if name not in names}
         return BlockNode(self.position, entries, {name: self.keys[name] for name in entries})
 

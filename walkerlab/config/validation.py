@@ -10,8 +10,7 @@ from pydantic_core import ErrorDetails
 
 from walkerlab.config.contact import BOUNDS_SI
 from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of, leaves, words_of
-from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, read_layers
-from walkerlab.config.layers import merge_layers
+from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, merge_layers, read_layers
 from walkerlab.config.numbers import DECIMAL_COMMA, short_number
 from walkerlab.config.problems import (
     Problem,

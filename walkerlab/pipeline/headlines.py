@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
-from walkerlab.config.canonical import flatten
+from walkerlab.config.reads import flatten
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config

@@ -27,8 +27,8 @@ from walkerlab.scene.identification import ConfigFamily, problem_of, step_map_of
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
 if TYPE_CHECKING:
+    from walkerlab.config.analyses import Plan
     from walkerlab.config.identify import Identify
-    from walkerlab.config.plan import Plan
     from walkerlab.config.schema import Config
 
 STEP_MEASUREMENTS: Final = {

@@ -6,23 +6,25 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.evidence.benchmarks import accuracy, ladder
-from walkerlab.evidence.benchmarks.accuracy import best_methods, conclusion, summarise
-from walkerlab.evidence.benchmarks.ladder import (
+from walkerlab.evidence.benchmarks import accuracy
+from walkerlab.evidence.benchmarks.accuracy import (
     Ascent,
     MethodRow,
     MethodRun,
     ascend,
+    best_methods,
+    conclusion,
     make_row,
     measure,
     omitted_tolerances,
+    summarise,
 )
 from walkerlab.evidence.benchmarks.references import End, Reference, WalkEndsError, first_end, reference_for
 from walkerlab.evidence.benchmarks.trials import USER_SCRIPT, RigidTrial, TrialRun
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.store.checkpoint import Checkpoint
-from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import rows_group
 from walkerlab.scene.rigid import rigid_walker
 
 CONFIG = load(None, ("contact=null",)).config
@@ -106,26 +108,26 @@ def test_error_below_the_uncertainty_of_the_reference_is_marked():
 
 
 def test_exhausted_budget_is_shown_and_stops_tightening(reference, monkeypatch):
-    monkeypatch.setattr(ladder, "RUN_BUDGET", 500)
+    monkeypatch.setattr(accuracy, "RUN_BUDGET", 500)
     one = ascend(TRIAL, "radau5", Checkpoint(None, ""))
     rows = [make_row(one, run, reference) for run in one.runs]
     assert [row.outcome for row in rows[:-1]] == ["walked"] * (len(rows) - 1)
     assert (rows[-1].outcome, rows[-1].error, rows[-1].within_reference) == ("budget-exhausted", None, False)
     not_run = omitted_tolerances(one)
-    assert len(rows) + len(not_run) == len(ladder.OWN_LADDER)
+    assert len(rows) + len(not_run) == len(accuracy.OWN_LADDER)
     assert all("budget-exhausted" in entry["why"] for entry in not_run)
 
 
 def test_library_series_stops_at_the_first_exhausted_budget(reference, monkeypatch):
     sizes = [run.result.rhs_evaluations for run in ascend(TRIAL, "scipy-dop853", Checkpoint(None, "")).runs]
-    monkeypatch.setattr(ladder, "LIBRARY_RUN_BUDGET", sizes[2] - 1)
-    monkeypatch.setattr(ladder, "LAST_RUN_SIZE", sizes[1] + 1)
+    monkeypatch.setattr(accuracy, "LIBRARY_RUN_BUDGET", sizes[2] - 1)
+    monkeypatch.setattr(accuracy, "LAST_RUN_SIZE", sizes[1] + 1)
     library, ours = (ascend(TRIAL, method, Checkpoint(None, "")) for method in ("scipy-dop853", "dop853"))
     rows = [make_row(library, run, reference) for run in library.runs]
     assert [row.outcome for row in rows] == ["walked", "walked", "budget-exhausted"]
     assert [row.rhs_evaluations for row in rows[:2]] == sizes[:2]
-    assert len(omitted_tolerances(library)) == len(ladder.LIBRARY_LADDER) - 3
-    assert len(ours.runs) == len(ladder.OWN_LADDER)
+    assert len(omitted_tolerances(library)) == len(accuracy.LIBRARY_LADDER) - 3
+    assert len(ours.runs) == len(accuracy.OWN_LADDER)
 
 
 class StopsAfter:
@@ -153,7 +155,7 @@ def test_interrupted_measurement_resumes_with_its_finished_runs(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         ascend(StopsAfter(30), "dop853", Checkpoint(path, "key"))
     finished = Checkpoint(path, "key").kept
-    assert 1 <= len(finished) < len(ladder.OWN_LADDER)
+    assert 1 <= len(finished) < len(accuracy.OWN_LADDER)
     resumed = ascend(TRIAL, "dop853", Checkpoint(path, "key"))
     assert [run.pack() for run in resumed.runs[: len(finished)]] == list(finished.values())
     fresh = ascend(TRIAL, "dop853", Checkpoint(None, ""))
@@ -188,11 +190,11 @@ class SlowAtFirst:
 
 def test_compilation_is_not_timed(reference, monkeypatch):
     trial = SlowAtFirst()
-    monkeypatch.setattr(ladder.time, "perf_counter", lambda: trial.clock)
+    monkeypatch.setattr(accuracy.time, "perf_counter", lambda: trial.clock)
     ascent = ascend(trial, "dop853", Checkpoint(None, ""))
     rows = [make_row(ascent, run, reference) for run in ascent.runs]
-    assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(ladder.OWN_LADDER))
-    assert {row.repeats_of_wall_s for row in rows} == {ladder.MAX_REPEATS}
+    assert [row.wall_s for row in rows] == pytest.approx([1e-3] * len(accuracy.OWN_LADDER))
+    assert {row.repeats_of_wall_s for row in rows} == {accuracy.MAX_REPEATS}
 
 
 def made(method, error, wall_s):

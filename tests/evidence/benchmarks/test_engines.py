@@ -15,9 +15,9 @@ from walkerlab.evidence.benchmarks.engines.registry import PHYSICS_ENGINES, Engi
 from walkerlab.evidence.benchmarks.engines.scenes import supported_scene
 from walkerlab.evidence.benchmarks.engines.stage import closest, ratios, three_digits
 from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.pipeline.plan.keys import Keys
+from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.store.key import differences
+from walkerlab.pipeline.store.artifact import differences
 
 ABSENT = Engine("absent", "no_such_engine_module")
 

@@ -10,8 +10,7 @@ from walkerlab.evidence.benchmarks.engines.section import section
 from walkerlab.evidence.benchmarks.figures import COLOURS, FIGURES, engine_series
 from walkerlab.labels import labels_of
 from walkerlab.views.figures.canvas import as_file, figure_style
-from walkerlab.views.report.blocks import Statements
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Results, Statements
 from walkerlab.views.report.tables import Table
 
 ERRORS, PERIODS = (

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from walkerlab.config.overlay import tree_of
+from walkerlab.config.loader import tree_of
 from walkerlab.config.tree import NOWHERE
 from walkerlab.config.validation import validate_tree
 from walkerlab.evidence.check.answer import check_gait

@@ -17,7 +17,7 @@ from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages import simulate
 from walkerlab.pipeline.stages.walk import step_columns, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 
 xarray = import_late("xarray")
 

@@ -16,8 +16,7 @@ from walkerlab.physics.orbits.rigid_limit import ALL_SERIES, NORMAL_SERIES, Cont
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint
-from walkerlab.views.report.blocks import Statements
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Results, Statements
 from walkerlab.views.report.sections import adjustment, verdict
 from walkerlab.views.report.words import words
 

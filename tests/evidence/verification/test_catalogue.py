@@ -2,7 +2,7 @@
 
 import pytest
 
-from walkerlab.config.stability import Case
+from walkerlab.config.analyses import Case
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.verification.catalogue import check_unique_names, config_of, package_cases
 from walkerlab.evidence.verification.judge import CaseCell, judge

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from walkerlab.evidence.verification import references
-from walkerlab.evidence.verification.known import PROBLEMS
+from walkerlab.evidence.verification.known_problems import PROBLEMS
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.args[0])

@@ -6,7 +6,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.evidence.verification import stability_maps
-from walkerlab.evidence.verification.maps import (
+from walkerlab.evidence.verification.stability_maps import (
     ERROR_MISSING,
     PAPER_STIFFNESS,
     VERDICT_NAMES,

@@ -13,7 +13,7 @@ from walkerlab.evidence.paper.appendix_a import impact
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
 from walkerlab.evidence.verification.judge import time_difference
-from walkerlab.evidence.verification.masses import RigidMasses, energy_won
+from walkerlab.evidence.verification.momentum import RigidMasses, energy_won
 from walkerlab.evidence.verification.scaling import scaled, to_twin
 from walkerlab.evidence.verification.starts import case_tolerances, prepare_start
 from walkerlab.evidence.verification.verdict import Measure, finite

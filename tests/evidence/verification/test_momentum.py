@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from walkerlab.config.stability import Case
+from walkerlab.config.analyses import Case
 from walkerlab.evidence.verification import momentum
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
 from walkerlab.evidence.verification.momentum import (

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from walkerlab.config.stability import Case
+from walkerlab.config.analyses import Case
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
 from walkerlab.evidence.verification.judge import LIBRARY_BUDGET, judge, other_methods, second_walk
 from walkerlab.evidence.verification.verdict import allowed_difference

@@ -5,17 +5,17 @@ from types import SimpleNamespace
 
 import pytest
 
+from walkerlab.config.analyses import Case
 from walkerlab.config.loader import load
-from walkerlab.config.stability import Case
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.verification.catalogue import config_of, package_cases
 from walkerlab.evidence.verification.judge import CaseCell, judge, run_cells
-from walkerlab.evidence.verification.known import Known
+from walkerlab.evidence.verification.known_problems import Known
 from walkerlab.evidence.verification.section import section
 from walkerlab.evidence.verification.stability import summarise
 from walkerlab.evidence.verification.starts import prepare_start
 from walkerlab.evidence.verification.verdict import BUDGET_USED, CaseResult, Measure, NotMeasured
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.sections import verdict as verdict_section
 from walkerlab.views.report.tables import Table
 

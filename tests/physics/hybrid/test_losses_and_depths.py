@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from contact_walks import scene_of, walked
 
-from walkerlab.evidence.verification.known import (
+from walkerlab.evidence.verification.known_problems import (
     ALONG_RATE,
     BODY_HEIGHT,
-    GRAVITY,
+    EARTH_GRAVITY,
     HEIGHT_RATE,
     rig,
     rig_state,
@@ -28,8 +28,8 @@ def test_damping_loss_of_a_bounce_equals_the_lost_height(rtol):
     run = run_until(ball, rig_state((0.0, DROP), (0.0, 0.0)), 0.25, rtol=rtol, atol=1e-3 * rtol)
     end = np.array(run.end)
     assert end[BODY_HEIGHT] > 0.0
-    left = MASS * (GRAVITY * end[BODY_HEIGHT] + 0.5 * (end[HEIGHT_RATE] ** 2 + end[ALONG_RATE] ** 2))
-    missing = MASS * GRAVITY * DROP - left
+    left = MASS * (EARTH_GRAVITY * end[BODY_HEIGHT] + 0.5 * (end[HEIGHT_RATE] ** 2 + end[ALONG_RATE] ** 2))
+    missing = MASS * EARTH_GRAVITY * DROP - left
     assert missing > 0.1
     # some hundred steps in contact, each to the tolerance
     assert run.dissipated[0] == pytest.approx(missing, abs=max(1e3 * rtol, 1e-11))

@@ -17,8 +17,8 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, simulate
 from walkerlab.pipeline.stages.walk import numbers_of, step_columns
 from walkerlab.pipeline.store import artifact
+from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.provenance import begin
 from walkerlab.scene import contact
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.config.design import Design
+from walkerlab.config.analyses import Design
 from walkerlab.config.fields import leaves, type_words
 from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load

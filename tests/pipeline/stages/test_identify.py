@@ -11,15 +11,14 @@ from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.pipeline.plan.keys import Keys
+from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, identify, simulate
 from walkerlab.pipeline.stages.measured_walk import NO_FILE, digests, read_measured
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.report.answers import answer
-from walkerlab.views.report.blocks import Player
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Player, Results
 from walkerlab.views.report.sections.identification import section
 from walkerlab.views.report.tables import Table
 

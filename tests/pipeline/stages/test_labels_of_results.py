@@ -3,15 +3,15 @@
 import pytest
 
 import walkerlab
-from walkerlab.evidence.benchmarks import ladder
+from walkerlab.evidence.benchmarks import accuracy
 from walkerlab.evidence.benchmarks.engines import rows as engines
 from walkerlab.evidence.paper import tune_limit
-from walkerlab.evidence.verification.known import Known
+from walkerlab.evidence.verification.known_problems import Known
 from walkerlab.evidence.verification.verdict import CaseResult
 from walkerlab.labels import axis_label, labels_of, unit_by_name
 from walkerlab.pipeline.stages import fixedpoint, walk
 
-CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, ladder.MethodRow, CaseResult, Known)
+CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, accuracy.MethodRow, CaseResult, Known)
 LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,

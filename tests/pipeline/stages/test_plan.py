@@ -15,8 +15,8 @@ from walkerlab.pipeline.stages import fixedpoint, plan
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures.registry import FIGURES
 from walkerlab.views.report.answers import answer
-from walkerlab.views.report.results import Results
-from walkerlab.views.report.sections.plan import section
+from walkerlab.views.report.blocks import Results
+from walkerlab.views.report.sections.identification import plan_section
 
 FIT = "identify.fit={slope_deg: null, walker.leg_length_m: null}"
 SHORT = ("plan.steps=6", "plan.max_steps=8")
@@ -58,7 +58,7 @@ def test_figure_and_page_show_the_errors(content):
     figure = next(figure for figure in FIGURES if figure.stages == ("plan",))
     assert figure.why_left_out({"plan": content}, {}) is None
     assert figure.render({"plan": content}).png.startswith(b"\x89PNG")
-    made = section(Results(configured(), {"plan": content}))
+    made = plan_section(Results(configured(), {"plan": content}))
     assert made is not None
     assert "Measurements to make" in made.title
 

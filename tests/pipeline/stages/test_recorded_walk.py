@@ -23,7 +23,7 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages import recorded_walk
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 
 MEMORY = MemoryResults()
 

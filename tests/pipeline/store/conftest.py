@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from walkerlab.config.schema import Config
+from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.content import Content, Group, Variable
-from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.provenance import begin
 
 

@@ -16,9 +16,9 @@ import walkerlab
 from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
 from walkerlab.pipeline.store import artifact, hdf5
+from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.content import Content, Group, Variable
 from walkerlab.pipeline.store.hdf5 import GroupOnDisk
-from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.provenance import begin
 
 xarray = import_late("xarray")

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from walkerlab.labels import Label, labels_of
-from walkerlab.pipeline.store.columns import columns, real_and_imaginary, rows_group
+from walkerlab.pipeline.store.content import columns, real_and_imaginary, rows_group
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
 import pytest
 
-from walkerlab.pipeline.store import artifact, index
-from walkerlab.pipeline.store.clean import files_of, remove
+from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder, files_of, remove
 
 
 @pytest.fixture
@@ -17,26 +16,26 @@ def folder(tmp_path):
 
 
 def drawn(folder):
-    return Content({index.GROUP: index.index(folder.path, [folder.figures / "figure-02.svg"])})
+    return Content({artifact.FILES_GROUP: artifact.index_files(folder.path, [folder.figures / "figure-02.svg"])})
 
 
 def test_unchanged_files_pass(folder):
-    assert index.broken_file(folder.path, drawn(folder)) is None
-    assert index.broken_file(folder.path, Content()) is None
+    assert artifact.broken_file(folder.path, drawn(folder)) is None
+    assert artifact.broken_file(folder.path, Content()) is None
 
 
 def test_altered_or_missing_file_is_named(folder):
     content = drawn(folder)
     (folder.figures / "figure-02.svg").write_text("<svg>other</svg>")
-    assert index.broken_file(folder.path, content) == "figures/figure-02.svg was altered"
+    assert artifact.broken_file(folder.path, content) == "figures/figure-02.svg was altered"
     (folder.figures / "figure-02.svg").unlink()
-    assert index.broken_file(folder.path, content) == "figures/figure-02.svg is missing"
+    assert artifact.broken_file(folder.path, content) == "figures/figure-02.svg is missing"
 
 
 def test_only_files_of_the_run_can_be_listed(folder, tmp_path):
     (tmp_path / "elsewhere").touch()
     with pytest.raises(ValueError):
-        index.index(folder.path, [tmp_path / "elsewhere"])
+        artifact.index_files(folder.path, [tmp_path / "elsewhere"])
 
 
 def test_clean_removes_only_generated_files(folder, identity, origin):
@@ -50,10 +49,10 @@ def test_clean_removes_only_generated_files(folder, identity, origin):
 
 def test_clean_does_not_leave_the_run_folder(folder, identity, origin, tmp_path):
     (tmp_path / "precious").write_text("not of this run")
-    forged = index.index(tmp_path, [tmp_path / "precious"])
+    forged = artifact.index_files(tmp_path, [tmp_path / "precious"])
     forged["file"].setflags(write=True)
     forged["file"][0] = "../precious"
-    artifact.write(folder.artifact("plot"), Content({index.GROUP: forged}), identity, origin)
+    artifact.write(folder.artifact("plot"), Content({artifact.FILES_GROUP: forged}), identity, origin)
     assert files_of(folder, ["plot"]) == [folder.figures / "figure-02.svg", folder.artifact("plot")]
 
 

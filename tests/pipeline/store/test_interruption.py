@@ -27,7 +27,7 @@ from pathlib import Path
 from conftest import full_content
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.provenance import begin
 origin = begin(Config(), {})
 for number in itertools.count():
@@ -42,7 +42,7 @@ from conftest import full_content
 from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.provenance import begin
 resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
 try:

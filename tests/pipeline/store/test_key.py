@@ -1,6 +1,6 @@
 import pytest
 
-from walkerlab.pipeline.store.key import Identity, changed_parts, differences
+from walkerlab.pipeline.store.artifact import Identity, changed_parts, differences
 
 SLICE = {"slope_rad": 0.0174, "contact": None, "walker": {"leg_mass_kg": 5.0, "hip_mass_kg": 10.0}}
 INPUTS = {"fixedpoint": "a", "simulate": "b"}

@@ -9,12 +9,12 @@ import pytest
 
 import walkerlab
 from walkerlab.errors import LockedError, StorageError
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 with RunFolder(Path(sys.argv[1]), "paper").locked():
     print("held", flush=True)
     time.sleep(600)

@@ -9,7 +9,7 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.pipeline.sweeps.chunk import memory_for
 from walkerlab.pipeline.sweeps.engines import Order, SweepEngine
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep

@@ -14,16 +14,15 @@ from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.benchmarks.engines import registry
 from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.pipeline.plan.keys import Keys
 from walkerlab.pipeline.plan.planner import Planner
-from walkerlab.pipeline.plan.results import FolderResults, MemoryResults
+from walkerlab.pipeline.plan.results import FolderResults, Keys, MemoryResults
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.stages.numerical_error import SAMPLE
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import remove_timings
 from walkerlab.pipeline.store.files import refused
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.pipeline.sweeps import sweep as sweeps
 from walkerlab.pipeline.sweeps.chunk import FOLDER, Chunk, PointResult, compute_point, flatten_summary, omit_outputs
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep

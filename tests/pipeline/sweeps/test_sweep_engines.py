@@ -92,7 +92,7 @@ SWEEPER = """
 import sys
 from pathlib import Path
 from walkerlab.config.loader import load
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.pipeline.sweeps.engines import Order
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
 from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
@@ -259,7 +259,7 @@ cat {folder}/answer 2>/dev/null
     ],
 )
 def test_slurm_job_without_a_result_is_detected_without_accounting(answer, expected, tmp_path, monkeypatch):
-    for name, value in (("LISTING_S", 0.0), ("RESULT_S", 0.0), ("SILENCE_S", 0.1)):
+    for name, value in (("LISTING_S", 0.0), ("RESULT_S", 0.0), ("SILENT_WORKER_S", 0.1)):
         monkeypatch.setattr(engines, name, value)
     program = tmp_path / "squeue"
     program.write_text(FAKE_SQUEUE.format(folder=tmp_path))

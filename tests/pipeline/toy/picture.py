@@ -1,6 +1,6 @@
 """One figure, that names what it was drawn from."""
 
-from walkerlab.pipeline.store import index
+from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import make_folder, write_atomically
 
@@ -9,4 +9,6 @@ def run(config, inputs, progress, folder, left_out):
     make_folder(folder / "figures")
     figure = folder / "figures" / "figure-01.svg"
     write_atomically(figure, f"<svg>{sorted(inputs)} without {[entry.what for entry in left_out]}</svg>".encode())
-    return Content({index.GROUP: index.index(folder, [figure])}, {"figures": ["figures/figure-01.svg"]})
+    return Content(
+        {artifact.FILES_GROUP: artifact.index_files(folder, [figure])}, {"figures": ["figures/figure-01.svg"]}
+    )

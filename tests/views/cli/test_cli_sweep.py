@@ -10,9 +10,9 @@ import pytest
 
 from walkerlab.pipeline.headlines import MAX_HEADLINES, Pair, difference
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.views.cli.clean import file_lines
-from walkerlab.views.cli.runs import lines, percent
+from walkerlab.pipeline.store.runs import RunFolder
+from walkerlab.views.cli.housekeeping import comparison_lines, percent
+from walkerlab.views.cli.stored import file_lines
 
 SWEEP = ("sweep", "--stage", "drop", "--jobs", "1")
 
@@ -134,7 +134,7 @@ def test_diff_of_different_walks_is_short_unless_all_is_requested():
                      for t, one in zip((0.7, 0.8), steps, strict=True))  # fmt: skip
     found = difference(first, second, (None, None))
     folders = (RunFolder(Path("runs"), "one"), RunFolder(Path("runs"), "two"))
-    short, whole = (lines(folders, found, [], every) for every in (False, True))
+    short, whole = (comparison_lines(folders, found, [], every) for every in (False, True))
     assert [line.split() for line in short if "last_step_period_s" in line] == [
         ["last_step_period_s", "0.7", "0.8", "+14.3", "%"]
     ]

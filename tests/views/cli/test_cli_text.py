@@ -10,8 +10,7 @@ from walkerlab.views.cli import console
 from walkerlab.views.cli.console import Console, StageLine
 from walkerlab.views.cli.request import Request
 from walkerlab.views.cli.stage import report_lines
-from walkerlab.views.report.tables import LONGEST_CELL
-from walkerlab.views.report.text import describe_summary, table
+from walkerlab.views.report.tables import LONGEST_CELL, describe_summary, record_lines
 
 SENTENCES = "One gait cycle of the rigid model, to scale. " * 5
 
@@ -26,7 +25,7 @@ def test_column_of_sentences_is_named_below_the_table():
 
 
 def test_table_with_only_sentences_is_shown():
-    assert table([{"caption": SENTENCES}])[1] == SENTENCES.rstrip()
+    assert record_lines([{"caption": SENTENCES}])[1] == SENTENCES.rstrip()
 
 
 @pytest.fixture

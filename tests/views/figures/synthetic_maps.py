@@ -2,8 +2,13 @@
 
 from synthetic_walks import stored
 
-from walkerlab.evidence.verification.maps import ERROR_MISSING, VERDICT_NAMES
-from walkerlab.evidence.verification.stability_maps import step_group, stiction_group, summary_of
+from walkerlab.evidence.verification.stability_maps import (
+    ERROR_MISSING,
+    VERDICT_NAMES,
+    step_group,
+    stiction_group,
+    summary_of,
+)
 from walkerlab.outcome import Outcome
 
 CELLS = 3

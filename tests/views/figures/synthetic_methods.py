@@ -3,9 +3,9 @@
 from synthetic_maps import stability_maps
 from synthetic_walks import both_models, stored
 
-from walkerlab.evidence.benchmarks.ladder import MethodRow
+from walkerlab.evidence.benchmarks.accuracy import MethodRow
 from walkerlab.labels import labels_of
-from walkerlab.pipeline.store.columns import rows_group
+from walkerlab.pipeline.store.content import rows_group
 
 SCENES = ("rigid", "contact", "contact-near-rigid")
 # method, tolerance, outcome, error, run time s, right-hand sides

@@ -3,9 +3,8 @@
 import numpy as np
 
 from walkerlab.pipeline.stages.walk import step_columns, variables_over_time
-from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.artifact import Identity, Stored
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.pipeline.store.key import Identity
 from walkerlab.pipeline.store.provenance import Provenance
 
 LEG_LENGTH, SLOPE, HALF_ANGLE = 1.0, 0.0174, 0.187

@@ -11,7 +11,7 @@ from walkerlab.pipeline.store.content import Content
 from walkerlab.views.figures import stage as plot
 from walkerlab.views.figures.maps import FIGURE_15 as FIGURE
 from walkerlab.views.figures.maps import attractor_name, sides_of
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.sections.families import basin as section
 
 

@@ -24,13 +24,13 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.store.artifact import read, write
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.provenance import begin
-from walkerlab.pipeline.store.runfolder import Record, RunFolder
+from walkerlab.pipeline.store.runs import Record, RunFolder
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.exports import Film, Target, export_from, walk_in, write_film
 from walkerlab.views.figures import illustration
 from walkerlab.views.figures import stage as plot
 from walkerlab.views.figures.registry import FIGURES
-from walkerlab.views.figures.style import WIDTH
+from walkerlab.views.figures.style import FIGURE_WIDTH
 from walkerlab.views.report.tex import escape_tex
 
 xarray = import_late("xarray")
@@ -79,7 +79,7 @@ def test_exported_figure_equals_that_of_the_page(run, monkeypatch):
     drawn = plot.run(only(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
     assert {Path(entry["svg"]).stem for entry in drawn} == READERS_OF_RESULTS
     for name in READERS_OF_RESULTS:
-        path = export_from(run, name, Target("svg", None), WIDTH, "", QUIET)
+        path = export_from(run, name, Target("svg", None), FIGURE_WIDTH, "", QUIET)
         assert path.read_bytes() == (run.path / "figures" / f"{name}.svg").read_bytes(), name
 
 
@@ -282,13 +282,15 @@ def test_export_overwrites_no_result(run):
     before = run.artifact("simulate").read_bytes()
     for owned in ("simulate.h5", "later.h5", ".run.json"):
         with pytest.raises(ConfigError, match="belongs to the results of the run"):
-            export_from(run, "trajectory", Target("csv", run.path / owned), WIDTH, "simulate", QUIET)
+            export_from(run, "trajectory", Target("csv", run.path / owned), FIGURE_WIDTH, "simulate", QUIET)
     assert run.artifact("simulate").read_bytes() == before
-    assert export_from(run, "trajectory", Target("csv", run.path / "mine.csv"), WIDTH, "simulate", QUIET).is_file()
+    assert export_from(
+        run, "trajectory", Target("csv", run.path / "mine.csv"), FIGURE_WIDTH, "simulate", QUIET
+    ).is_file()
 
 
 def test_export_of_an_outdated_result_warns(run, capsys):
-    export_from(run, "trajectory", Target("csv", None), WIDTH, "simulate", Console())
+    export_from(run, "trajectory", Target("csv", None), FIGURE_WIDTH, "simulate", Console())
     assert f"warning: {run.artifact('simulate')} is out of date: " in capsys.readouterr().err
 
 
@@ -303,5 +305,5 @@ def test_film_of_an_older_result_without_needed_data_is_rejected(run):
 
 def test_exports_are_listed(run):
     with pytest.raises(ConfigError) as caught:
-        export_from(run, "99", Target(None, None), WIDTH, "simulate", QUIET)
+        export_from(run, "99", Target(None, None), FIGURE_WIDTH, "simulate", QUIET)
     assert {"  figure-07", "  trajectory"} <= set(caught.value.advice.splitlines())

@@ -16,7 +16,7 @@ from walkerlab.views.figures.families import (
     FIGURE_13,
     FIGURE_14,
     FIGURE_16,
-    MODELS,
+    MODEL_COLOURS,
     STYLES,
     Curve,
     DrawnBranch,
@@ -77,7 +77,7 @@ def test_one_column_figure_stacks_its_panels():
 def test_branch_is_solid_up_to_its_flip_and_dashed_beyond():
     axes = plotted(FIGURE_13).axes[0]
     solid, dashed = (
-        [line for line in axes.lines if line.get_color() == MODELS["rigid"] and line.get_linestyle() == style]
+        [line for line in axes.lines if line.get_color() == MODEL_COLOURS["rigid"] and line.get_linestyle() == style]
         for style in ("-", "--")
     )
     ends = sorted((float(line.get_xdata()[0]), float(line.get_xdata()[-1])) for line in solid)

@@ -20,9 +20,9 @@ from synthetic_walks import both_models, contact, rigid, rigid_alone
 from walkerlab.evidence.paper.figures import PAPER_ERROR, PHASE_LOOK, TIME_LOOK
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome
 from walkerlab.views.figures.canvas import figure_style, settle
-from walkerlab.views.figures.maps import ATTRACTORS
+from walkerlab.views.figures.maps import ATTRACTOR_COLOURS
 from walkerlab.views.figures.registry import FIGURES
-from walkerlab.views.figures.style import CONTACT, LEGS, POINT, RIGID
+from walkerlab.views.figures.style import CONTACT_LOOK, LEGS, POINT, RIGID_LOOK
 from walkerlab.views.report.tex import COLUMN_WIDTHS
 
 RESULTS = {
@@ -157,7 +157,7 @@ def test_legend_has_no_duplicates(drawn):
 
 def test_outcomes_have_distinct_colours_in_every_map():
     failures = [OUTCOME_TEXTS[one].colour for one in Outcome if one is not Outcome.WALKED]
-    every = [tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5)) for colour in (*failures, *ATTRACTORS)]
+    every = [tuple(int(colour[i : i + 2], 16) for i in (1, 3, 5)) for colour in (*failures, *ATTRACTOR_COLOURS)]
     for one, other in itertools.combinations(every, 2):
         assert max(abs(a - b) for a, b in zip(one, other, strict=True)) > TOLD_APART
 
@@ -170,7 +170,7 @@ def brightness(colour):
 
 @pytest.mark.parametrize(
     "looks",
-    [(RIGID, CONTACT), LEGS, (TIME_LOOK, PHASE_LOOK), (PHASE_LOOK, PAPER_ERROR)],
+    [(RIGID_LOOK, CONTACT_LOOK), LEGS, (TIME_LOOK, PHASE_LOOK), (PHASE_LOOK, PAPER_ERROR)],
     ids=["models", "legs", "errors", "paper"],
 )
 def test_overlapping_lines_differ_in_brightness_and_style(looks):

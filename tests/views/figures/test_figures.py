@@ -21,7 +21,7 @@ from walkerlab.views.figures import stick_diagram, walks
 from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.illustration import WORDS, Illustration
 from walkerlab.views.figures.registry import FIGURES as ALL_FIGURES
-from walkerlab.views.figures.style import CONTACT, RIGID
+from walkerlab.views.figures.style import CONTACT_LOOK, RIGID_LOOK
 
 SVG = "{http://www.w3.org/2000/svg}"
 ELSEWHERE = {"tune", "continuation", "basin", "engines", "robustness", "identify", "plan"}
@@ -200,8 +200,8 @@ def test_captions_are_sentences_with_numbers(figure):
 def test_heel_strikes_of_both_models_are_marked_on_every_axis_in_time():
     results = both_models()
     expected = {
-        RIGID.colour: results["simulate"]["steps"]["touch_time_s"].tolist(),
-        CONTACT.colour: results["contact-sim"]["steps"]["touch_time_s"].tolist(),
+        RIGID_LOOK.colour: results["simulate"]["steps"]["touch_time_s"].tolist(),
+        CONTACT_LOOK.colour: results["contact-sim"]["steps"]["touch_time_s"].tolist(),
     }
     for figure in (NUMBERED[7], NUMBERED[10]):
         for axes in plotted(figure, results).axes:
@@ -216,7 +216,7 @@ def test_lines_in_time_are_the_stored_angles_and_velocities():
     results = both_models()
     axes = plotted(NUMBERED[7], results).axes
     for row, (name, leg) in enumerate((("angle", 0), ("angle", 1), ("velocity", 0), ("velocity", 1))):
-        for stage, look in (("simulate", RIGID), ("contact-sim", CONTACT)):
+        for stage, look in (("simulate", RIGID_LOOK), ("contact-sim", CONTACT_LOOK)):
             (line,) = lines_of(axes[row], look)
             trajectory = results[stage]["trajectory"]
             np.testing.assert_array_equal(line.get_xdata(), trajectory["time"])
@@ -233,7 +233,7 @@ def test_stance_phases_are_shaded():
 def test_long_walk_shows_five_strides_and_says_so():
     results = rigid_alone(simulate=rigid(24))
     figure = plotted(NUMBERED[7], results)
-    (line,) = lines_of(figure.axes[0], RIGID)
+    (line,) = lines_of(figure.axes[0], RIGID_LOOK)
     assert line.get_xdata()[-1] == pytest.approx(10 * 0.7)
     caption = caption_of(NUMBERED[7], results)
     assert "(the first 5 strides)" in caption
@@ -277,7 +277,7 @@ def test_limit_cycles_of_both_legs_have_equal_scales():
 def test_last_stride_has_the_style_of_its_model_and_the_walk_is_thin():
     results = both_models()
     axes = plotted(NUMBERED[9], results).axes[0]
-    (last,) = lines_of(axes, RIGID)
+    (last,) = lines_of(axes, RIGID_LOOK)
     trajectory = results["simulate"]["trajectory"]
     shown = trajectory["time"] >= 8 * 0.7
     np.testing.assert_array_equal(last.get_xdata(), trajectory["angle"][shown, 0])
@@ -322,7 +322,7 @@ def test_legend_of_limit_cycles_has_the_markers_of_both_models():
     results = both_models()
     figure = plotted(NUMBERED[9], results)
     marks = {(line.get_marker(), line.get_markerfacecolor()) for line in figure.legends[0].get_lines()}
-    for look in (RIGID, CONTACT):
+    for look in (RIGID_LOOK, CONTACT_LOOK):
         assert {(look.marker, look.colour), (look.marker, "white")} <= marks
 
 

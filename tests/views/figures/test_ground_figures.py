@@ -7,7 +7,7 @@ from synthetic_walks import WEIGHT, both_models, contact, stored, without
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures.canvas import figure_style
 from walkerlab.views.figures.ground import FIGURES, losses
-from walkerlab.views.figures.style import CONTACT
+from walkerlab.views.figures.style import CONTACT_LOOK
 from walkerlab.views.figures.walks import walk_of
 
 FORCES, LOST = FIGURES
@@ -30,7 +30,7 @@ def test_friction_is_drawn_within_its_cone():
 
 
 def test_losses_of_a_step_are_independent_of_the_sampling():
-    lost = losses(walk_of(contact(), CONTACT))
+    lost = losses(walk_of(contact(), CONTACT_LOOK))
     assert [label for label, _ in lost] == ["damping of the ground", "friction"]
     (damping, friction) = lost.values()
     np.testing.assert_allclose(damping, [0.0, *[1.0] * 9], atol=1e-12)
@@ -46,8 +46,10 @@ def test_work_of_drives_is_not_shown_as_a_loss():
     given = Variable(150.0 - gone["total_energy_J"], ("time",), "J", "given")
     level = Variable(np.full(given.values.size, 150.0), ("time",), "J", "energy")
     driven = {**gone.variables, "push_off_J": given, "total_energy_J": level}
-    found = losses(walk_of(stored("contact-sim", {**walk.groups, "trajectory": Group(driven)}, walk.summary), CONTACT))
-    passive = losses(walk_of(walk, CONTACT))
+    found = losses(
+        walk_of(stored("contact-sim", {**walk.groups, "trajectory": Group(driven)}, walk.summary), CONTACT_LOOK)
+    )
+    passive = losses(walk_of(walk, CONTACT_LOOK))
     assert [*found] == [*passive]
     np.testing.assert_allclose([*found.values()], [*passive.values()], atol=1e-12)
 

@@ -9,7 +9,7 @@ from synthetic_walks import both_models, rigid_alone
 from walkerlab.config.reads import only
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.pipeline.store import index
+from walkerlab.pipeline.store import artifact
 from walkerlab.scene.omissions import LeftOut
 from walkerlab.views.figures import stage as plot
 
@@ -75,8 +75,8 @@ def test_every_figure_is_an_svg_and_a_png(whole):
 
 def test_index_lists_every_file_with_its_digest(whole):
     folder, content = whole
-    assert sorted(index.indexed_files(content)) == [f"figures/{name}" for name in names(folder)]
-    assert index.broken_file(folder, content) is None
+    assert sorted(artifact.indexed_files(content)) == [f"figures/{name}" for name in names(folder)]
+    assert artifact.broken_file(folder, content) is None
 
 
 def test_figures_drawn_early_are_final_and_not_redrawn(tmp_path):
@@ -85,12 +85,12 @@ def test_figures_drawn_early_are_final_and_not_redrawn(tmp_path):
     written = {path: path.stat().st_mtime_ns for path in (folder / "figures").iterdir()}
     final = draw(folder, results, early=content)
     assert {path: path.stat().st_mtime_ns for path in written} == written
-    assert index.broken_file(folder, content) is None
+    assert artifact.broken_file(folder, content) is None
     entries = {entry["svg"]: entry for entry in final.summary["figures"]}
     assert len(entries) > len(content.summary["figures"])
     assert [entries[entry["svg"]] for entry in content.summary["figures"]] == content.summary["figures"]
     anew = draw(folder, results)
-    assert index.indexed_files(anew) == index.indexed_files(final)
+    assert artifact.indexed_files(anew) == artifact.indexed_files(final)
 
 
 def test_each_entry_has_text_and_files_of_its_figure(whole):

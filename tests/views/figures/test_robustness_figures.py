@@ -7,7 +7,7 @@ from synthetic_walks import rigid, stored
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.views.figures import robustness
 from walkerlab.views.figures.canvas import figure_style
-from walkerlab.views.figures.families import MODELS
+from walkerlab.views.figures.families import MODEL_COLOURS
 
 CUT_OFF = 40
 STEPS = np.array([[[3.0, 7.0, 7.0, 20.0], [40.0, 12.0, 40.0, 40.0]]])
@@ -65,7 +65,7 @@ def swept(count=5):
     numbers = {"gaits.{}.gait_sensitivity_norm": 20.0 + (x - 2.0) ** 2, "gaits.{}.spectral_radius": 0.2 * x}
     numbers |= {"largest_step.{}.down_m": 0.01 * x, "largest_step.{}.up_m": 0.005 * x, "gaits.{}.speed_m_s": 0.3 * x}
     found = {"slope_deg": Variable(x, ("slope_deg",), "deg", "slope")}
-    for k, model in enumerate(MODELS):
+    for k, model in enumerate(MODEL_COLOURS):
         found |= {name.format(k): Variable(y + k, ("slope_deg",), "1", name) for name, y in numbers.items()}
         found[f"gaits.{k}.model"] = Variable(np.array([model] * count), ("slope_deg",), "", "model")
     return Group(found)

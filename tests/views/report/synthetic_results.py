@@ -8,9 +8,8 @@ import numpy as np
 
 from walkerlab.config.loader import load
 from walkerlab.evidence.paper.errata import Erratum
-from walkerlab.pipeline.store.artifact import Stored
+from walkerlab.pipeline.store.artifact import Identity, Stored
 from walkerlab.pipeline.store.content import Group, Variable
-from walkerlab.pipeline.store.key import Identity
 from walkerlab.views.figures.registry import FIGURES
 
 sys.path.append(str(Path(__file__).parent.parent / "figures"))

@@ -10,10 +10,12 @@ from walkerlab.views.report.answers import ANSWERS, answer, elide, verdict
 from walkerlab.views.report.gaits import gait_table
 from walkerlab.views.report.numbers import number
 from walkerlab.views.report.tables import (
+    PARAGRAPH_WIDTH,
     Column,
     aligned,
     as_csv,
     csv_text,
+    describe_summary,
     measured,
     side_by_side,
     table,
@@ -21,7 +23,6 @@ from walkerlab.views.report.tables import (
     width,
 )
 from walkerlab.views.report.tex import as_tex
-from walkerlab.views.report.text import PARAGRAPH_WIDTH, describe_summary
 
 GAIT = {
     "state": [-0.2042, 0.1694, -0.6058, -0.861],

@@ -11,11 +11,10 @@ from walkerlab.config.loader import load
 from walkerlab.evidence.paper.compared_releases import CONTACT_STEPS, RELEASES
 from walkerlab.pipeline.run.runner import execute
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.views.report.blocks import Player
+from walkerlab.pipeline.store.runs import RunFolder
+from walkerlab.views.report.blocks import Player, Results
 from walkerlab.views.report.registry import sections_of
-from walkerlab.views.report.results import Results
-from walkerlab.views.report.sections import models, motion, verdict
+from walkerlab.views.report.sections import motion, verdict
 from walkerlab.views.report.stage import write_pages
 
 WALKS = ("fixedpoint", "simulate", "contact-sim", "compare")
@@ -66,13 +65,13 @@ def test_time_of_release_decides_which_gait_is_walked(run):
     # the rigid model by either rule: the published gait, and the other one
     assert releases["compression"]["rigid"]["period_s"] == pytest.approx(PERIOD, abs=1e-6)
     assert releases["touch"]["rigid"]["period_s"] == pytest.approx(OTHER_PERIOD, abs=1e-5)
-    assert "determines the gait" in models.departure(results)
-    assert "with the same rule the rigid model takes steps of 0.54259" in models.departure(results)
+    assert "determines the gait" in verdict.departure(results)
+    assert "with the same rule the rigid model takes steps of 0.54259" in verdict.departure(results)
 
 
 def test_verdict_explains_the_difference_of_the_models_in_one_paragraph(run):
     results, _ = run
-    said = models.departure(results)
+    said = verdict.departure(results)
     assert [block.text for block in verdict.section(results).blocks if getattr(block, "text", "") == said] == [said]
     for words in ("last step", "slips", "in knee strikes", "knee locks", "20 steps"):
         assert words in said
@@ -101,5 +100,5 @@ def test_paragraph_omits_knees_without_a_release(run):
     compared = results.stored["compare"]
     summary = {name: value for name, value in compared.summary.items() if name != "releases"}
     stored = {**results.stored, "compare": dataclasses.replace(compared, summary=summary)}
-    assert "knee locks" not in models.departure(Results(results.config, stored))
+    assert "knee locks" not in verdict.departure(Results(results.config, stored))
     assert sections_of(Results(results.config, stored))

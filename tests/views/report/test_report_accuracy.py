@@ -3,8 +3,7 @@
 import pytest
 from synthetic_results import config, fixedpoint, stored
 
-from walkerlab.views.report.blocks import Statements
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Results, Statements
 from walkerlab.views.report.sections.accuracy import section
 from walkerlab.views.report.tables import Table
 from walkerlab.views.report.words import words

@@ -5,7 +5,7 @@ from dataclasses import replace
 from synthetic_results import config, families, families_that_move, simulate
 
 from walkerlab.config.loader import load
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.sections import families as section
 from walkerlab.views.report.sections.families import MIN_MARK_DISTANCE, gait_diagram, separate_marks
 from walkerlab.views.report.words import words

@@ -13,11 +13,10 @@ from synthetic_results import EVERYTHING, PAPER_ROWS, compare, config, contact_s
 from walkerlab.evidence.paper.prose import prose
 from walkerlab.scene.omissions import LeftOut
 from walkerlab.views.prose import parts
-from walkerlab.views.report.blocks import MAIN, Paragraph, Picture, Section, Shares, Statement, Statements
+from walkerlab.views.report.blocks import MAIN, Paragraph, Picture, Results, Section, Shares, Statement, Statements
 from walkerlab.views.report.page import Page as Sheet
 from walkerlab.views.report.page import render, source, to_markup
 from walkerlab.views.report.registry import pages_of
-from walkerlab.views.report.results import Results
 from walkerlab.views.report.tables import Cell, Column, table
 from walkerlab.views.report.words import join_row, words
 

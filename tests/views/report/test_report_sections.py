@@ -26,12 +26,20 @@ from synthetic_results import (
 
 from walkerlab.config.loader import load
 from walkerlab.scene.omissions import LeftOut
-from walkerlab.views.report.blocks import PAPER_PAGE, Code, Paragraph, Picture, Player, Section, Shares, Statements
-from walkerlab.views.report.gaits import SETS, coordinate, works
+from walkerlab.views.report.blocks import (
+    PAPER_PAGE,
+    Code,
+    Paragraph,
+    Picture,
+    Player,
+    Results,
+    Section,
+    Shares,
+    Statements,
+)
+from walkerlab.views.report.gaits import SETS, coordinate, every_gait, works
 from walkerlab.views.report.registry import SECTIONS, lead, sections_of
-from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections import motion
-from walkerlab.views.report.sections.gaits import every_gait
 from walkerlab.views.report.sections.walks import assumptions
 from walkerlab.views.report.tables import Table
 from walkerlab.views.report.tracks import Track, slip_since_touch

@@ -10,10 +10,10 @@ from walkerlab.config.schema import Config
 from walkerlab.errors import StorageError
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.store.index import broken_file, indexed_files
+from walkerlab.pipeline.store.artifact import broken_file, indexed_files
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 from walkerlab.views.report import stage as report
-from walkerlab.views.report.pictures import fitting
+from walkerlab.views.report.page import fitting
 from walkerlab.views.report.stage import write_pages
 
 SVG = b"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 518.4 396" onload="alert(1)"><script>alert(1)</script>

@@ -2,7 +2,7 @@
 
 import pytest
 
-from walkerlab.views.report.symbols import typeset
+from walkerlab.views.report.numbers import typeset
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW
 from walkerlab.views.figures.canvas import add_legend, cost_axis, entry, error_axis, panels
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results
-from walkerlab.views.figures.style import BLACK, BLUE, CONTACT, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
+from walkerlab.views.figures.style import BLACK, BLUE, CONTACT_LOOK, GREEN, GREY, ORANGE, PALE, PURPLE, VERMILLION, Look
 from walkerlab.views.figures.walks import Array
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def draw_periods(scene: str, results: Results) -> Drawn:
     reference = summary["reference"][scene]
     for series in engines:
         draw_engine(axes, series, "step_s", np.where(series.completed, series.runs["period_s"], np.nan))
-    levels = [axes.axhline(reference["period_s"], color=CONTACT.colour, linewidth=1.6, label="ADAMS's law")]
+    levels = [axes.axhline(reference["period_s"], color=CONTACT_LOOK.colour, linewidth=1.6, label="ADAMS's law")]
     if "rigid_period_s" in reference:
         level = reference["rigid_period_s"]
         levels.append(axes.axhline(level, color=GREY, linewidth=1.2, linestyle=":", label="rigid gait"))

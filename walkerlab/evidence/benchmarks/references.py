@@ -1,25 +1,77 @@
-"""Reference end states that methods are compared with, and their uncertainty."""
+"""Reference end states that methods are compared with, their uncertainty, and the Taylor method that computes them."""
 
-from __future__ import annotations
-
+import importlib.util
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from walkerlab.evidence.benchmarks import taylor_reference
 from walkerlab.evidence.benchmarks.trials import RigidTrial, Trial
-from walkerlab.evidence.paper.appendix_a import RigidWalker
+from walkerlab.evidence.paper.appendix_a import RigidWalker, impact
 from walkerlab.outcome import Outcome
 from walkerlab.physics.solvers.registry import METHODS
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.checkpoint import Numbers
+
+TAYLOR_METHOD = "heyoka-taylor"
+
+
+def is_installed() -> bool:
+    return importlib.util.find_spec("heyoka") is not None
+
+
+def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) -> Floats | None:
+    """Return the state after `steps` heel strikes, or None if one of them does not occur."""
+    limit = 10.0 * np.sqrt(walker.leg_length / walker.gravity)
+    passing, striking = integrators(walker)
+    state = np.array(start)
+    for _ in range(steps):
+        # both feet are on the slope at the start too: look for the heel strike once the legs have passed each other
+        for integrator in (passing, striking) if state[0] < state[1] else (striking,):
+            integrator.time, integrator.state[:] = 0.0, state
+            integrator.reset_cooldowns()
+            outcome = integrator.propagate_until(limit)[0]
+            if outcome.value >= 0 or abs(integrator.time) >= limit:
+                return None
+            state = np.array(integrator.state)
+        state = np.array(impact(walker, *state.tolist()))
+    return state
+
+
+def integrators(walker: RigidWalker) -> tuple[Any, Any]:
+    """Build two Taylor integrators of the swing phase: one stops when the legs pass, the other at heel strike."""
+    import heyoka as hy
+
+    th1, th2, w1, w2 = hy.make_vars("th1", "th2", "w1", "w2")
+    L, a, m, M = walker.leg_length, walker.foot_to_mass, walker.leg_mass, walker.hip_mass
+    b = L - a
+    g = walker.gravity
+    inertia = walker.leg_inertia
+    d11 = m * b * b + inertia
+    d22 = M * L * L + m * (L * L + a * a) + inertia
+    d12 = -m * L * b * hy.cos(th2 - th1)
+    r1 = -m * L * b * w2 * w2 * hy.sin(th2 - th1) - m * g * b * hy.sin(th1)
+    r2 = -walker.c21_sign * m * L * b * w1 * w1 * hy.sin(th2 - th1) + (M * L + m * (a + L)) * g * hy.sin(th2)
+    determinant = d11 * d22 - d12 * d12
+    equations = [
+        (th1, w1),
+        (th2, w2),
+        (w1, (d22 * r1 - d12 * r2) / determinant),
+        (w2, (d11 * r2 - d12 * r1) / determinant),
+    ]
+    upward = hy.event_direction.positive
+    downward = hy.event_direction.negative
+    passing = hy.t_event(th1 - th2, direction=upward)
+    striking = hy.t_event(th1 + th2 + 2.0 * walker.slope, direction=downward)
+    return tuple(hy.taylor_adaptive(equations, [0.0] * 4, t_events=[event]) for event in (passing, striking))
+
 
 REFERENCE_RUN_BUDGET = 20_000_000  # right-hand sides, enough for the million explicit steps that stiff ground takes
 # on stiff ground the error of an explicit step is all rounding: a tighter tolerance would only shrink the step
 TIGHTEST_CONTACT = {"dop853": 1e-12, "radau5": 1e-11}
 TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 
-END_METHODS = (taylor_reference.TAYLOR_METHOD, *METHODS)
+END_METHODS = (TAYLOR_METHOD, *METHODS)
 
 
 @dataclass(frozen=True)
@@ -36,7 +88,7 @@ class End:
         return [END_METHODS.index(self.method), self.tolerance, self.rhs_evaluations, *self.state.tolist()]
 
     @classmethod
-    def unpack(cls, numbers: Numbers) -> End:
+    def unpack(cls, numbers: Numbers) -> "End":
         method, tolerance, rhs_evaluations, *state = numbers
         return cls(END_METHODS[int(method)], np.array(state), tolerance, int(rhs_evaluations))
 
@@ -51,7 +103,7 @@ class Reference:
     @property
     def from_outside(self) -> bool:
         """Whether the first end state is independent of this project's solvers, event search and equations."""
-        return self.first.method == taylor_reference.TAYLOR_METHOD
+        return self.first.method == TAYLOR_METHOD
 
     @property
     def agreement(self) -> float:
@@ -80,10 +132,10 @@ def first_end(trial: Trial) -> End:
     Raises WalkEndsError if the walk does not reach its end.
     """
     if isinstance(trial, RigidTrial) and (compass := compass_of(trial)) is not None:
-        state = taylor_reference.walk_by_taylor(compass, trial.start, trial.steps)
+        state = walk_by_taylor(compass, trial.start, trial.steps)
         if state is None:
             raise WalkEndsError("the walk ends early (no heel strike), without an end state to compare")
-        return End(taylor_reference.TAYLOR_METHOD, state)
+        return End(TAYLOR_METHOD, state)
     return tightest_end(trial, "dop853")
 
 
@@ -94,7 +146,7 @@ def second_end(trial: Trial) -> End:
 
 def compass_of(trial: Trial) -> RigidWalker | None:
     """Return the Appendix A walker of a rigid trial, or None if the trial has no compass or heyoka is not installed."""
-    return trial.compass if isinstance(trial, RigidTrial) and taylor_reference.is_installed() else None
+    return trial.compass if isinstance(trial, RigidTrial) and is_installed() else None
 
 
 def tightest_end(trial: Trial, method: str) -> End:

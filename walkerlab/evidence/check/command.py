@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from walkerlab.errors import ConfigError, escape_controls
-from walkerlab.views.cli.command import Offer
-from walkerlab.views.cli.failures import print_error, print_json
-from walkerlab.views.cli.request import Request
+from walkerlab.views.cli.request import Offer, Request, print_error, print_json
 
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig

@@ -7,9 +7,8 @@ from typing import Any
 
 from walkerlab.evidence.check.printed import DIFFERENT, EXPLAINED, NOT_COMPARABLE, REPRODUCED, UNEXPLAINED
 from walkerlab.labels import join_words
-from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
+from walkerlab.views.report.blocks import PageBlock, Paragraph, Section, stage_section
 from walkerlab.views.report.numbers import count, number
-from walkerlab.views.report.results import stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, table
 
 Row = Mapping[str, Any]

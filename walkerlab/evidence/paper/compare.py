@@ -36,8 +36,7 @@ from walkerlab.labels import labels_of
 from walkerlab.physics.hybrid.recorded_walk import as_state
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import last_step, mean_step
-from walkerlab.pipeline.store.columns import numbered, rows_group
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
 from walkerlab.scene.contact import GAIT_TOLERANCES, contact_scene, require_contact, start_state
 from walkerlab.scene.rigid import have_different_legs
 

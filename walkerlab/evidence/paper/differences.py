@@ -11,8 +11,7 @@ import numpy as np
 from walkerlab.evidence.paper.measured import Errors
 from walkerlab.physics.hybrid import comparison
 from walkerlab.pipeline.stages.walk import LEG, STEP, TIME, legs, variables_over_time
-from walkerlab.pipeline.store.columns import numbered
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
 
 STEPS_PER_STRIDE = 2
 ALIGNMENTS = ("raw", "aligned", "between_impacts", "settled")

@@ -9,13 +9,13 @@ from typing import Any, Final
 import numpy as np
 
 from walkerlab.evidence.paper.printed import LARGEST_ERROR
+from walkerlab.labels import RIGID_STAGE
 from walkerlab.views.figures.canvas import add_legend, blank, cost_axis, entry, error_axis, label_of, power_of_ten
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
-from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, RECORDED, RIGID, VERMILLION, Look
+from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, RECORDED, RIGID_LOOK, VERMILLION, Look
 from walkerlab.views.figures.walks import (
     COMPARE_STAGE,
     NO_STATES,
-    RIGID_STAGE,
     STEPS_TAKEN_RIGID,
     TUNE_STAGE,
     claims_in,
@@ -49,7 +49,7 @@ ALIGNED_ERRORS = Need(
 
 def draw_differences(results: Results) -> Drawn:
     """Plot the errors of each leg's angle and angular velocity over the rigid walk's steps, on logarithmic scales."""
-    (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID)])
+    (rigid,), _ = first_strides([walk_of(results[RIGID_STAGE], RIGID_LOOK)])
     raw, aligned = (results[COMPARE_STAGE][need.group] for need in (RAW_ERRORS, ALIGNED_ERRORS))
     claimed = bool(claims_in(results))
     early = raw["time"] <= rigid.time[-1]

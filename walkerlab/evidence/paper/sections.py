@@ -7,13 +7,19 @@ from typing import Any
 
 from walkerlab.labels import add_unit
 from walkerlab.views.report.answers import last_steps
-from walkerlab.views.report.blocks import PAPER_PAGE, PageBlock, Paragraph, Section, Shares, Statement, Statements
-from walkerlab.views.report.numbers import count, number
-from walkerlab.views.report.outcomes import describe_error
-from walkerlab.views.report.results import Results
-from walkerlab.views.report.symbols import typeset
+from walkerlab.views.report.blocks import (
+    PAPER_PAGE,
+    PageBlock,
+    Paragraph,
+    Results,
+    Section,
+    Shares,
+    Statement,
+    Statements,
+)
+from walkerlab.views.report.numbers import count, number, typeset
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
-from walkerlab.views.report.words import words
+from walkerlab.views.report.words import describe_error, words
 
 Row = Mapping[str, Any]
 

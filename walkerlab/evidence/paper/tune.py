@@ -42,8 +42,7 @@ from walkerlab.pipeline.stages.walk import (
     step_columns,
     variables_over_time,
 )
-from walkerlab.pipeline.store.columns import numbered, real_and_imaginary, rows_group
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, real_and_imaginary, rows_group
 from walkerlab.scene.contact import (
     SAMPLES_PER_PENDULUM_TIME,
     ContactScene,

@@ -9,11 +9,11 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from walkerlab.config.analyses import FATES, Case, Fate
 from walkerlab.config.fields import Block
-from walkerlab.config.overlay import paper_config_with
+from walkerlab.config.loader import paper_config_with
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, replace_state, state_of
-from walkerlab.config.stability import FATES, Case, Fate
 from walkerlab.config.tree import plain
 from walkerlab.config.walkers import has_knees
 from walkerlab.errors import ConfigError

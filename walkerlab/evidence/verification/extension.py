@@ -22,8 +22,8 @@ def cases_config(config: SceneConfig) -> type:
 def paper_walks(_config: object) -> dict[str, Any]:
     """Return the part of the paper's config that the cases depend on."""
     # imported here, because the command line's help does not need it
-    from walkerlab.config.canonical import slice_of
-    from walkerlab.config.overlay import paper_config_with
+    from walkerlab.config.loader import paper_config_with
+    from walkerlab.config.reads import slice_of
 
     return {"paper": slice_of(paper_config_with({}), reads.WalksConfig)}
 
@@ -51,7 +51,7 @@ STAGES = (
         "stability", "walkerlab.evidence.verification.stability",
         "Verify extreme cases and problems with known answers.",
         cases_config, known_problems_and_start, depends_on=paper_walks, needed_by=("report",), checks=check_cases,
-        does_without=lazy_function("walkerlab.evidence.verification.omissions:verification_omissions"),
+        does_without=lazy_function("walkerlab.evidence.verification.stability:verification_omissions"),
     ),
     Stage(
         "stability-maps", "walkerlab.evidence.verification.stability_maps",

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
+from walkerlab.config.analyses import Case
 from walkerlab.config.schema import Config
-from walkerlab.config.stability import Case
 from walkerlab.evidence.verification.catalogue import config_of
 from walkerlab.evidence.verification.ordinary import Choice, choices
 from walkerlab.evidence.verification.scaling import scaled, to_twin

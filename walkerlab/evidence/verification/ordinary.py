@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
+from walkerlab.config.analyses import Case
 from walkerlab.config.reads import RigidConfig, WalksConfig
-from walkerlab.config.stability import Case
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.benchmarks.user_script import walk_as_a_script
 from walkerlab.evidence.paper.appendix_a import RigidWalker

@@ -7,9 +7,18 @@ from typing import Any
 
 from walkerlab.evidence.verification.verdict import BUDGET_USED
 from walkerlab.outcome import outcome_of
-from walkerlab.views.report.blocks import CASES, Gallery, PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.views.report.blocks import (
+    CASES,
+    Gallery,
+    PageBlock,
+    Paragraph,
+    Results,
+    Section,
+    Statement,
+    Statements,
+    stage_section,
+)
 from walkerlab.views.report.numbers import format_integer, number
-from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, measured, table
 from walkerlab.views.report.words import words
 

@@ -1,23 +1,41 @@
 """Stage `stability`: extreme cases and known problems, judged by measures that the walk itself does not use."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, TypeGuard
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig, WalksConfig, keys_of
 from walkerlab.config.schema import Config, replace_state
 from walkerlab.evidence.verification.catalogue import all_cases, scene_cases
 from walkerlab.evidence.verification.judge import CaseCell, run_cells
-from walkerlab.evidence.verification.omissions import verification_omissions
 from walkerlab.evidence.verification.ordinary import FINE_ERROR, MAX_ORDINARY_EVALUATIONS, Choice
 from walkerlab.evidence.verification.verdict import CaseResult
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
-from walkerlab.pipeline.store.columns import rows_group
-from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.content import Content, rows_group
 from walkerlab.scene.contact import scene_on_pads
+from walkerlab.scene.omissions import Entry, omission
 from walkerlab.scene.studies import is_studied
+
+if TYPE_CHECKING:
+    from walkerlab.config.reads import CompassCasesConfig, SceneCasesConfig
+
+
+def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tuple[Entry, ...]:
+    """List the omitted parts of the verification, or return () for the paper's compass."""
+    if is_studied(config):
+        return ()
+    return (
+        omission(
+            "the named extreme cases",
+            "they are cases of the paper's compass; this walker has cases of its own",
+            "about a hundred cases",
+        ),
+        omission("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),
+    )
 
 
 def run(

@@ -6,11 +6,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from walkerlab.config.analyses import Case
 from walkerlab.config.reads import WalksConfig
 from walkerlab.config.schema import MidStep, state_of
-from walkerlab.config.stability import Case
-from walkerlab.evidence.verification.masses import RigidMasses, energy_won, feet_off_the_slope
-from walkerlab.evidence.verification.momentum import MEASURE, momentum_finding
+from walkerlab.evidence.verification.momentum import (
+    MEASURE,
+    RigidMasses,
+    energy_won,
+    feet_off_the_slope,
+    momentum_finding,
+)
 from walkerlab.evidence.verification.scaling import pendulum_time
 from walkerlab.evidence.verification.verdict import Measure, NotMeasured, finite
 from walkerlab.outcome import Outcome

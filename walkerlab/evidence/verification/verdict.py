@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-from walkerlab.config.stability import Case
+from walkerlab.config.analyses import Case
 from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"

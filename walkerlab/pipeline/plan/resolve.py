@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkerlab.config.canonical import flatten
 from walkerlab.config.files import (
     BUILTIN_FOLDER,
     DEFAULT,
@@ -18,15 +17,14 @@ from walkerlab.config.files import (
 )
 from walkerlab.config.loader import LoadedConfig, key_of, load
 from walkerlab.config.problems import problem_error
+from walkerlab.config.reads import flatten
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import PartsWalker
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.artifact import Damaged
-from walkerlab.pipeline.store.key import brief
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.store.runs import SHOWN_CHANGES, config_text, find_run, read_all, stored_in
+from walkerlab.pipeline.store.artifact import Damaged, brief
+from walkerlab.pipeline.store.runs import SHOWN_CHANGES, RunFolder, config_text, find_run, read_all, stored_in
 
 SUFFIX = ".h5"
 BUILTIN = "built-in "

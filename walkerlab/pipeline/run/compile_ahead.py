@@ -18,9 +18,9 @@ from walkerlab.physics import kernel_cache
 from walkerlab.pipeline.run.workers import map_in_order
 
 HALF_ANGLE = 0.2  # rad, from the slope's normal to each leg at the start of a walk
-BUDGET = 200  # right-hand sides, enough for the first step of each method
+COMPILING_BUDGET = 200  # right-hand sides, enough for the first step of each method
 # one method for each form of the kernels: our two, and one of another library, which calls parts of them from Python
-METHODS = ("radau5", "dop853", "scipy-radau")
+COMPILED_METHODS = ("radau5", "dop853", "scipy-radau")
 
 
 def compile_rigid(method: str, config: Config) -> None:
@@ -32,7 +32,7 @@ def compile_rigid(method: str, config: Config) -> None:
     from walkerlab.scene.rigid import rigid_walker
 
     walker = rigid_walker(config)
-    tolerances = Tolerances(method, 1e-6, 1e-6, BUDGET)
+    tolerances = Tolerances(method, 1e-6, 1e-6, COMPILING_BUDGET)
     z = np.eye(1, int(walker.coordinates)) * HALF_ANGLE
     samples = take_walk(walker, tolerances, state_on_section(walker, z[0]), 1, sampled=True).samples
     assert samples is not None
@@ -55,7 +55,7 @@ def compile_contact(method: str, config: Config) -> None:
     places = group_bodies(scene.assembly).names
     angles = [HALF_ANGLE if name == "2" else -HALF_ANGLE if name.startswith("1") else 0.0 for name in places]
     standing = start_state(scene, (*angles, *(0.0 for _ in places)))
-    walk = scene.walk(standing, 1, Tolerances(method, 1e-3, 1e-3, BUDGET), scene.ground.frame.pendulum_time)
+    walk = scene.walk(standing, 1, Tolerances(method, 1e-3, 1e-3, COMPILING_BUDGET), scene.ground.frame.pendulum_time)
     assert walk.samples is not None
     sample_energies(scene.walker, walk.samples)
     sample_feet(scene.walker, walk.samples)
@@ -90,7 +90,10 @@ def compile_lanes(config: Config) -> None:
 
 
 PARTS: tuple[Callable[[Config], None], ...] = (
-    *(partial(compile_model, method) for method, compile_model in product(METHODS, (compile_contact, compile_rigid))),
+    *(
+        partial(compile_model, method)
+        for method, compile_model in product(COMPILED_METHODS, (compile_contact, compile_rigid))
+    ),
     compile_plain_systems,
     compile_lanes,
 )

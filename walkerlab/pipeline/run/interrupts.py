@@ -11,7 +11,7 @@ SOON_S = 0.02
 CALLED_BACK = "_raw_object_cache"
 """Prefix of the names of functions that LLVM calls after compiling or loading; errors raised in them are lost."""
 
-PATIENCE_S = 1.0
+STORING_PATIENCE_S = 1.0
 """Time that a command has to store finished results after its parent has ended."""
 
 
@@ -48,7 +48,7 @@ def end_with_parent() -> None:
     def watch() -> None:
         os.read(0, 1)
         os.kill(os.getpid(), signal.SIGTERM)
-        time.sleep(PATIENCE_S)
+        time.sleep(STORING_PATIENCE_S)
         os.killpg(0, signal.SIGKILL)
 
     threading.Thread(target=watch, daemon=True).start()

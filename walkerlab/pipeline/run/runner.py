@@ -10,9 +10,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.files import DEFAULT, builtin_names
-from walkerlab.config.layers import parse_setting
-from walkerlab.config.overlay import paper_config_with
+from walkerlab.config.files import DEFAULT, builtin_names, parse_setting
+from walkerlab.config.loader import paper_config_with
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_extending_yaml
 from walkerlab.errors import NoAnswer
@@ -24,8 +23,7 @@ from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.progress import Reporter
 from walkerlab.pipeline.run.executor import Executor
 from walkerlab.pipeline.store.files import write_numbered
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.store.runs import claim, refuse_another_config
+from walkerlab.pipeline.store.runs import RunFolder, claim, refuse_another_config
 from walkerlab.scene.omissions import LeftOut
 
 

@@ -29,7 +29,7 @@ from walkerlab.physics.kernel_cache import cache_root
 from walkerlab.pipeline.run.interrupts import raise_on
 
 ONE_THREAD = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-PATIENCE_S = 5.0
+WORKER_PATIENCE_S = 5.0
 """Time that a worker has to end before it is killed."""
 START = """
 import signal, sys
@@ -153,7 +153,7 @@ class Worker:
     def ended(self) -> int:
         """Wait until the process ends, kill it if that takes too long, and return its exit code."""
         try:
-            return self.process.wait(PATIENCE_S)
+            return self.process.wait(WORKER_PATIENCE_S)
         except subprocess.TimeoutExpired:
             self.process.kill()
             return self.process.wait()

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from walkerlab.config.basin import COORDINATES, Basin
+from walkerlab.config.analyses import COORDINATES, Basin
 from walkerlab.config.reads import BasinConfig, RigidConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError

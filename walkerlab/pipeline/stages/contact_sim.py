@@ -27,8 +27,7 @@ from walkerlab.pipeline.stages.walk import (
     turning,
     variables_over_time,
 )
-from walkerlab.pipeline.store.columns import numbered
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
 from walkerlab.scene.contact import (
     SAMPLES_PER_PENDULUM_TIME,
     ContactScene,

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from walkerlab.config.continuation import Span
+from walkerlab.config.analyses import Span
 from walkerlab.config.reads import ContactConfig, ContinuationConfig
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError, NoAnswer

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from walkerlab.config.design import Design
+from walkerlab.config.analyses import Design
 from walkerlab.config.reads import DesignConfig
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import contact_required_error
@@ -31,8 +31,7 @@ from walkerlab.physics.orbits.step_map import gait_near, multipliers_of
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.store.checkpoint import Checkpoint
-from walkerlab.pipeline.store.columns import rows_group
-from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.content import Content, rows_group
 from walkerlab.scene.families import refuse_unread
 from walkerlab.scene.parameter import Parameter, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker

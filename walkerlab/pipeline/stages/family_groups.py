@@ -24,8 +24,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.stages.numerical_error import evenly_spread
 from walkerlab.pipeline.stages.rigid_groups import trajectory_group
 from walkerlab.pipeline.stages.walk import only_at
-from walkerlab.pipeline.store.columns import columns, labelled, real_and_imaginary
-from walkerlab.pipeline.store.content import Group, Variable
+from walkerlab.pipeline.store.content import Group, Variable, columns, labelled, real_and_imaginary
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
 

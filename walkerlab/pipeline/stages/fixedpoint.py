@@ -11,8 +11,7 @@ from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
 from walkerlab.physics.orbits.fixed_point import GaitSearch, RigidGait, find_gaits
 from walkerlab.pipeline.progress import Progress, track
-from walkerlab.pipeline.store.columns import real_and_imaginary, rows_group, values_by_column
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, real_and_imaginary, rows_group, values_by_column
 from walkerlab.scene.rigid import rigid_walker, state_names
 from walkerlab.scene.studies import equation_sets
 

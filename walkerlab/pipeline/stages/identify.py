@@ -25,8 +25,7 @@ from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
 from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, doubts_about, read_divisions, read_measured
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, variables_over_time
-from walkerlab.pipeline.store.columns import numbered, rows_group
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
 from walkerlab.scene.identification import identify_walk
 from walkerlab.scene.parameter import config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
+from walkerlab.config.analyses import Plan
 from walkerlab.config.identify import Identify
-from walkerlab.config.plan import Plan
 from walkerlab.config.reads import PlanConfig
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.progress import Progress

@@ -36,8 +36,7 @@ from walkerlab.pipeline.run.work import WorkUnit, complete
 from walkerlab.pipeline.run.workers import map_in_order
 from walkerlab.pipeline.stages.rigid_groups import groups as groups_of_walk
 from walkerlab.pipeline.store.checkpoint import Checkpoint
-from walkerlab.pipeline.store.columns import rows_group
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, rows_group
 from walkerlab.scene.families import model_reads, refuse_unread
 from walkerlab.scene.parameter import parameter_keys, parameter_of
 from walkerlab.scene.rigid import rigid_scene

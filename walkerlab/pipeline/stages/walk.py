@@ -24,8 +24,7 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.numerical_error import numerical_error
-from walkerlab.pipeline.store.columns import labelled, numbered
-from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.content import Content, Group, Variable, labelled, numbered
 from walkerlab.pipeline.store.footholds import UNEVEN
 from walkerlab.scene.rigid import first_step_length, have_different_legs
 

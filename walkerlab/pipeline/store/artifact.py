@@ -1,19 +1,74 @@
-"""Artifacts: results of stages as HDF5 files, written atomically and verified on reading."""
+"""Artifacts: results of stages with their identity, as HDF5 files, written atomically and verified on reading."""
 
 import hashlib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
 
-from walkerlab.config.canonical import canonical_json
+import numpy as np
+
+from walkerlab.config.reads import canonical_json
 from walkerlab.pipeline.store import hdf5
 from walkerlab.pipeline.store.content import Attribute, Content, Digest, Group, Variable
 from walkerlab.pipeline.store.files import file_digest, read_bounded, refuse_full_disk, replacing, write_atomically
-from walkerlab.pipeline.store.key import READABLE, SCHEMA_VERSION, Identity
 from walkerlab.pipeline.store.provenance import Provenance
+
+SCHEMA_VERSION = 3
+"""Version of the artifacts' layout."""
+READABLE: Final = (2, SCHEMA_VERSION)
+"""Versions of the layout that can be read; in version 2 text has variable length."""
+DIGEST: Final = re.compile("[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Everything that determines a stage's result."""
+
+    stage: str  # name of the stage
+    config_slice: Mapping[str, Any]  # keys of the config that the stage reads, with their values
+    input_keys: Mapping[str, str]  # stage keys of its inputs, by stage
+    code_digest: str  # digest of the stage's code, see `walkerlab.code_digest`
+    schema_version: int = SCHEMA_VERSION  # version of the artifact's layout
+
+    @property
+    def key(self) -> str:
+        """Stage key: sha256 of all fields except the name. The order of keys does not matter."""
+        parts = [self.schema_version, dict(self.config_slice), dict(self.input_keys), self.code_digest]
+        return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+
+
+def changed_parts(old: Identity, new: Identity) -> list[str]:
+    """Describe the differences between two identities, or return none if their keys are equal."""
+    changes = list(differences("", old.config_slice, new.config_slice))
+    for name in sorted({*old.input_keys, *new.input_keys}):
+        if old.input_keys.get(name) != new.input_keys.get(name):
+            what = "left out" if name not in new.input_keys else "changed" if name in old.input_keys else "added"
+            changes.append(f"input {name} {what}")
+    if old.code_digest != new.code_digest:
+        changes.append("code changed")
+    if old.schema_version != new.schema_version:
+        changes.append(f"layout of artifacts {old.schema_version} -> {new.schema_version}")
+    return changes
+
+
+def differences(where: str, old: Any, new: Any) -> Iterator[str]:
+    """Iterate over the differing values of two config slices, as text such as 'walker.leg_mass_kg 5.0 -> 6.0'."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        for name in sorted({*old, *new}):
+            yield from differences(f"{where}.{name}" if where else name, old.get(name), new.get(name))
+    elif canonical_json(old) != canonical_json(new):
+        yield f"{where} {brief(old)} -> {brief(new)}"
+
+
+def brief(value: Any) -> str:
+    if value is None:
+        return "none"
+    text = "{...}" if isinstance(value, Mapping) else str(value)
+    return f"{text[:8]}..." if DIGEST.fullmatch(text) else text
+
 
 NOT_THERE = "not there yet"
 """Reason for running a stage without a stored result."""
@@ -211,3 +266,40 @@ def assembled(groups: Mapping[str, Group], root: Mapping[str, Any], seal: str) -
     if identity.key != root["stage_key"]:
         raise Damaged("its key does not match the config, inputs and code that it records")
     return artifact
+
+
+FILES_GROUP = "files"
+
+
+def index_files(folder: Path, files: Iterable[Path]) -> Group:
+    """Build the group that lists files below a run folder, for storage under the name `FILES_GROUP`.
+
+    Raises ValueError for a file outside the folder and FileNotFoundError for a missing one.
+    """
+    listed = sorted(files)
+    names = [path.relative_to(folder).as_posix() for path in listed]
+    digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in listed]
+    return Group(
+        {
+            "file": Variable(np.array(names, dtype=object), ("file",), "", "path in the run folder"),
+            # figures that plot run times differ between runs, so the content's digest excludes the digests of files
+            "sha256": Variable(np.array(digests, dtype=object), ("file",), "", "sha256 of the file", timing=True),
+        }
+    )
+
+
+def indexed_files(content: Content) -> dict[str, str]:
+    """Return the digest of each listed file, by path in the run folder. It is empty if the content has no list."""
+    group = content.groups.get(FILES_GROUP)
+    return dict(zip(group["file"].tolist(), group["sha256"].tolist(), strict=True)) if group is not None else {}
+
+
+def broken_file(folder: Path, content: Content) -> str | None:
+    """Describe the first listed file that is missing or altered, or return None if all are intact."""
+    for name, digest in indexed_files(content).items():
+        current = file_digest(folder / PurePosixPath(name))
+        if current is None:
+            return f"{name} is missing"
+        if current != digest:
+            return f"{name} was altered"
+    return None

@@ -1,7 +1,5 @@
 """Provenance of results: software, machine, time and command. Recorded, but not part of the key."""
 
-from __future__ import annotations
-
 import datetime
 import importlib.metadata
 import platform
@@ -45,7 +43,7 @@ class Provenance:
         start, ended = map(datetime.datetime.fromisoformat, (self.started_utc, self.ended_utc))
         return (ended - start).total_seconds()
 
-    def finish(self) -> Provenance:
+    def finish(self) -> "Provenance":
         return replace(self, ended_utc=utc_now())
 
 

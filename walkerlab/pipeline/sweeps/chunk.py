@@ -1,7 +1,5 @@
 """Points of a sweep, which any process can compute, and chunks: files that store several points."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -21,17 +19,14 @@ from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.plan.stage import STRIDES
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store import artifact
-from walkerlab.pipeline.store.artifact import Damaged, OtherLayout
-from walkerlab.pipeline.store.columns import rows_group
-from walkerlab.pipeline.store.content import Content, remove_timings
-from walkerlab.pipeline.store.key import Identity
+from walkerlab.pipeline.store.artifact import Damaged, Identity, OtherLayout
+from walkerlab.pipeline.store.content import Content, remove_timings, rows_group
 from walkerlab.pipeline.store.provenance import Provenance
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import CHUNKS, RunFolder
 
 Status = Literal["answered", "no-answer", "failed"]
 Labels = Mapping[str, tuple[str, str]]
 
-FOLDER: Final = "sweep-chunks"
 OMITTED_KEYS: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
 """Number of caches of stage inputs (see `memory_for`) that a process keeps."""
@@ -168,7 +163,7 @@ def store(folder: RunFolder, stage: str, code_digest: str, chunk: Chunk, provena
     inside = hashlib.sha256("\n".join(row.key for row in rows).encode()).hexdigest()
     name = f"{stage}-{code_digest[:8]}-{inside[:16]}.h5"
     identity = Identity("sweep-chunk", {"of": stage, "name": name}, {}, code_digest)
-    path = folder.path / FOLDER / name
+    path = folder.path / CHUNKS / name
     path.parent.mkdir(exist_ok=True)
     artifact.write(path, content, identity, provenance.finish())
 
@@ -181,7 +176,7 @@ def stored_chunks(
     keys  stage keys of the sweep; chunks are all included, results of single runs only if their keys match
     warn  called with a message about each damaged chunk
     """
-    for path in sorted(runs_dir.glob(f"*/{FOLDER}/{stage}-{code_digest[:8]}-*.h5")):
+    for path in sorted(runs_dir.glob(f"*/{CHUNKS}/{stage}-{code_digest[:8]}-*.h5")):
         try:
             content = artifact.read(path)
             columns = [content["points"][name].tolist() for name in labels_of(PointResult)]

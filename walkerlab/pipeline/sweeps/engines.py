@@ -1,7 +1,5 @@
 """Engines that compute chunks. Each provides a concurrent.futures executor."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import importlib
@@ -30,7 +28,7 @@ RESULT_S: Final = 30.0
 """Time after a job's end in which its result may still appear on a network disk."""
 RESTART_S: Final = 20.0
 """Time without a Dask worker after which workers are started again; Dask itself needs some seconds to replace one."""
-SILENCE_S: Final = 600.0
+SILENT_WORKER_S: Final = 600.0
 """Time without an answer of Slurm's queue after which its jobs are taken for lost."""
 GONE = "gone"
 SILENT = "silent"
@@ -63,7 +61,7 @@ class SweepEngine:
     chunk_s: float  # target duration of a chunk, s: long compared with the engine's overhead
 
     @contextlib.contextmanager
-    def start_early(self, order: Order) -> Iterator[SweepEngine]:
+    def start_early(self, order: Order) -> Iterator["SweepEngine"]:
         """Yield the engine for one sweep. Local workers start now and import modules while the points are prepared."""
         if self.opened is not local:
             yield self
@@ -97,7 +95,7 @@ def environment_of_workers() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def dask(order: Order) -> Iterator[JobExecutor]:
+def dask(order: Order) -> Iterator["JobExecutor"]:
     """Use a Dask cluster at an address, or start one on this machine."""
     distributed = extra("distributed", "dask")
     # Dask copies these variables into this process's environment whenever it starts or replaces a worker.
@@ -154,7 +152,7 @@ class DaskWorkers:
 
 
 @contextlib.contextmanager
-def slurm(order: Order) -> Iterator[JobExecutor]:
+def slurm(order: Order) -> Iterator["JobExecutor"]:
     """Submit a Slurm job for each chunk. `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
     refuse_address("slurm", order)
@@ -239,14 +237,14 @@ class SlurmQueue:
                     self._states = dict(line.split()[:2] for line in done.stdout.splitlines())
             if self._answered_at == self._listed_at and self._listed_at > submitted:
                 return self._states.get(job_id, GONE)
-            return SILENT if now - self._answered_at > SILENCE_S else "UNKNOWN"
+            return SILENT if now - self._answered_at > SILENT_WORKER_S else "UNKNOWN"
 
     def describe(self, job: Any, state: str) -> str:
         what = {
             "TIMEOUT": f"reached its time limit ({self.time_limit} min; --engine-option timeout_min=N)",
             "OUT_OF_MEMORY": "needed more memory than it may have (--engine-option mem_gb=N)",
             GONE: "left the queue",
-            SILENT: f"is not known, because squeue has not answered for {SILENCE_S:.0f} s",
+            SILENT: f"is not known, because squeue has not answered for {SILENT_WORKER_S:.0f} s",
         }.get(state, f"ended: {state}")
         return f"Slurm job {job.job_id} {what}, without a result; its output: {job.paths.stderr}"
 

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.fields import annotation_of, leaves, value_at
-from walkerlab.config.layers import ConfigSetting
+from walkerlab.config.files import ConfigSetting
 from walkerlab.config.problems import nearest, problem_error
 from walkerlab.config.reader import read
 from walkerlab.config.schema import Config, SlopeInDegrees
@@ -22,10 +22,10 @@ from walkerlab.pipeline.headlines import QUANTITIES, has_quantity
 Value = float | int | str | bool
 Layout = Literal["grid", "list"]
 
-POINT: Final = "point"
+POINT_DIMENSION: Final = "point"
 MAX_POINTS: Final = 10_000_000
 """Maximum number of points in a sweep."""
-FORMS: Final = "FROM:TO:N, FROM:TO:N:log, or a list [a, b, ...]; for --sample also FROM:TO"
+VALUE_FORMS: Final = "FROM:TO:N, FROM:TO:N:log, or a list [a, b, ...]; for --sample also FROM:TO"
 EXAMPLE: Final = "For example: `walkerlab sweep --over slope_deg=0.5:5:10 --stage fixedpoint`"
 SAMPLERS: Final = ("latin-hypercube", "sobol", "random")
 
@@ -69,7 +69,7 @@ class SweptStage:
 
     @property
     def dims(self) -> tuple[str, ...]:
-        return (POINT,) if self.layout == "list" else self.names
+        return (POINT_DIMENSION,) if self.layout == "list" else self.names
 
     def __len__(self) -> int:
         return math.prod(self.shape)
@@ -127,7 +127,7 @@ def build_sweep(
         return SweptStage(stage, sampled(axes, sample, seed), "list")
     for parameter in axes:
         if not parameter.values:
-            raise parameter_error(parameter.source, f"{parameter.key}: the number of values is missing", FORMS)
+            raise parameter_error(parameter.source, f"{parameter.key}: the number of values is missing", VALUE_FORMS)
     if zipped and len({len(parameter.values) for parameter in axes}) > 1:
         lengths = ", ".join(f"{parameter.key} {len(parameter.values)}" for parameter in axes)
         raise problem_error(None, f"--zip: the parameters have different numbers of values: {lengths}")
@@ -149,7 +149,7 @@ def axis_of_text(text: str) -> tuple[str, Any, str]:
     source = f"--over {text}"
     key = key.strip()
     if not equals or not all(key.split(".")):
-        raise parameter_error(source, "is not of the form KEY=VALUES", FORMS)
+        raise parameter_error(source, "is not of the form KEY=VALUES", VALUE_FORMS)
     if values.lstrip().startswith("["):
         node = read(values, source, len(key) + 2)
         assert isinstance(node, ListNode)
@@ -182,7 +182,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
     if isinstance(values, list | tuple):
         odd = next((value for value in values if not isinstance(value, Value)), None)
         if odd is not None or not values:
-            raise parameter_error(source, f"{key}: {odd if values else 'an empty list'}", FORMS)
+            raise parameter_error(source, f"{key}: {odd if values else 'an empty list'}", VALUE_FORMS)
         refuse_too_many(key, len(values))
         return Axis(key, tuple(values), source)
     parts = str(values).split(":")
@@ -194,7 +194,7 @@ def axis(key: str, values: Any, source: str) -> Axis:
     refuse_too_many(f"{key}={values}", count)
     logarithmic = parts[3:] == ["log"]
     if count < 0 or (len(parts) > 2 and count < 1) or len(parts) > 3 + logarithmic or not math.isfinite(low + high):
-        raise parameter_error(source, f"{key}: {values} is not a range of values", FORMS)
+        raise parameter_error(source, f"{key}: {values} is not a range of values", VALUE_FORMS)
     if logarithmic and min(low, high) <= 0.0:
         raise parameter_error(source, f"{key}: {values}", "both ends above 0 for a logarithmic range")
     return Axis(key, as_the_key_has_it(key, evenly_spaced(low, high, count, logarithmic)), source, (low, high))

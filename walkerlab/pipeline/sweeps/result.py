@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.schema import Config
-from walkerlab.labels import ERROR_OF_EACH_STEP, axis_label, unit_by_name
+from walkerlab.labels import CONTACT_STAGE, ERROR_OF_EACH_STEP, axis_label, unit_by_name
 from walkerlab.physics.solvers.system import Integers
 from walkerlab.pipeline.headlines import LAST_STEP_SOURCES, headlines
 from walkerlab.pipeline.store.artifact import InTurn
@@ -21,7 +21,6 @@ from walkerlab.pipeline.sweeps.chunk import Chunk
 from walkerlab.pipeline.sweeps.question import SweptStage, described
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
-CONTACT = "contact-sim"
 PAD_PITCH = "contact.pad_pitch"
 
 
@@ -31,7 +30,7 @@ STATUS_TEXTS: Final = {
     "reason": "why there is no answer",
 }
 """Columns that every point has in addition to the stage's quantities."""
-STATES: Final = ("state", "start_state", "final_state")
+STATE_NAMES: Final = ("state", "start_state", "final_state")
 MAX_REASON: Final = 500
 """Maximum length of a reason; all points have room for the longest, since text in files has a fixed length."""
 
@@ -176,7 +175,7 @@ class Merge:
             varied = PAD_PITCH in (axis.key for axis in question.axes)
             laid = "" if config.contact is None or varied else config.contact.pad_pitch
             pads = Pads(ends_of(pitch[off]), ends_of(steps) if steps.size else None, str(laid))
-        return describe_endings(count_texts(outcomes), config, question.stage == CONTACT, pads)
+        return describe_endings(count_texts(outcomes), config, question.stage == CONTACT_STAGE, pads)
 
     def numerical_error(self) -> dict[str, Any]:
         """Return the largest errors of the repeated walks. `ended_otherwise` counts those that ended differently."""
@@ -201,7 +200,7 @@ class Merge:
         if column.text:
             unit = ""
             text = STATUS_TEXTS.get(name, name)
-        elif last in STATES:
+        elif last in STATE_NAMES:
             unit = "rad, rad/s"
             text = last.replace("_", " ")
         elif last in self.labels:

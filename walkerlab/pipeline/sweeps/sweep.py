@@ -12,24 +12,23 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.canonical import canonical_json
 from walkerlab.config.loader import LoadedConfig
 from walkerlab.config.problems import SHOWN_PROBLEMS
+from walkerlab.config.reads import canonical_json
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError, NoAnswer, WalkerlabError
 from walkerlab.extensions import versions
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
-from walkerlab.pipeline.plan.keys import Keys
+from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Progress, Reporter, Silent
 from walkerlab.pipeline.run.work import Spread, WorkUnit
 from walkerlab.pipeline.stages.numerical_error import SAMPLE, evenly_spread
 from walkerlab.pipeline.store import artifact, provenance
+from walkerlab.pipeline.store.artifact import Identity
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.pipeline.store.files import make_folder
 from walkerlab.pipeline.store.hdf5 import GroupOnDisk
-from walkerlab.pipeline.store.key import Identity
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.store.runs import claim, refuse_another_config
+from walkerlab.pipeline.store.runs import RunFolder, claim, refuse_another_config
 from walkerlab.pipeline.sweeps.chunk import Chunk, PointResult, compute_point, join_points, store, stored_chunks
 from walkerlab.pipeline.sweeps.engines import ENGINES, Order, SweepEngine
 from walkerlab.pipeline.sweeps.question import SweptStage

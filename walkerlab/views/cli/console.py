@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.live import Live
     from rich.table import Table
 
-SILENCE_S = 8.0
+QUIET_LINE_S = 8.0
 """Maximum time (s) without a message while a stage runs and stderr is not a terminal."""
 
 ENOUGH_DONE = 0.1
@@ -116,7 +116,7 @@ class Console:
     def _talk(self, end: threading.Event) -> None:
         """Report the running stages whenever nothing has been printed for a while."""
         while not end.wait(0.5):
-            if time.monotonic() - self._said_at >= SILENCE_S:
+            if time.monotonic() - self._said_at >= QUIET_LINE_S:
                 self._say("; ".join(line.describe() for line in self._lines()))
 
     def _lines(self) -> Iterator[StageLine]:

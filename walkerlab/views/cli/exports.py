@@ -21,23 +21,21 @@ from walkerlab.errors import ConfigError, StaleError, StorageError
 from walkerlab.extensions import declared, load
 from walkerlab.labels import add_unit, join_words
 from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.pipeline.plan.planner import Planner
+from walkerlab.pipeline.plan.planner import Planner, command, refusing_older, results_in, results_to_show, the_result
 from walkerlab.pipeline.plan.resolve import warn_of_edits
 from walkerlab.pipeline.plan.results import FolderResults
-from walkerlab.pipeline.plan.survey import command, refusing_older, results_in, results_to_show, the_result
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Group
 from walkerlab.pipeline.store.csv_text import csv_text
 from walkerlab.pipeline.store.files import as_text
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.store.runs import config_of, read_all, run_named
+from walkerlab.pipeline.store.runs import RunFolder, config_of, read_all, run_named
 from walkerlab.views.cli.console import Console
 from walkerlab.views.cli.request import Request
 from walkerlab.views.cli.target import Target, write_file
 from walkerlab.views.figures.style import EXPORT_DPI
-from walkerlab.views.report.outcomes import MODEL_NAMES
 from walkerlab.views.report.tables import Table, as_csv, record_table
 from walkerlab.views.report.tex import as_tex
+from walkerlab.views.report.words import MODEL_NAMES
 
 if TYPE_CHECKING:
     from walkerlab.views.figures.illustration import Illustration
@@ -133,8 +131,8 @@ def caption_name(caption: str) -> str:
 def page_tables(folder: RunFolder) -> dict[str, Table]:
     """Return the tables of a run's page by short caption, or by full caption where the short one is ambiguous."""
     # Imported here: exporting a figure needs no page.
+    from walkerlab.views.report.blocks import Results
     from walkerlab.views.report.registry import pages_of
-    from walkerlab.views.report.results import Results
 
     planner = plan_run(folder)
     report = PIPELINE["report"]

@@ -9,8 +9,7 @@ import typer
 
 from walkerlab.errors import StoppedError
 from walkerlab.pipeline.run.interrupts import raise_on
-from walkerlab.views.cli.command import Offer
-from walkerlab.views.cli.request import OUTPUT_FIELDS, Request
+from walkerlab.views.cli.request import OUTPUT_FIELDS, Offer, Request
 from walkerlab.views.figures.style import EXPORT_DPI
 
 RunArgument = Annotated[
@@ -80,7 +79,7 @@ def rerun(
     artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="A stage's result, such as simulate.h5.")],
 ) -> None:
     """Recompute a stored result from scratch and check that it is the same."""
-    from walkerlab.views.cli.rerun import rerun_artifact
+    from walkerlab.views.cli.stored import rerun_artifact
 
     rerun_artifact(artifact, request)
 

@@ -17,9 +17,7 @@ from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.stage import STRIDES, Stage
 from walkerlab.pipeline.run.workers import ONE_THREAD
 from walkerlab.views.cli import housekeeping, lifecycle, sweep
-from walkerlab.views.cli import runs as whole_runs
-from walkerlab.views.cli.command import Offer, add_command
-from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Request
+from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, add_command
 
 
 def main() -> None:
@@ -99,7 +97,7 @@ def program(graph: Graph = PIPELINE) -> typer.Typer:
             add_command(app, graph, load(stage.adds_command))
         else:
             add_stage(app, stage, graph)
-    for module in (housekeeping, lifecycle, sweep, whole_runs):
+    for module in (housekeeping, lifecycle, sweep):
         for offer in module.COMMANDS:
             add_command(app, graph, offer)
     return app

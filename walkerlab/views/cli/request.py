@@ -1,25 +1,40 @@
-"""Options that commands share, each declared once, and the run that they select."""
+"""Commands of the program: the options they share, how they print results and failures, and how typer gets them."""
 
+import contextlib
+import errno
 import glob
+import inspect
+import json
 import os
 import re
 import shlex
-from dataclasses import dataclass, field
+import signal
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import Field, dataclass, field, fields
 from functools import cached_property
+from itertools import starmap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
+from typer.core import TyperCommand
 
+from walkerlab.errors import ConfigError, StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
+from walkerlab.extensions import check_names, foreign
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
+from walkerlab.pipeline.run.interrupts import raise_on
 from walkerlab.views.cli.console import Console
 
-# Imported for types only: help must load neither the config nor NumPy.
 if TYPE_CHECKING:
     from walkerlab.config.loader import LoadedConfig
     from walkerlab.config.schema import Config
     from walkerlab.pipeline.plan.resolve import ResolvedRun
-    from walkerlab.pipeline.store.runfolder import RunFolder
+    from walkerlab.pipeline.plan.stage import Option
+    from walkerlab.pipeline.store.runs import RunFolder
+
+
+# Imported for types only: help must load neither the config nor NumPy.
 
 RUNS = Path("runs")
 OF_KIND = re.compile(r"\([^)]*\)")
@@ -182,3 +197,216 @@ OF_A_RUN = ("config", "sets", "strides", "name", "runs")
 """Options that select the run."""
 OUTPUT_FIELDS = ("as_json", "quiet", "verbose")
 """Options for the form and amount of output."""
+
+
+FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+@contextlib.contextmanager
+def exit_on_failure(request: Request) -> Iterator[None]:
+    """Turn expected failures into a message on stderr and an exit code. With `--json`, also print a JSON object."""
+    raise_on(signal.SIGTERM, KeyboardInterrupt)
+    # background jobs of a script ignore SIGINT, and must go on doing so
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        raise_on(signal.SIGINT, KeyboardInterrupt)
+
+    def print_failed(error: WalkerlabError) -> None:
+        """With `--json`, print an object that describes the failure."""
+        if request.as_json:
+            run_dir = None if request.run_dir is None else str(request.run_dir)
+            nothing: dict[str, Any] = {"artifact": None, "reused": False, "wall_s": 0.0, "left_out": []}
+            print_json({"stage": request.command, "run_dir": run_dir, **nothing, "error": as_json(error, request)})
+
+    try:
+        yield
+        sys.stdout.flush()
+    except WalkerlabError as error:
+        print_failed(error)
+        print_error(error, request.typed_for)
+        raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt:
+        stopped = StoppedError("interrupted", "Finished results are kept; the same command computes the rest.")
+        print_failed(stopped)
+        print(f"{stopped.message}\nadvice: {stopped.advice}", file=sys.stderr)
+        raise typer.Exit(stopped.exit_code) from None
+    except BrokenPipeError:
+        discard_output()
+        raise typer.Exit(0) from None
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            too_long = ConfigError(f"the name {error.filename[:60]!r}... is too long.", "Choose a shorter one.")
+            print_failed(too_long)
+            print_error(too_long)
+            raise typer.Exit(too_long.exit_code) from None
+        if error.errno not in FULL_DISK_ERRORS or error.filename is not None:
+            raise
+        discard_output()
+        print_error(
+            StorageError(f"the output could not be written: {error.strerror}.", "The results themselves are stored.")
+        )
+        raise typer.Exit(StorageError.exit_code) from None
+
+
+def discard_output() -> None:
+    """Redirect stdout to the null device, so that flushing it at exit does not fail again."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
+def print_result(
+    request: Request, value: dict[str, Any], lines: Iterable[str], error: WalkerlabError | None = None
+) -> None:
+    """Print a result as text lines or, with `--json`, as the object `value`. Exit non-zero if there is an error."""
+    if request.as_json:
+        print_json(value if error is None else value | {"error": as_json(error, request)})
+    else:
+        sys.stdout.writelines(f"{escape_controls(line)}\n" for line in lines)
+    if error is not None:
+        print_error(error, request.typed_for)
+        raise typer.Exit(error.exit_code)
+
+
+def as_json(error: WalkerlabError, request: Request) -> dict[str, Any]:
+    return error.as_json() | {"advice": add_run_options(error.advice, request.typed_for)}
+
+
+def print_error(error: WalkerlabError, options_of: Callable[[str], str] = lambda _: "") -> None:
+    print(f"error: {error.message}", file=sys.stderr)
+    if error.advice:
+        print(f"advice: {add_run_options(error.advice, options_of)}", file=sys.stderr)
+
+
+def print_json(value: dict[str, Any]) -> None:
+    print(json.dumps(value, indent=2, allow_nan=False))
+
+
+# Imported for types only: help must load neither the config nor NumPy.
+
+
+def as_parameter(entry: Field[Any]) -> inspect.Parameter:
+    """Convert a field declared by `option` to a parameter of the signature that typer reads."""
+    kind = inspect.Parameter.KEYWORD_ONLY
+    declared = entry.metadata["option"]
+    return inspect.Parameter(entry.name, kind, default=entry.default, annotation=Annotated[entry.type, declared])
+
+
+def settings_from(options: Sequence["Option"], values: Mapping[str, Any]) -> tuple[SetByOption, ...]:
+    """Convert a stage's own options to settings. `values` holds the value of each option by flag, or None if the user
+    gave none.
+
+    Raises typer.BadParameter for malformed bounds, and for an option given without the options that it needs.
+    """
+    settings = []
+    for option in options:
+        value = values[option.flag]
+        if option.runs or (not value and value != 0):
+            continue
+        if any(values[flag] is None for flag in option.needs):
+            raise typer.BadParameter(f"requires {' and '.join(option.needs)}", param_hint=option.flag)
+        typed = [word for item in (value if isinstance(value, list) else [value]) for word in (option.flag, str(item))]
+        match option.kind:
+            case "bounds" | "bounds-or-none":
+                text = bounds(option, value)
+            case "pairs" | "numbers" | "units":
+                text = pairs(option, value)
+            case "text" | "texts":
+                text = json.dumps(value)
+            case _:
+                text = str(value)
+                typed = [option.flag] if option.kind == "switch" else [option.flag, text.removesuffix(".0")]
+        settings.append(SetByOption(f"{option.key}={text}", *typed))
+    return tuple(settings)
+
+
+def bounds(option: "Option", values: Sequence[str]) -> str:
+    """Convert arguments NAME=A:B (or NAME for null, if allowed) to a YAML block.
+
+    Raises typer.BadParameter for arguments of another form.
+    """
+    either = r"([^=]+)(?:=([^:]+):([^:]+))" + ("?" if option.kind == "bounds-or-none" else "")
+    parts = [re.fullmatch(either, value) for value in values]
+    if None in parts:
+        raise typer.BadParameter(f"give a name and two numbers, {option.metavar}", param_hint=option.flag)
+    named = (f"{part[1]}: [{part[2]}, {part[3]}]" if part[2] else f"{part[1]}: null" for part in parts if part)
+    return "{" + ", ".join(named) + "}"
+
+
+def pairs(option: "Option", values: Sequence[str]) -> str:
+    """Convert NAME=VALUE,... arguments to YAML. A bare unit applies to all quantities of its kind."""
+    # Imported here: few commands read files of other programs.
+    from walkerlab.errors import ConfigError
+    from walkerlab.exchange.columns import parse_pairs, parse_units
+
+    try:
+        named = parse_units(values) if option.kind == "units" else parse_pairs(option.flag, values)
+    except ConfigError as error:
+        raise typer.BadParameter(f"{error.message} {error.advice}", param_hint=option.flag) from None
+    if option.kind != "numbers":
+        return json.dumps(named)
+    return "{" + ", ".join(f"{key}: {value}" for key, value in named.items()) + "}"
+
+
+def own_parameter(name: str, option: "Option") -> inspect.Parameter:
+    """Convert a stage's own option to a parameter of the signature that typer reads."""
+    complete = keys_to_vary if option.kind == "key" else None
+    declared = typer.Option(option.flag, metavar=option.metavar or None, help=option.help, autocompletion=complete)
+    types = {"int": int, "float": float, "switch": bool, "word": str, "text": str, "key": str}
+    value: Any = types.get(option.kind, list[str])
+    annotation = Annotated[value | None, declared]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
+class KeysAreNoOptions(TyperCommand):
+    """A command that suggests `--set KEY=VALUE` if a user types a config key as an option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the options. If an unknown option is a config key, the error message suggests `--set`."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:  # click's NoSuchOption; its module depends on typer's version
+            typed = str(getattr(error, "option_name", ""))
+            name = typed.lstrip("-").replace("-", "_")
+            keys = keys_to_vary("") if name and any(option.name == "sets" for option in self.params) else []
+            keys.sort(key=lambda key: not key.startswith(f"{self.name}."))  # prefer the command's own block
+            key = next((key for key in keys if name in (key, key.rpartition(".")[2])), None)
+            if key is not None:
+                message = f"There is no option {typed}; set the config key with --set {key}=VALUE"
+                error.message = message  # type: ignore[attr-defined]
+            raise
+
+
+class Offer(NamedTuple):
+    """A function of a request, and of further options, that the program offers as a command."""
+
+    function: Callable[..., None]
+    shared: Sequence[str] = ()  # fields of the request that the command offers as options
+    name: str | None = None  # name of the command; default: the function's
+    asks: type[Request] = Request  # type of the request; its additional fields come first in the help
+    purpose: str | None = None  # help text; default: the function's docstring
+    sets: Sequence["Option"] = ()  # options that set keys of the config; they come first in the help
+
+
+def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
+    """Add a command to the program of a graph. Errors of its function end it as `exit_on_failure` describes."""
+    function, shared, name, asks, purpose, sets = offer
+    typed = name or function.__name__
+    # Flags such as --from cannot be names of parameters.
+    names = {f"set_{place}": option for place, option in enumerate(sets)}
+
+    def run(**arguments: Any) -> None:
+        values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
+        settings = settings_from(sets, values)
+        instead = next((option.runs for option in sets if option.runs and values[option.flag]), "")
+        request = asks(typed, settings, instead, graph, **{field: arguments.pop(field) for field in shared})
+        with exit_on_failure(request):
+            if foreign() and typed != "extensions":
+                commands = [str(each.name) for each in app.registered_commands]
+                check_names(request.console.warn, (each for each in commands if commands.count(each) > 1))
+            function(request, **arguments)
+
+    _, *own = inspect.signature(function, eval_str=True).parameters.values()
+    options = sorted((entry for entry in fields(asks) if entry.name in shared), key=fields(Request).__contains__)
+    by_name = [entry.replace(kind=inspect.Parameter.KEYWORD_ONLY) for entry in (*own, *map(as_parameter, options))]
+    run.__signature__ = inspect.Signature([*starmap(own_parameter, names.items()), *by_name])  # type: ignore[attr-defined]
+    app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)

@@ -8,8 +8,7 @@ from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.stage import Stage
 from walkerlab.pipeline.run.executor import short_reason
 from walkerlab.pipeline.run.runner import Options, StageReport, run_and_write
-from walkerlab.views.cli.failures import print_result
-from walkerlab.views.cli.request import Request
+from walkerlab.views.cli.request import Request, print_result
 from walkerlab.views.report.answers import answer, further_tables, verdict
 from walkerlab.views.report.tables import aligned
 

@@ -1,22 +1,36 @@
-"""`walkerlab status` and `walkerlab show STAGE`: which results are current, and their content."""
+"""Commands on stored results: `status`, `show`, `clean` and `rerun`."""
 
+import sys
+import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
+import typer
+
+from walkerlab.config.files import ConfigFile
+from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError, StaleError
+from walkerlab.pipeline.plan.planner import RunSummary, runs_in, survey
 from walkerlab.pipeline.plan.results import UP_TO_DATE, Step
-from walkerlab.pipeline.plan.survey import RunSummary, runs_in, survey
 from walkerlab.pipeline.run.executor import short_reason
-from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
+from walkerlab.pipeline.run.runner import execute
+from walkerlab.pipeline.store.artifact import NOT_THERE, Damaged, Stored, read
 from walkerlab.pipeline.store.content import Variable
-from walkerlab.pipeline.store.runfolder import RunFolder
-from walkerlab.pipeline.store.runs import config_of, run_named
-from walkerlab.views.cli.failures import print_result
-from walkerlab.views.cli.request import Request
-from walkerlab.views.report.tables import aligned
-from walkerlab.views.report.text import describe_summary
+from walkerlab.pipeline.store.runs import (
+    CHUNKS,
+    FIGURES_FOLDER,
+    RunFolder,
+    config_of,
+    files_of,
+    remove,
+    remove_if_empty,
+    run_named,
+)
+from walkerlab.views.cli.request import Request, print_result
+from walkerlab.views.report.tables import aligned, describe_summary
 
 DIGEST_CHARACTERS = 12
 """Number of a digest's characters shown in text output."""
@@ -180,3 +194,87 @@ def lines(stored: Stored) -> list[str]:
 def row(name: str, variable: Variable) -> list[str]:
     sizes = ", ".join(f"{dim} {size}" for dim, size in zip(variable.dims, variable.values.shape, strict=True))
     return [name, f"({sizes})", variable.units, variable.long_name]
+
+
+def clean_folders(request: Request, every: bool, stages: Sequence[str], yes: bool) -> None:
+    """Delete the stages' files of one run or, with `every`, of all runs, after confirmation, and remove emptied
+    folders.
+
+    Raises typer.BadParameter if there is no terminal to ask on, LockedError (with `--no-wait`) and StorageError.
+    """
+    if every:
+        names = sorted(path.name for path in request.runs.iterdir() if path.is_dir()) if request.runs.is_dir() else []
+        folders = [RunFolder(request.runs, name) for name in names]
+    else:
+        folders = [request.folder]
+    files_by_folder = {folder: files_of(folder, stages) for folder in folders}
+    files = [path for paths in files_by_folder.values() for path in paths]
+    sizes = {path: path.lstat().st_size for path in files}
+    where = folders[0].path if len(folders) == 1 else request.runs
+    if files and not (yes or request.dry_run):
+        if not sys.stdin.isatty():
+            raise typer.BadParameter("cannot ask for confirmation without a terminal; give --yes", param_hint="--yes")
+        if not typer.confirm(f"Remove {len(files)} files from {where}?", err=True):
+            files_by_folder = {}
+            files = []
+    if not request.dry_run:
+        for folder, paths in files_by_folder.items():
+            if paths:
+                with folder.locked(not request.no_wait, request.console.note):
+                    remove(folder, paths)
+                remove_if_empty(folder)
+    verb = "would be removed" if request.dry_run else "removed"
+    lines = [f"{verb}: {line}" for line in file_lines(files, sizes)] or [f"{where}: nothing {verb}"]
+    print_result(request, {"run_dir": str(where), "removed": [*map(str, files)], "dry_run": request.dry_run}, lines)
+
+
+def file_lines(files: Sequence[Path], sizes: Mapping[Path, int]) -> list[str]:
+    """Return a line for each file, but only one line for all figures of a run and for all chunks of a sweep."""
+    lines: dict[str, list[Path]] = {}
+    for path in files:
+        stem = {CHUNKS: f"{path.stem.rpartition('-')[0]}-*", FIGURES_FOLDER: "*"}.get(path.parent.name, path.name)
+        lines.setdefault(str(path.parent / stem), []).append(path)
+    return [
+        line if len(paths) == 1 else f"{line} ({len(paths)} files, {sum(sizes[path] for path in paths) / 1e6:.1f} MB)"
+        for line, paths in lines.items()
+    ]
+
+
+def rerun_artifact(path: Path, request: Request) -> None:
+    """Recompute an artifact in an empty folder.
+
+    Raises ConfigError if missing, StaleError if damaged or not reproduced.
+    """
+    try:
+        stored = read(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise ConfigError(f"there is no artifact {path}.", "`walkerlab status` lists a run's artifacts.") from None
+    except Damaged as error:
+        advice = f"`walkerlab {path.stem} -c {RunFolder.open_folder(path.parent).quoted_path}` recomputes it."
+        raise StaleError(f"{path} is damaged: {error}.", advice) from None
+    stage = stored.identity.stage
+    name = path.resolve().parent.name
+    config = load(ConfigFile(Path(name), str(path), stored.provenance.config)).config
+    with tempfile.TemporaryDirectory(prefix="walkerlab-rerun-") as scratch:
+        report = execute(config, stage, RunFolder(Path(scratch), name), reporter=request.console, graph=request.graph)
+        again = None if report.artifact is None else read(report.artifact)
+    before, after = stored.digest(), None if again is None else again.digest()
+    same_code = again is not None and again.identity.key == stored.identity.key
+    value = {
+        "stage": stage,
+        "artifact": str(path),
+        "same": before == after,
+        "digest": before,
+        "digest_again": after,
+        "same_code": same_code,
+    }
+    if before == after:
+        print_result(request, value, [f"{path} is reproduced bit for bit: content {before[:DIGEST_CHARACTERS]}."])
+        return
+    why = "the code is the same" if same_code else "the code has changed since"
+    another = StaleError(
+        f"{path} is not reproduced: its content digest was {before[:DIGEST_CHARACTERS]} "
+        f"and is now {(after or 'missing')[:DIGEST_CHARACTERS]}; {why}.",
+        "Results agree bit for bit only on the same platform with the same versions; `walkerlab show` lists both.",
+    )
+    print_result(request, value, [], another)

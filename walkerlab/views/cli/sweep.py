@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from walkerlab.views.cli.command import Offer
-from walkerlab.views.cli.failures import print_result
-from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Request, option
-from walkerlab.views.report.text import paragraph
+from walkerlab.views.cli.request import OF_A_RUN, OUTPUT_FIELDS, Offer, Request, option, print_result
+from walkerlab.views.report.tables import paragraph
 
 if TYPE_CHECKING:
     from walkerlab.pipeline.sweeps.sweep import Foreseen, Swept
@@ -65,7 +63,7 @@ SWEEP_FIELDS = [one.name for one in fields(SweepRequest) if one not in fields(Re
 
 def sweep(request: SweepRequest) -> None:
     """Run a stage over a range of parameters, reusing results that exist."""
-    from walkerlab.config.sweep import Sweep
+    from walkerlab.config.analyses import Sweep
     from walkerlab.pipeline.sweeps.engines import Order, engine_named
     from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep, refuse_unrecorded
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of

@@ -1,7 +1,5 @@
 """Destination of an export: a format and a file that must not be overwritten by mistake."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +7,8 @@ from pathlib import Path
 
 from walkerlab.errors import ConfigError, StorageError
 from walkerlab.pipeline.plan.graph import PIPELINE
-from walkerlab.pipeline.store.clean import owner_of
 from walkerlab.pipeline.store.files import storing, write_through
+from walkerlab.pipeline.store.runs import owner_of
 from walkerlab.views.cli.console import Console
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from walkerlab.pipeline.run.interrupts import PATIENCE_S
+from walkerlab.pipeline.run.interrupts import STORING_PATIENCE_S
 from walkerlab.views.explore.walks import Answered, ExploredConfig
 
 KINDS = ("report", "gif")
@@ -55,7 +55,7 @@ class Job:
         if (process := self._process) is not None:
             process.terminate()
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(PATIENCE_S)
+                process.wait(STORING_PATIENCE_S)
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
 

@@ -20,7 +20,7 @@ from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.views.explore.numbers import adjustable
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import Results
 from walkerlab.views.report.sections import motion
 
 WALK_STAGES = {"rigid": "simulate", "contact": "contact-sim"}

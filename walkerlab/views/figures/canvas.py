@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from walkerlab.labels import add_unit
-from walkerlab.views.figures.style import NARROW, NARROW_BELOW, PNG_DPI, RC, WIDTH
+from walkerlab.views.figures.style import FIGURE_WIDTH, NARROW, NARROW_BELOW, PNG_DPI, RC
 
 FILLS = 0.95
 """Maximum fraction of the available width that a legend, title or label fills."""
@@ -33,12 +33,12 @@ SHRINKS = 0.7
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
 """Ratio of an axis's limits, and the multiples of powers of ten that are labelled if the ratio is smaller."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
-LONGEST: Final = 1e4
+MAX_MINOR_SPAN: Final = 1e4
 """Largest number written without an exponent."""
 
 
 @contextlib.contextmanager
-def figure_style(width: float = WIDTH) -> Iterator[None]:
+def figure_style(width: float = FIGURE_WIDTH) -> Iterator[None]:
     """Apply the project's style, ignoring the user's matplotlib settings. Figures are `width` inches wide."""
     size = {"figure.figsize": (width, width)}
     with matplotlib.style.context(["default", RC, *([NARROW] if width < NARROW_BELOW else []), size]):
@@ -61,7 +61,7 @@ class ShownFigure(Figure):
 def blank(height: float) -> Figure:
     """Create a figure of the style's width. `height` (in) is for the default width and shrinks less than the width."""
     width = matplotlib.rcParams["figure.figsize"][0]
-    figure = ShownFigure(figsize=(width, height * (width / WIDTH) ** SHRINKS), layout="constrained")
+    figure = ShownFigure(figsize=(width, height * (width / FIGURE_WIDTH) ** SHRINKS), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -78,7 +78,7 @@ def label_of(words: str, unit: str) -> str:
 def label_ticks(axis: Axis) -> None:
     """Label as many decades of a logarithmic axis as fit, and values between them if the axis spans few."""
     least, last = axis.get_view_interval()
-    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, LONGEST)), ())
+    between = next((subs for span, subs in BETWEEN_DECADES if last < min(span * least, MAX_MINOR_SPAN)), ())
     axis.set_major_locator(LogLocator(subs=(1.0, *between)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter((lambda value, _place: f"{value:g}") if between else power_of_ten))

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
 from walkerlab.labels import axis_label
 from walkerlab.pipeline.store.content import Group
-from walkerlab.views.figures.canvas import add_legend, entry, is_narrow, label_of, panels
+from walkerlab.views.figures.canvas import add_legend, entry, figure_style, is_narrow, label_of, panels, settle
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.maps import Kind, draw_kinds
 from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
@@ -24,10 +25,30 @@ from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURP
 if TYPE_CHECKING:
     from matplotlib.typing import LineStyleType
 
-STAGE: Final = "continuation"
-NEED: Final = Need(STAGE, "branches", ("model", "period", "from", "to"), "no branch was found")
-MODELS: Final = {"rigid": BLUE, "contact": ORANGE}
-MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
+
+def draw_unit_circle(multipliers: Sequence[complex]) -> Figure:
+    """Draw a gait's multipliers and the unit circle, inside which all multipliers of a stable gait lie."""
+    with figure_style(4.0):
+        figure, axes = panels(4.0)
+        axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=GREY))
+        axes.axhline(color=GREY, linewidth=0.5)
+        axes.axvline(color=GREY, linewidth=0.5)
+        for multiplier in multipliers:
+            colour = BLUE if abs(multiplier) < 1.0 else VERMILLION
+            axes.plot(multiplier.real, multiplier.imag, "o", color=colour, markeredgecolor=BLACK)
+        extent = 1.1 * max(1.0, *map(abs, multipliers))
+        axes.set(
+            xlim=(-extent, extent), ylim=(-extent, extent), aspect="equal", xlabel="real part", ylabel="imaginary part"
+        )
+        axes.set_title(f"Multipliers; the largest has magnitude {max(map(abs, multipliers)):.3g}")
+        settle(figure)
+    return figure
+
+
+CONTINUATION_STAGE: Final = "continuation"
+NEED: Final = Need(CONTINUATION_STAGE, "branches", ("model", "period", "from", "to"), "no branch was found")
+MODEL_COLOURS: Final = {"rigid": BLUE, "contact": ORANGE}
+BIFURCATION_MARKS: Final = {"flip": ("o", VERMILLION), "fold": ("s", BLACK), "torus": ("D", PURPLE)}
 STYLES: Final[dict[bool, LineStyleType]] = {True: "-", False: (0.0, (2.2, 1.6))}
 FROM_FLIP: Final = 16  # points plotted between a flip and the first gait computed on the branch that starts there
 OTHER_GAITS: Final = GREEN
@@ -53,13 +74,13 @@ class DrawnBranch:
 
     @property
     def colour(self) -> str:
-        return OTHER_GAITS if self.is_other else MODELS[self.model]
+        return OTHER_GAITS if self.is_other else MODEL_COLOURS[self.model]
 
 
 def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]:
     """Yield the groups called `name` (branch or curve) of each model, in the order in which they were followed."""
-    groups = results[STAGE].groups
-    for model in MODELS:
+    groups = results[CONTINUATION_STAGE].groups
+    for model in MODEL_COLOURS:
         for number in count():
             if (group := groups.get(f"{model}/{name}_{number}")) is None:
                 break
@@ -68,7 +89,7 @@ def branches_of(results: Results, name: str = "branch") -> Iterator[DrawnBranch]
 
 def parameter_of(results: Results) -> str:
     """Return the axis label of the parameter, with its unit."""
-    summary = results[STAGE].summary
+    summary = results[CONTINUATION_STAGE].summary
     return label_of(axis_label(str(summary["over"])), str(summary["unit"]))
 
 
@@ -116,7 +137,7 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
         stretch = stretch_of(curve, begin, end)
         axes.plot(*stretch, color=branch.colour, linestyle=STYLES[stable], linewidth=thick, zorder=order)
     for place, kind in curve.marks:
-        marker, colour = MARKS[kind]
+        marker, colour = BIFURCATION_MARKS[kind]
         mark: dict[str, Any] = {"marker": marker, "markersize": 2.6, "color": colour, "markeredgewidth": 0.0}
         values = np.full(curve.quantity.shape[1], curve.value[place])
         axes.plot(values, curve.quantity[place], linestyle="none", **mark, zorder=6)
@@ -137,11 +158,11 @@ def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64],
 
 
 def clouds(results: Results) -> Iterator[tuple[str, Group]]:
-    found = ((model, results[STAGE].groups.get(f"{model}/attractor")) for model in MODELS)
+    found = ((model, results[CONTINUATION_STAGE].groups.get(f"{model}/attractor")) for model in MODEL_COLOURS)
     return ((model, group) for model, group in found if group is not None)
 
 
-QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
+ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "stance angle"}
 ROOM: Final = 0.06
 """Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
 MIN_PANEL_SPAN: Final = 0.05
@@ -154,7 +175,7 @@ POINTS_BETWEEN: Final = 16
 
 def draw_branches(results: Results) -> Drawn:
     """Plot step period and stance angle over the full range (left) and around the bifurcations, if any (right)."""
-    summary = results[STAGE].summary
+    summary = results[CONTINUATION_STAGE].summary
     branches = list(branches_of(results))
     settled = list(clouds(results))
     close = close_of(results)
@@ -166,7 +187,7 @@ def draw_branches(results: Results) -> Drawn:
         figure, both = panels(5.6, 2, len(parts), squeeze=False)
     births = births_in(branches, close) if close else []
     kinds: set[str] = set()
-    for row, (name, words) in zip(both, QUANTITIES.items(), strict=True):
+    for row, (name, words) in zip(both, ATTRACTOR_QUANTITIES.items(), strict=True):
         for axes, shown in zip(row, parts.values(), strict=True):
             for model, cloud in settled:
                 values = np.broadcast_to(cloud["value"][:, None], cloud[name].shape)
@@ -180,14 +201,14 @@ def draw_branches(results: Results) -> Drawn:
             axes.set_ylim(*bounds(results, name, shown))
     for axes, title in zip(both[0], parts, strict=True):
         axes.set_title(title if close else "")
-    models = {branch.model: MODELS[branch.model] for branch in branches}
+    models = {branch.model: MODEL_COLOURS[branch.model] for branch in branches}
     key: list[Artist] = [entry(f"{model} model", color=colour, linewidth=1.5) for model, colour in models.items()]
     if any(branch.is_other for branch in branches):
         key.append(entry("other gaits", color=OTHER_GAITS, linewidth=1.0))
     key.append(entry("unstable", color=BLACK, linewidth=0.9, linestyle=STYLES[False]))
     if settled:
         key.append(entry("attractor", color=BLACK, linestyle="none", marker=".", markersize=3))
-    marks = {kind: mark for kind, mark in MARKS.items() if kind in kinds}
+    marks = {kind: mark for kind, mark in BIFURCATION_MARKS.items() if kind in kinds}
     for kind, (marker, colour) in marks.items():
         key.append(entry(kind, color=colour, linestyle="none", marker=marker, markersize=4))
     add_legend(figure, key)
@@ -221,7 +242,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 def close_of(results: Results) -> tuple[float, float] | None:
     """Return the parameter range around the bifurcations and any attractor, or None if there are no bifurcations."""
-    summary = results[STAGE].summary
+    summary = results[CONTINUATION_STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]
     if not found:
         return None
@@ -307,14 +328,16 @@ def draw_multipliers(results: Results) -> Drawn:
     end = entry("largest parameter value", color=BLACK, linestyle="none", marker=">", markersize=4)
     add_legend(figure, [*key, end])
     found: dict[tuple[str, str], list[float]] = {}
-    for item in results[STAGE].summary["bifurcations"]:
+    for item in results[CONTINUATION_STAGE].summary["bifurcations"]:
         if item["period"] == shortest:
             found.setdefault((item["model"], item["kind"]), []).append(item["value"])
     bifurcations = {which: sorted(values) for which, values in found.items()}
     return figure, (bifurcations, largest if largest > FARTHEST else None)
 
 
-CURVES_NEED: Final = Need(STAGE, "curves", ("model", "period"), "no curves over two parameters (continuation.second)")
+CURVES_NEED: Final = Need(
+    CONTINUATION_STAGE, "curves", ("model", "period"), "no curves over two parameters (continuation.second)"
+)
 CURVE_COLOURS: Final = {"rigid": BLACK, "contact": ORANGE}
 CURVE_STYLES: Final[dict[str, LineStyleType]] = {"flip": "-", "fold": (0.0, (3.0, 1.5))}
 WIDTHS: Final = {1: 1.4, 2: 1.0}
@@ -326,7 +349,7 @@ OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 def draw_plane(results: Results) -> Drawn:
     """Colour the plane by attractor, and plot the bifurcation curves over it, styled by model, kind and period."""
     figure, axes = panels(4.4)
-    regions = results[STAGE].groups.get("rigid/regions")
+    regions = results[CONTINUATION_STAGE].groups.get("rigid/regions")
     key: list[Artist] = []
     shares = []
     if regions is not None:
@@ -344,7 +367,7 @@ def draw_plane(results: Results) -> Drawn:
     axes.set_xlabel(parameter_of(results))
     order = sorted(looks, key=lambda look: (list(CURVE_COLOURS).index(look[0]), look[1]))
     add_legend(figure, [*key, *(entry(f"{kind}s, {model} model", **looks[model, kind]) for model, kind in order)])
-    kinds = sorted({kind for _, kind in looks}, key=list(MARKS).index)
+    kinds = sorted({kind for _, kind in looks}, key=list(BIFURCATION_MARKS).index)
     return figure, (kinds, [model for model in CURVE_COLOURS if any(model == name for name, _ in looks)], shares)
 
 

@@ -7,31 +7,23 @@ from matplotlib.artist import Artist
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from walkerlab.labels import CONTACT_STAGE
 from walkerlab.physics.energy_channels import KNEE_STRIKES, LOSSES, SAMPLED
 from walkerlab.views.figures.canvas import add_legend, blank, entry, panels
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results
-from walkerlab.views.figures.style import BLACK, CONTACT, GREY, LEGS
-from walkerlab.views.figures.walks import (
-    CONTACT_STAGE,
-    NO_ENERGIES,
-    STEPS_TAKEN_CONTACT,
-    TRAJECTORY,
-    Array,
-    DrawnWalk,
-    line,
-    walk_of,
-)
+from walkerlab.views.figures.style import BLACK, CONTACT_LOOK, GREY, LEGS
+from walkerlab.views.figures.walks import NO_ENERGIES, STEPS_TAKEN_CONTACT, TRAJECTORY, Array, DrawnWalk, line, walk_of
 
-NORMAL = "normal_force_N"
+NORMAL_FORCE = "normal_force_N"
 FRICTION = "friction_force_N"
-FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL, FRICTION), "'forces' is not among the config's outputs")
+FORCES = Need(CONTACT_STAGE, TRAJECTORY, (NORMAL_FORCE, FRICTION), "'forces' is not among the config's outputs")
 TOTAL: Final = "total_energy_J"
 LOSS_STYLES: Final = {loss.variable: (loss.cause, loss.colour) for loss in SAMPLED.values()}
 DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
-STRIDES = 2
-STEPS = 40
+SHOWN_STRIDES = 2
+SHOWN_STEPS = 40
 """Number of strides in the force figure, few enough to tell impacts apart, and of steps in the loss figure."""
 OF_SAMPLES: Final = 0.99
 """Fraction of the loaded samples that the axis shows; impact forces, many times the weight, lie beyond it."""
@@ -42,10 +34,10 @@ NOTHING: Final = 1e-3
 def draw_forces(results: Results) -> Drawn:
     """Plot normal force and friction over time (left) and against each other, with the friction cone (right)."""
     result = results[CONTACT_STAGE]
-    whole = walk_of(result, CONTACT)
-    walk = whole.first_strides(STRIDES)
-    every = whole[NORMAL]
-    loads = walk[NORMAL]
+    whole = walk_of(result, CONTACT_LOOK)
+    walk = whole.first_strides(SHOWN_STRIDES)
+    every = whole[NORMAL_FORCE]
+    loads = walk[NORMAL_FORCE]
     pulls = walk[FRICTION]
     # upper limit of the normal-force axis (N)
     top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
@@ -74,7 +66,7 @@ def draw_forces(results: Results) -> Drawn:
         cone.plot(load[loaded], pull[loaded], linestyle="none", marker=".", markersize=1.6, color=look.colour, zorder=4)
     reach = 1.1 * max(float(np.abs(pulls[loads < top]).max()), 1e-9)
     wide = max(reach, 0.6 * steepest * top)
-    of_normal = walk.label("normal force", NORMAL)
+    of_normal = walk.label("normal force", NORMAL_FORCE)
     of_friction = walk.label("friction", FRICTION)
     end = (0.0, float(walk.time[-1]))
     normal.set(ylabel=of_normal, title="(a) normal force", xlim=end, ylim=(-0.03 * top, top))
@@ -87,7 +79,7 @@ def draw_forces(results: Results) -> Drawn:
     add_legend(figure, key)
     borne = every > 0.1 * float(np.median(every.max(axis=1)))
     ratio = float((np.abs(whole[FRICTION][borne]) / every[borne]).max()) if borne.any() else 0.0
-    return figure, (0 if walk is whole else STRIDES, ratio, every.max())
+    return figure, (0 if walk is whole else SHOWN_STRIDES, ratio, every.max())
 
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
@@ -103,9 +95,9 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
 
 def draw_losses(results: Results) -> Drawn:
     """Plot a stacked bar per step. The caption gives the mean loss (J) by cause, leaving out the first step."""
-    found = losses(walk_of(results[CONTACT_STAGE], CONTACT))
+    found = losses(walk_of(results[CONTACT_STAGE], CONTACT_LOOK))
     figure, axes = panels(2.9)
-    steps = np.arange(1, 1 + min(STEPS, next(iter(found.values())).size))
+    steps = np.arange(1, 1 + min(SHOWN_STEPS, next(iter(found.values())).size))
     below = np.zeros(steps.size)
     for (_, colour), lost in found.items():
         axes.bar(steps, lost[: steps.size], 0.7, below, color=colour)

@@ -1,6 +1,4 @@
-"""Figures of an identified walk: steps, residuals, trade-off of parameters, and the information in each measurement."""
-
-from __future__ import annotations
+"""Figures of an identification, and of a measurement plan."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,7 +14,7 @@ from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, entry, label_of, panels
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results
-from walkerlab.views.figures.style import BLACK, BLUE, GREY, ORANGE, PALE, VERMILLION
+from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, VERMILLION
 
 IDENTIFY_STAGE: Final = "identify"
 NO_MEASURED_STEPS: Final = "it has no steps"
@@ -157,14 +155,50 @@ def draw_worth(results: Results) -> Drawn:
     return figure, (axis_label(most), float(shares[most]))
 
 
-STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), NO_MEASURED_STEPS)
+MEASURED_STEPS = Need(IDENTIFY_STAGE, "steps", ("measured_step_period_s",), NO_MEASURED_STEPS)
+
+
+PANEL_INCHES: Final = 2.1
+MEASUREMENT_COLOURS: Final = (BLUE, ORANGE, GREEN, VERMILLION)
+
+
+def draw_errors(results: Results) -> Drawn:
+    """Plot the standard error of each parameter over the number of steps, a curve for each measurement and start."""
+    summary = results["plan"].summary
+    group = results["plan"].groups["errors"]
+    rows = summary["measurements"]
+    names = list(dict.fromkeys(row["measurement"] for row in rows))
+    first_start = rows[0]["start"]
+    entries = rows[0]["errors"]
+    figure, axes = panels(0.9 + PANEL_INCHES * len(entries), len(entries), sharex=True, squeeze=False)
+    for place, (panel, parameter) in enumerate(zip(axes[:, 0], entries, strict=True)):
+        for row, errors in zip(rows, group["standard_error"], strict=True):
+            style = "-" if row["start"] == first_start else "--"
+            colour = MEASUREMENT_COLOURS[names.index(row["measurement"])]
+            panel.loglog(group["steps"], errors[:, place], style, color=colour, marker=".", markersize=3.0)
+        if "wanted" in parameter:
+            panel.axhline(parameter["wanted"], color="black", linewidth=0.7, linestyle=":")
+        panel.set_ylabel(label_of(f"± {axis_label(parameter['key'])}", parameter["unit"]))
+    axes[-1, 0].set_xlabel("measured steps")
+    key = [entry(name, color=colour) for name, colour in zip(names, MEASUREMENT_COLOURS, strict=True)]
+    starts = [
+        entry(start, color="black", linestyle=style)
+        for start, style in zip((first_start, rows[-1]["start"]), ("-", "--"), strict=True)
+    ]
+    add_legend(figure, [*key, *starts])
+    return figure, (int(summary["max_steps"]), any("wanted" in parameter for parameter in entries))
+
+
 FIGURES: Final = (
-    Illustration("identified-steps", (STEPS,), draw_steps),
-    Illustration("identified-residuals", (STEPS,), draw_residuals),
+    Illustration("identified-steps", (MEASURED_STEPS,), draw_steps),
+    Illustration("identified-residuals", (MEASURED_STEPS,), draw_residuals),
     Illustration(
         "identified-trade-off",
         (Need(IDENTIFY_STAGE, "worst", ("moves",), "fewer than two combinations of parameters are determined"),),
         draw_trade_off,
     ),
-    Illustration("identified-worth", (STEPS,), draw_worth),
+    Illustration("identified-worth", (MEASURED_STEPS,), draw_worth),
+    Illustration(
+        "planned-errors", (Need("plan", "errors", ("standard_error",), "no errors were computed"),), draw_errors
+    ),
 )  # fmt: skip

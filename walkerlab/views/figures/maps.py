@@ -1,7 +1,5 @@
 """Maps of cells: figure 11 (starts that walk), figure 15 (basins of attraction), and the reliability of methods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
@@ -76,14 +74,17 @@ def axis_of(cells: Group, name: str) -> str:
     return label_of(variable.long_name, variable.units)
 
 
-SWING = "swing_factor"
-STANCE = "stance_factor"
+SWING_FACTOR = "swing_factor"
+STANCE_FACTOR = "stance_factor"
 MAP = Need(
-    TUNE_STAGE, "map", (SWING, STANCE, "outcome", "steps", "rigid_outcome", "rigid_steps"), "no walk was computed"
+    TUNE_STAGE,
+    "map",
+    (SWING_FACTOR, STANCE_FACTOR, "outcome", "steps", "rigid_outcome", "rigid_steps"),
+    "no walk was computed",
 )
 
-OUTCOMES: Final = discrete([OUTCOME_TEXTS[item].colour for item in Outcome])
-MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
+OUTCOME_COLOURS: Final = discrete([OUTCOME_TEXTS[item].colour for item in Outcome])
+TUNED_MODELS: Final = (("", "(a) contact model"), ("rigid_", "(b) rigid model"))
 STEP_LEVELS: Final = (0.5, 1.5, 2.5, 4.5)
 
 
@@ -91,24 +92,24 @@ def draw_starts(results: Results) -> Drawn:
     """Plot the starts for both models on equal axes, coloured by outcome, with contours of the number of steps."""
     cells = results[TUNE_STAGE]["map"]
     summary = results[TUNE_STAGE].summary
-    across = cells[SWING]
-    up = cells[STANCE]
+    across = cells[SWING_FACTOR]
+    up = cells[STANCE_FACTOR]
     marks: list[tuple[str, str, int, str, tuple[Any, Any]]] = [("rigid start", "o", 6, WHITE, (1.0, 1.0))]
     for name, marker, size, face in (("adjusted", "D", 9, "none"), ("gait", "X", 6, WHITE)):
-        place = cells.attrs.get(f"{name}_{SWING}"), cells.attrs.get(f"{name}_{STANCE}")
+        place = cells.attrs.get(f"{name}_{SWING_FACTOR}"), cells.attrs.get(f"{name}_{STANCE_FACTOR}")
         if None not in place:
             marks.append(("contact gait" if name == "gait" else "adjusted start", marker, size, face, place))
     figure, both = panels(3.9, 1, 2, sharex=True, sharey=True)
     swing, stance = ("link 1", "link 2") if redoes_the_procedure(results) else ("the swing leg", "the stance leg")
-    for axes, (model, title) in zip(both, MODELS, strict=True):
+    for axes, (model, title) in zip(both, TUNED_MODELS, strict=True):
         steps = cells[f"{model}steps"]
-        axes.pcolormesh(across, up, cells[f"{model}outcome"], **OUTCOMES, rasterized=True)
+        axes.pcolormesh(across, up, cells[f"{model}outcome"], **OUTCOME_COLOURS, rasterized=True)
         levels = [level for level in STEP_LEVELS if level < int(steps.max())]
         if levels and steps.min() < levels[-1]:
             axes.contour(across, up, steps, levels, colors=BLACK, linewidths=0.4)
         axes.set(title=title, xlabel=f"factor on the velocity of {swing}")
     both[0].set_ylabel(f"factor on the velocity of {stance}")
-    key = patches(ends_among([cells[f"{model}outcome"] for model, _ in MODELS]))
+    key = patches(ends_among([cells[f"{model}outcome"] for model, _ in TUNED_MODELS]))
     for label, marker, size, face, (x, y) in marks:
         mark: dict[str, Any] = {"linestyle": "", "marker": marker, "markersize": size, "color": BLACK}
         for axes in both:
@@ -123,7 +124,7 @@ def draw_starts(results: Results) -> Drawn:
 
 BASIN: Final = "basin"
 CELLS = Need(BASIN, "basin", ("outcome", "attractor", "steps_to_settle", "walking"), "no walk was computed")
-ATTRACTORS: Final = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION)
+ATTRACTOR_COLOURS: Final = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION)
 NO_ATTRACTOR: Final = -1
 
 
@@ -177,7 +178,7 @@ def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, 
     """Return the kinds of cells that occur: attractors, walks that do not settle, and failures."""
     attractors = summary["attractors"]
     kinds: list[Kind] = [
-        (ATTRACTORS[number % len(ATTRACTORS)], attractor_name(number, attractors), attractor == number)
+        (ATTRACTOR_COLOURS[number % len(ATTRACTOR_COLOURS)], attractor_name(number, attractors), attractor == number)
         for number in range(len(attractors))
     ]
     said = "aperiodic" if summary["aperiodic"] else "walks, not settled"
@@ -197,9 +198,9 @@ def attractor_name(number: int, attractors: list[dict[str, Any]]) -> str:
 
 
 MAPS: Final = "stability-maps"
-STIFFNESS = "stiffness"
+STIFFNESS_AXIS = "stiffness"
 VELOCITY = "stiction_velocity"
-STEP = "step_size"
+STEP_SIZE = "step_size"
 _LAW: Final = Contact().in_si()
 PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
 SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # error ranges of the colour scales: stiction map, step map
@@ -217,11 +218,13 @@ class OverStiffness:
 
     def __init__(self, cells: Group, up: str, titles: tuple[str, str]) -> None:
         self.cells = cells
-        self.edges = (edges(cells[STIFFNESS]), edges(cells[up]))
+        self.edges = (edges(cells[STIFFNESS_AXIS]), edges(cells[up]))
         self.figure, (self.left, self.right) = panels(3.9, 1, 2, sharex=True, sharey=True)
         xlim, ylim = (ends[[0, -1]] for ends in self.edges)
         for axes, title in ((self.left, titles[0]), (self.right, titles[1])):
-            axes.set(xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS), title=title, xlim=xlim, ylim=ylim)
+            axes.set(
+                xscale="log", yscale="log", xlabel=axis_of(cells, STIFFNESS_AXIS), title=title, xlim=xlim, ylim=ylim
+            )
             axes.xaxis.set_major_locator(LogLocator())
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_minor_locator(NullLocator())
@@ -248,7 +251,7 @@ def draw_stiction(results: Results) -> Drawn:
     made = OverStiffness(cells, VELOCITY, ("(a) outcome", "(b) difference at a ten times tighter tolerance"))
     outcomes = cells["outcome"]
     compared = cells["compared"] == 1
-    made.draw(made.left, outcomes, **OUTCOMES)
+    made.draw(made.left, outcomes, **OUTCOME_COLOURS)
     unanswered = np.isin(outcomes, [int(Outcome.BUDGET_EXHAUSTED), int(Outcome.SOLVER_FAILED)])
     otherwise = (VERMILLION, "(b) other outcome", ~compared & ~unanswered)
     made.draw_errors(compared, SHARP, [(BLACK, "", unanswered), otherwise])
@@ -264,7 +267,7 @@ def draw_step(results: Results) -> Drawn:
     """Plot verdicts (left) and errors (right) over stiffness and step size."""
     cells = results[MAPS]["step"]
     names = [item.partition(" ")[2] for item in str(cells.attrs["verdicts"]).split(", ")]
-    made = OverStiffness(cells, STEP, ("(a) outcome", "(b) error of the final state"))
+    made = OverStiffness(cells, STEP_SIZE, ("(a) outcome", "(b) error of the final state"))
     verdict = np.array(names, dtype=object)[cells["verdict"]]
     made.draw(made.left, cells["verdict"], **discrete([VERDICT_COLOURS[name] for name in names]))
     errors = ("fine", "wrong silently")
@@ -281,9 +284,9 @@ def draw_step(results: Results) -> Drawn:
 
 NOT_COMPUTED = "this map was not computed"
 STICTION_NEED = Need(
-    MAPS, "stiction", (STIFFNESS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NOT_COMPUTED
+    MAPS, "stiction", (STIFFNESS_AXIS, VELOCITY, "outcome", "sharper_outcome", "compared", "error"), NOT_COMPUTED
 )
-STEP_NEED = Need(MAPS, "step", (STIFFNESS, STEP, "verdict", "error"), NOT_COMPUTED)
+STEP_NEED = Need(MAPS, "step", (STIFFNESS_AXIS, STEP_SIZE, "verdict", "error"), NOT_COMPUTED)
 STABILITY = (
     Illustration("stability-stiction", (STICTION_NEED,), draw_stiction),
     Illustration("stability-step", (STEP_NEED,), draw_step),

@@ -13,27 +13,27 @@ from numpy.typing import NDArray
 
 from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, second_of
 from walkerlab.views.figures.canvas import blank, figure_style, files_of
-from walkerlab.views.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION, WIDTH
+from walkerlab.views.figures.style import BLACK, BLUE, FIGURE_WIDTH, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION
 
 AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
 Point = tuple[float, float]
 
-HEIGHT = 4.6
+FIGURE_HEIGHT = 4.6
 SMALL = 7.5
 """Nominal height of the figure (in) and font size of its labels (pt)."""
 SMALL_ARC = 0.02
 """Length (leg lengths) up to which a dimension has a label but no arrow, and a sole has no mark at its centre."""
-FAINT = "#C8C8C8"
+FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
 BEHIND = -0.3
-BENT = -0.75
+BENT_ANGLE = -0.75
 """Angles (rad) at which the second leg is drawn: of the whole leg or, with knees, its thigh; and of the shank."""
-BESIDE = 0.62
+LEFT_OF_LEG = 0.62
 FIRST_LANE = 0.24
 """Distances from the leg (leg lengths): of the labels behind it, and of the first dimension line ahead of it."""
 LETTER = 0.0088
-LINE = 0.0195
+LINE_SPACING = 0.0195
 """Width of a character and height of a line of text, as fractions of the picture's width."""
 CLEAR = 0.05
 """Minimum distance between the centres of labels in a lane, in leg lengths."""
@@ -148,7 +148,7 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     """
     legs = [measure_leg(each) for each in dict.fromkeys((walker, second_of(walker)))]
     views = [frame_leg(leg) for leg in legs]
-    heights = [WIDTH * (view.top - view.bottom) / view.width for view in views]
+    heights = [FIGURE_WIDTH * (view.top - view.bottom) / view.width for view in views]
     titles = len(legs) > 1
     figure = blank(sum(heights) + titles * len(legs) * TITLE)
     panels = figure.subplots(len(legs), 1, squeeze=False, height_ratios=heights)[:, 0]
@@ -179,10 +179,10 @@ def frame_leg(leg: UprightLeg) -> View:
     # text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length
     behind = letters([words for words, *_ in labels])
     ahead = [letters([dimension.label for dimension in lane]) for lane in lanes]
-    width = (BESIDE + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
-    width = max(width, (leg.top + 0.3 * length) * WIDTH / HEIGHT)
-    left = -BESIDE * length - LETTER * behind * width
-    sizes = [LINE * width * len(words.split("\n")) for words, *_ in labels]
+    width = (LEFT_OF_LEG + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
+    width = max(width, (leg.top + 0.3 * length) * FIGURE_WIDTH / FIGURE_HEIGHT)
+    left = -LEFT_OF_LEG * length - LETTER * behind * width
+    sizes = [LINE_SPACING * width * len(words.split("\n")) for words, *_ in labels]
     heights = spread([spot[1] for *_, spot in labels], sizes, 0.0)
     top = max(leg.top, *heights) + 0.1 * length
     return View(labels, heights, lanes, ahead, left, width, -0.16 * length, top)
@@ -202,10 +202,10 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
     # the other leg, behind and off the ground, with its knee bent if it has one
     second = [leg.joints[0]]
-    angles = (BEHIND, BENT)[: len(other.joints)]
+    angles = (BEHIND, BENT_ANGLE)[: len(other.joints)]
     for angle, above, below in zip(angles, other.joints, other.line[1:], strict=True):
         second.append(rotate(angle, above, below, second[-1]))
-    draw_leg(axes, second, rotate(angles[-1], other.joints[-1], other.centre, second[-2]), other.radius, FAINT)
+    draw_leg(axes, second, rotate(angles[-1], other.joints[-1], other.centre, second[-2]), other.radius, FAINT_GREY)
     draw_leg(axes, line, leg.centre, leg.radius, BLACK)
     axes.plot([0.0, 0.0], [length, leg.top], color=BLACK, linewidth=2.0)
     x = FIRST_LANE * length
@@ -218,8 +218,8 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
         if dimension.start[1] == dimension.end[1]:
             axes.plot(*np.transpose([dimension.start, dimension.end]), color=VERMILLION, linewidth=1.5)
     for (words, colour, spot), height in zip(view.labels, view.heights, strict=True):
-        axes.plot([-BESIDE * length, spot[0]], [height, spot[1]], color=colour, linewidth=0.5, zorder=1)
-        axes.text(-BESIDE * length, height, f"{words} ", color=colour, fontsize=SMALL, ha="right", va="center")
+        axes.plot([-LEFT_OF_LEG * length, spot[0]], [height, spot[1]], color=colour, linewidth=0.5, zorder=1)
+        axes.text(-LEFT_OF_LEG * length, height, f"{words} ", color=colour, fontsize=SMALL, ha="right", va="center")
     if leg.radius > SMALL_ARC * length:
         axes.plot(*leg.centre, marker="+", markersize=8, color=BLUE, zorder=5)
 
@@ -298,7 +298,7 @@ def draw_parts(walker: PartsWalker) -> Figure:
 
     alike = () if level_walker(walker, gravity=1.0).legs_differ else walker.legs[0]
     shown = [body for body in walker.bodies if body.name not in alike]
-    figure = blank(HEIGHT)
+    figure = blank(FIGURE_HEIGHT)
     for axes, body in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         axes.set(aspect="equal", title="\n".join([f"name: {body.name}", *mass_labels(body, "")]), xlabel="ahead (m)")
         axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=0)
@@ -313,10 +313,10 @@ def draw_parts(walker: PartsWalker) -> Figure:
         points = np.array([*bones, *(spot for *_, spot in marks)])
         (left, low), (_, high) = points.min(axis=0), points.max(axis=0)
         tall = PARTS_ROOM * max(high - low, 0.1 * walker.leg_length_m)
-        wide = tall * (WIDTH / len(shown) - 0.7) / (HEIGHT - 1.0)
+        wide = tall * (FIGURE_WIDTH / len(shown) - 0.7) / (FIGURE_HEIGHT - 1.0)
         low = 0.5 * (low + high - tall)
         axes.set(ylim=(low, low + tall), xlim=(left - 0.25 * wide, left + 0.75 * wide))
-        line = tall * 1.35 * SMALL * POINT / (HEIGHT - 1.0)
+        line = tall * 1.35 * SMALL * POINT / (FIGURE_HEIGHT - 1.0)
         heights = spread([spot[1] for *_, spot in marks], [line * len(words.split("\n")) for words, *_ in marks])
         for (words, colour, marker, spot), height in zip(marks, heights, strict=True):
             axes.plot(*spot, marker=marker, markersize=8, color=colour, linestyle="none", zorder=3)

@@ -1,16 +1,7 @@
 """All illustrations in display order: those with a number of the paper, then others, including those of extensions."""
 
 from walkerlab.extensions import extensions, load
-from walkerlab.views.figures import (
-    families,
-    ground,
-    identification,
-    maps,
-    measurement_plan,
-    robustness,
-    stick_diagram,
-    walks,
-)
+from walkerlab.views.figures import families, ground, identification, maps, robustness, stick_diagram, walks
 from walkerlab.views.figures.illustration import Illustration
 
 ADDED: tuple[Illustration, ...] = tuple(
@@ -21,7 +12,6 @@ FIGURES: tuple[Illustration, ...] = (
     *sorted((figure for figure in NUMBERED if figure.number is not None), key=lambda figure: figure.name),
     *ground.FIGURES,
     *identification.FIGURES,
-    *measurement_plan.FIGURES,
     *(figure for figure in ADDED if figure.number is None),
     *maps.STABILITY,
 )

@@ -1,7 +1,5 @@
 """Figures of robustness: 17 (over one parameter, from a sweep) and 18 (walks on rough ground)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import cycle
@@ -14,13 +12,13 @@ from numpy.typing import NDArray
 from walkerlab.labels import axis_label
 from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
-from walkerlab.views.figures.families import DASHES, MODELS
+from walkerlab.views.figures.families import DASHES, MODEL_COLOURS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.stick_diagram import FAINT, FULL, draw_postures, draw_slope, frame_view, sticks_of
+from walkerlab.views.figures.stick_diagram import FAINT_WIDTH, FULL, draw_postures, draw_slope, frame_view, sticks_of
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 Values = NDArray[np.float64]
-STAGE: Final = "robustness"
+ROBUSTNESS_STAGE: Final = "robustness"
 PANELS: Final[tuple[tuple[str, str, Callable[[Values], Values]], ...]] = (
     ("sensitivity norm (s/m)", "gaits.{}.gait_sensitivity_norm", lambda norm: norm),
     ("1 − largest multiplier", "gaits.{}.spectral_radius", lambda radius: 1.0 - radius),
@@ -46,8 +44,8 @@ MOST_ROWS: Final = 4
 """Maximum number of rows of a table at one point: two models, each with two legs."""
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
-BELOW = 1.7
-BESIDE = 0.4
+LOWER_PANEL_INCHES = 1.7
+AXIS_LABEL_INCHES = 0.4
 """Mean height of the panels below the walker, and width of the axis labels beside it (in)."""
 
 
@@ -76,14 +74,14 @@ def plot_over_parameter(group: Group, parameter: str, _results: Results) -> Draw
     figure, axes = panels(0.6 + PANEL_HEIGHT * len(PANELS), len(PANELS), sharex=True)
     for panel, (label, name, shown) in zip(axes, PANELS, strict=True):
         for model in models:
-            look: dict[str, Any] = {"color": MODELS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
+            look: dict[str, Any] = {"color": MODEL_COLOURS[model], "markersize": 2.6, "linewidth": 1.3, **LINES[model]}
             for place in (name, UP) if name.startswith("largest_step") else (name,):
                 for values in rows_of(group, place, model):
                     panel.plot(x, shown(values) if place == name else 1e3 * values, **look)
         panel.set_ylabel(label)
     axes[2].axhline(0.0, color=GREY, linewidth=0.7)
     axes[-1].set_xlabel(label_of(said, unit))
-    add_legend(figure, [entry(f"{model} model", color=MODELS[model], **LINES[model]) for model in models])
+    add_legend(figure, [entry(f"{model} model", color=MODEL_COLOURS[model], **LINES[model]) for model in models])
     norms = {model: rows_of(group, PANELS[0][1], model)[0] for model in models}
     best = {model: (x[np.nanargmin(norm)], np.nanmin(norm)) for model, norm in norms.items() if np.isfinite(norm).any()}
     return figure, (said, unit, best)
@@ -132,21 +130,23 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
 
 def plot_rough_ground(results: Results) -> Drawn:
     """Plot figure 18. The caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
-    result = results[STAGE]
+    result = results[ROBUSTNESS_STAGE]
     sticks = sticks_of(result, "rough_walk/")
     steps = result["rough_steps"]
     across = sticks.project(sticks.landings)[:, 0]
     seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)
     left, bottom, right, top = frame_view(sticks.project(seen).reshape(-1, 2), sticks.leg_length)
-    figure = blank(1.6 + 2.0 * BELOW)
-    tall = (figure.get_figwidth() - BESIDE) * (top - bottom) / (right - left)
+    figure = blank(1.6 + 2.0 * LOWER_PANEL_INCHES)
+    tall = (figure.get_figwidth() - AXIS_LABEL_INCHES) * (top - bottom) / (right - left)
     figure.set_figheight(figure.get_figheight() + tall)
-    walk, heights, share = figure.subplots(3, 1, height_ratios=[tall, 0.7 * BELOW, 1.3 * BELOW])
+    walk, heights, share = figure.subplots(
+        3, 1, height_ratios=[tall, 0.7 * LOWER_PANEL_INCHES, 1.3 * LOWER_PANEL_INCHES]
+    )
     walk.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", ylabel="height (m)")
     heights.sharex(walk)
     strikes = np.searchsorted(sticks.time, np.append(0.0, sticks.strikes))
     strikes = strikes[strikes < sticks.time.size]
-    draw_postures(walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), FAINT)
+    draw_postures(walk, sticks, np.linspace(0, sticks.time.size - 1, 5 * strikes.size).astype(np.int64), FAINT_WIDTH)
     draw_postures(walk, sticks, strikes, FULL)
     draw_slope(walk, sticks)
     heights.bar(across, 1e3 * sticks.landings[:, 1], 0.4 * np.diff(across).mean(), color=GREY)
@@ -155,7 +155,7 @@ def plot_rough_ground(results: Results) -> Drawn:
     draw_shares(share, steps)
     roughest = float(steps["roughness_m"].max())
     models = [str(model) for model in steps["model"]]
-    key = [entry(f"{model} model", color=MODELS[model]) for model in models]
+    key = [entry(f"{model} model", color=MODEL_COLOURS[model]) for model in models]
     dashed = zip(1e3 * steps["roughness_m"], cycle(DASHES), strict=False)
     key += [entry(f"{roughness:g} mm", color=BLACK, linestyle=dash) for roughness, dash in dashed]
     add_legend(figure, key)
@@ -171,16 +171,21 @@ def draw_shares(axes: Axes, steps: Group) -> None:
             going = 1.0 - np.arange(ended.size + 1) / walks.size
             at = np.concatenate(([1.0], ended, [min(walks.max(), last)]))
             share = np.append(going, going[-1])
-            axes.step(at, share, where="post", color=MODELS[str(model)], linestyle=dash)
+            axes.step(at, share, where="post", color=MODEL_COLOURS[str(model)], linestyle=dash)
     axes.set(xscale="log", xlabel="steps", ylabel="share still walking", ylim=(0.0, 1.02))
 
 
 FIGURE_18 = paper_figure(
     18,
     (
-        Need(STAGE, "rough_walk/trajectory", ("hip_along_m", "foot_along_m"), "no walk on rough ground was requested"),
-        Need(STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
-        Need(STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
+        Need(
+            ROBUSTNESS_STAGE,
+            "rough_walk/trajectory",
+            ("hip_along_m", "foot_along_m"),
+            "no walk on rough ground was requested",
+        ),
+        Need(ROBUSTNESS_STAGE, "rough_walk/steps", ("touch_along_m",), "the walk on rough ground takes no step"),
+        Need(ROBUSTNESS_STAGE, "rough_steps", ("steps",), "no walks on rough ground were requested"),
     ),
     plot_rough_ground,
 )

@@ -6,15 +6,14 @@ from pathlib import Path
 from walkerlab.config.reads import NamedConfig
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.store import artifact, index
+from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import make_folder, storing, write_atomically
+from walkerlab.pipeline.store.runs import FIGURES_FOLDER
 from walkerlab.scene.omissions import LeftOut
 from walkerlab.views.figures.illustration import Illustration
 from walkerlab.views.figures.registry import FIGURES
-
-FOLDER = "figures"
 
 
 def run(
@@ -32,7 +31,7 @@ def run(
     Raises StorageError if one cannot be stored.
     """
     finished = {} if early is None else {entry["svg"]: entry for entry in early.summary["figures"]}
-    make_folder(folder / FOLDER)
+    make_folder(folder / FIGURES_FOLDER)
     absent = {entry.what: entry.why for entry in left_out}
     reasons = [figure.why_left_out(inputs, absent) for figure in FIGURES]
     progress.start("plot", reasons.count(None))
@@ -52,7 +51,7 @@ def run(
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
     # some captions quote run times, which differ from run to run
     summary = {"figures": drawn, "left_out": missing}
-    return Content({index.GROUP: index.index(folder, files)}, summary, timed=("figures",))
+    return Content({artifact.FILES_GROUP: artifact.index_files(folder, files)}, summary, timed=("figures",))
 
 
 def draw(
@@ -75,7 +74,7 @@ def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
     """Draw the figures that need only `stage`, redrawing existing ones if `anew`, and return the paths of all SVG
     files.
     """
-    make_folder(folder / FOLDER)
+    make_folder(folder / FIGURES_FOLDER)
     results = {stage: artifact.read(folder / f"{stage}.h5")}
     figures = [figure for figure in FIGURES if figure.stages == (stage,) and figure.why_left_out(results, {}) is None]
     for figure in figures:
@@ -86,4 +85,4 @@ def draw_at_once(stage: str, folder: Path, anew: bool) -> list[Path]:
 
 def paths_of(name: str) -> dict[str, str]:
     """Return the paths of a figure's files by kind, relative to the run's folder."""
-    return {kind: f"{FOLDER}/{name}.{kind}" for kind in ("svg", "png")}
+    return {kind: f"{FIGURES_FOLDER}/{name}.{kind}" for kind in ("svg", "png")}

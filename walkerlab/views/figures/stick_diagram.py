@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
+from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.outcome import outcome_of
 from walkerlab.pipeline.store.artifact import Identified
 from walkerlab.pipeline.store.content import Group, Variable
@@ -24,11 +25,9 @@ from walkerlab.views.figures.canvas import add_legend, blank, entry, figure_styl
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
 from walkerlab.views.figures.style import BLACK, GREY, LEGS, PURPLE, VERMILLION
 from walkerlab.views.figures.walks import (
-    CONTACT_STAGE,
     JOINTS,
     NO_STATES,
-    RIGID_STAGE,
-    STATES,
+    STATE_VARIABLES,
     STEPS_TAKEN_CONTACT,
     STEPS_TAKEN_RIGID,
     TOUCHES,
@@ -40,7 +39,7 @@ CYCLE = 2
 """Steps per gait cycle."""
 POSTURES_BETWEEN = 5
 """Number of postures drawn between two heel strikes."""
-FAINT = 0.8
+FAINT_WIDTH = 0.8
 FULL = 2.2
 """Line widths (pt) of legs between heel strikes and at them."""
 HEADROOM = 0.19
@@ -54,7 +53,7 @@ SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
 UNDER = 0.36
-BESIDE = 0.7
+SIDE_INCHES = 0.7
 ABOVE = 1.05
 """Room (in) for landing times below the lowest foot, for axis labels at the side, and for the legend."""
 SHAPE = 0.68
@@ -191,13 +190,13 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     widen = max(0.0, 0.5 * ((top - bottom) / SHAPE - (right - left)))
     left, right = left - widen, right + widen
     figure = blank(0.0)
-    across = figure.get_figwidth() - BESIDE
+    across = figure.get_figwidth() - SIDE_INCHES
     lowest = sticks.project(seen)[..., 1].min()
     bottom = min(bottom, lowest - UNDER * (right - left) / across)
     figure.set_figheight(ABOVE + across * (top - bottom) / (right - left))
     axes = figure.add_subplot()
     axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
-    draw_postures(axes, sticks, between, FAINT)
+    draw_postures(axes, sticks, between, FAINT_WIDTH)
     draw_postures(axes, sticks, at_strikes, FULL)
     shown = slice(0, int(rows.max()) + 1)
     axes.plot(*sticks.project(sticks.hip[shown]).T, color=BLACK, linewidth=0.7, linestyle=":", zorder=2)
@@ -265,7 +264,7 @@ def entries(sticks: Sticks) -> list[Artist]:
     """Return the legend entries of the legs, the hip and any torso."""
     legs = [entry(look.label, **look.line | {"linewidth": 1.6}, marker=look.marker) for look in LEGS]
     strike = entry("at heel strike", color=GREY, linewidth=FULL)
-    between = entry("between", color=GREY, linewidth=FAINT)
+    between = entry("between", color=GREY, linewidth=FAINT_WIDTH)
     hip = entry("hip", color=BLACK, linewidth=0.7, linestyle=":", marker="o", markersize=4.0)
     torso = [] if sticks.head is None else [entry("torso", color=BLACK, linewidth=1.6)]
     return [*legs, strike, between, hip, *torso]
@@ -315,7 +314,9 @@ def draw_cycle(stage: str, results: Results) -> Drawn:
     return figure, (*caption_values, max(sticks.radii), result.identity.config_slice["contact"]["terrain"], pitch)
 
 
-FILM_NEEDS = {stage: Need(stage, TRAJECTORY, (*STATES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)}
+FILM_NEEDS = {
+    stage: Need(stage, TRAJECTORY, (*STATE_VARIABLES, *JOINTS), NO_STATES) for stage in (RIGID_STAGE, CONTACT_STAGE)
+}
 """Variables that an animation needs; a walk that ends in its first step can be animated too."""
 FIGURE_2, FIGURE_6 = (
     paper_figure(number, (FILM_NEEDS[stage], steps_taken), partial(draw_cycle, stage))

@@ -21,7 +21,7 @@ PURPLE: Final = "#CC79A7"
 GREY: Final = "#7F7F7F"
 PALE: Final = "#EDEDED"
 
-WIDTH: Final = 7.2
+FIGURE_WIDTH: Final = 7.2
 """Width of a figure on the page (in): two columns of a journal."""
 POINT: Final = 1.0 / 72.0
 """One point (in)."""
@@ -41,7 +41,7 @@ RC: Final = {
     "axes.titlepad": 4.0,
     "figure.constrained_layout.h_pad": 0.05,
     "figure.constrained_layout.w_pad": 0.05,
-    "figure.figsize": (WIDTH, WIDTH),
+    "figure.figsize": (FIGURE_WIDTH, FIGURE_WIDTH),
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 9.0,
@@ -88,8 +88,8 @@ class Look:
         return {"color": self.colour, "linestyle": self.style, "linewidth": self.width}
 
 
-RIGID: Final = Look("rigid model", BLUE, "-", 1.7, "o", order=3)
-CONTACT: Final = Look("contact model", ORANGE, (0.0, (3.2, 1.4)), 1.5, "^", order=4)
+RIGID_LOOK: Final = Look("rigid model", BLUE, "-", 1.7, "o", order=3)
+CONTACT_LOOK: Final = Look("contact model", ORANGE, (0.0, (3.2, 1.4)), 1.5, "^", order=4)
 RECORDED: Final = Look("recorded walk", GREEN, (0.0, (1.0, 1.0)), 1.5, "s", order=5)
 
 LEGS: Final = (

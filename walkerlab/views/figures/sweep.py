@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import cycle
 from typing import Any, Final
 
 import matplotlib
@@ -24,7 +25,7 @@ MAP_HEIGHT: Final = 2.9
 MAX_PANELS: Final = 4
 MAX_LINES: Final = 5
 """Maximum number of lines, one for each value of a second parameter; with more values a map is drawn."""
-DASHES: Final = ("-", "--", "-.")
+SWEEP_DASHES: Final = ("-", "--", "-.")
 STABILITY_BOUND: Final = "largest multiplier 1"
 MAX_SCATTERED: Final = 20_000
 """Maximum number of points plotted in a panel; if there are more, an even selection is plotted."""
@@ -34,7 +35,7 @@ PREFERRED: Final[tuple[str, ...]] = (
 )  # fmt: skip
 RADIUS: Final = "spectral_radius"
 MISSING: Final[dict[str, Any]] = {"color": VERMILLION, "marker": "|", "linestyle": "none", "markersize": 5.0}
-LABELS: Final = {RADIUS: "largest multiplier"}
+AXIS_LABELS: Final = {RADIUS: "largest multiplier"}
 
 
 def choose(group: Group, parameters: Sequence[str]) -> list[str]:
@@ -109,7 +110,7 @@ def name_in_text(group: Group, name: str) -> str:
 
 def label(group: Group, name: str) -> str:
     """Return the axis label of a variable, with its unit."""
-    return label_of(LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
+    return label_of(AXIS_LABELS.get(name, axis_label(name.rpartition(".")[2])), group.variables[name].units)
 
 
 def plot_scatter(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figure:
@@ -168,8 +169,10 @@ def lines(group: Group, parameters: Sequence[str], names: Sequence[str]) -> Figu
     across, few = sorted(parameters, key=lambda parameter: -group[parameter].size)
     x = numbers(group, across)
     values = group[few].tolist()
-    looks = [{"color": matplotlib.colormaps["viridis"](0.85 * shade), "linestyle": DASHES[place % len(DASHES)]}
-             for place, shade in enumerate(np.linspace(0.0, 1.0, len(values)))]  # fmt: skip
+    colours = matplotlib.colormaps["viridis"](0.85 * np.linspace(0.0, 1.0, len(values)))
+    looks = [
+        {"color": colour, "linestyle": dashes} for colour, dashes in zip(colours, cycle(SWEEP_DASHES), strict=False)
+    ]
     figure, axes = panels(0.8 + SWEEP_PANEL_HEIGHT * len(names), len(names), sharex=True, squeeze=False)
     for panel, name in zip(axes[:, 0], names, strict=True):
         found = group[name].astype(float)

@@ -1,7 +1,5 @@
 """Figures of both models' walks: 5, 7 and 10 (over time), 9 (limit cycles), and two runs overlaid."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import is_
@@ -14,22 +12,21 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.pipeline.headlines import claims
 from walkerlab.pipeline.store.content import Content, Group
 from walkerlab.views.figures.canvas import add_legend, entry, figure_style, files_of, label_of, panels
 from walkerlab.views.figures.illustration import Drawn, Need, Results, paper_figure
-from walkerlab.views.figures.style import BLUE, CONTACT, GREY, ORANGE, PALE, RECORDED, RIGID, Look
+from walkerlab.views.figures.style import BLUE, CONTACT_LOOK, GREY, ORANGE, PALE, RECORDED, RIGID_LOOK, Look
 
 Array = NDArray[np.float64]
 
-RIGID_STAGE = "simulate"
-CONTACT_STAGE = "contact-sim"
 COMPARE_STAGE = "compare"
 TUNE_STAGE = "tune"
 RECORDED_STAGE = "recorded-walk"
 TRAJECTORY = "trajectory"
 STEPS = "steps"
-STATES = ("time", "angle", "velocity", "stance_leg")
+STATE_VARIABLES = ("time", "angle", "velocity", "stance_leg")
 JOINTS = ("hip_along_m", "hip_height_m", "foot_along_m", "foot_height_m")
 ENERGIES = ("time", "kinetic_J", "potential_J", "mechanical_J")
 
@@ -38,7 +35,7 @@ NO_ENERGIES = "'energies' is not among the config's outputs"
 NO_STEP = "no step was completed"
 TOUCHES = "touch_time_s"
 
-RIGID_STATES = Need(RIGID_STAGE, TRAJECTORY, STATES, NO_STATES)
+RIGID_STATES = Need(RIGID_STAGE, TRAJECTORY, STATE_VARIABLES, NO_STATES)
 RIGID_ENERGIES = Need(RIGID_STAGE, TRAJECTORY, ENERGIES, NO_ENERGIES)
 STEPS_TAKEN_RIGID, STEPS_TAKEN_CONTACT = (
     Need(stage, STEPS, (TOUCHES, "touch_along_m"), NO_STEP) for stage in (RIGID_STAGE, CONTACT_STAGE)
@@ -76,7 +73,7 @@ class DrawnWalk:
     def label(self, words: str, name: str) -> str:
         return label_of(words, self.samples.variables[name].units)
 
-    def first_strides(self, strides: int) -> DrawnWalk:
+    def first_strides(self, strides: int) -> "DrawnWalk":
         strikes = self.strikes[: 2 * strides]
         if strikes.size == self.strikes.size:
             return self
@@ -86,7 +83,7 @@ class DrawnWalk:
 
 def walks_with(results: Results, names: tuple[str, ...]) -> list[DrawnWalk]:
     """Return the walks whose trajectories have the given variables, the rigid model's walk first."""
-    every = ((RIGID_STAGE, RIGID), (CONTACT_STAGE, CONTACT), (RECORDED_STAGE, RECORDED))
+    every = ((RIGID_STAGE, RIGID_LOOK), (CONTACT_STAGE, CONTACT_LOOK), (RECORDED_STAGE, RECORDED))
     there = [(stage, look) for stage, look in every if not Need(stage, TRAJECTORY, names, "").missing_in(results, {})]
     return [walk_of(results[stage], look) for stage, look in there]
 
@@ -170,7 +167,7 @@ def draw_adjusted(results: Results) -> Drawn:
     named = redoes_the_procedure(results)
     outcome = str(result.summary["procedure"]["adjusted"]["outcome"])
     whole = []
-    for group, look, end in (("rigid_start", RIGID, "walked"), ("adjusted", CONTACT, outcome)):
+    for group, look, end in (("rigid_start", RIGID_LOOK, "walked"), ("adjusted", CONTACT_LOOK, outcome)):
         times = touch_times(result[group])
         whole.append(DrawnWalk(look, end, times.size, times, result[group]))
     walks, extent = first_strides(whole)
@@ -191,7 +188,7 @@ STATES_IN_TIME = (
 
 def draw_states(results: Results) -> Drawn:
     """Plot each leg's angle and angular velocity, a row each, shaded while the leg is in stance."""
-    walks, extent = first_strides(walks_with(results, STATES))
+    walks, extent = first_strides(walks_with(results, STATE_VARIABLES))
     first = walks[0]
     figure, axes = plot_over_time(walks, 1.55, STATES_IN_TIME)
     for panel, (_, _, leg, _) in zip(axes, STATES_IN_TIME, strict=True):
@@ -214,7 +211,7 @@ ARROW_LENGTH = 0.06
 
 def draw_cycles(results: Results) -> Drawn:
     """Plot a phase plane for each leg on equal scales. The caption gives the strides shown and how the walks ended."""
-    walks, extent = first_strides(walks_with(results, STATES), CYCLES)
+    walks, extent = first_strides(walks_with(results, STATE_VARIABLES), CYCLES)
     figure, axes = panels(4.2, 1, 2, sharex=True, sharey=True)
     for leg, panel in enumerate(axes):
         for walk in walks:
@@ -273,7 +270,7 @@ ENERGIES_IN_TIME = (
 )
 SMALLEST_SPAN = 0.005
 """Minimum span of the mechanical-energy axis relative to the energy: a constant must look constant."""
-MARGIN = 0.08
+RANGE_MARGIN = 0.08
 TRIMMED_SHARE = 0.005
 """Fraction of the samples at each end of the range that do not set the scale, because they lie inside impacts."""
 
@@ -286,7 +283,7 @@ def draw_energies(results: Results) -> Drawn:
     bottom = float(ends[:, 0].min())
     top = float(ends[:, 1].max())
     lacking = max(0.0, SMALLEST_SPAN * max(abs(bottom), abs(top)) - (top - bottom))
-    room = 0.5 * lacking + MARGIN * (top - bottom)
+    room = 0.5 * lacking + RANGE_MARGIN * (top - bottom)
     axes[-1].set_ylim(bottom - room, top + room)
     legend(figure, walks)
     means = []
@@ -295,7 +292,7 @@ def draw_energies(results: Results) -> Drawn:
         durations = np.diff(walk.time)
         integral = np.sum(0.5 * (energy[1:] + energy[:-1]) * durations)
         means.append((walk.look.label, integral / durations.sum() if durations.any() else energy[0]))
-    impacts = any(walk.look is CONTACT for walk in walks)
+    impacts = any(walk.look is CONTACT_LOOK for walk in walks)
     asked = results[RIGID_STAGE].identity.config_slice
     driven = any((asked["push_off"]["impulse_N_s"], *asked["walker"]["hip"].values()))
     return figure, (extent, means, bool(claims_in(results)), impacts, driven, walks)

@@ -16,11 +16,19 @@ from walkerlab.labels import join_words, unit_by_name
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.report import gaits
 from walkerlab.views.report.numbers import count, decimals_left, fixed, length, number, quantity
-from walkerlab.views.report.outcomes import MODEL_NAMES, WALKED_LABEL, describe_error, describe_limp, legs_differ
-from walkerlab.views.report.outcomes import walks as walk_text
-from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table, table_lines
-from walkerlab.views.report.text import describe_summary, paragraph
-from walkerlab.views.report.words import words
+from walkerlab.views.report.tables import (
+    Cell,
+    Column,
+    Table,
+    describe_summary,
+    measured,
+    paragraph,
+    side_by_side,
+    table,
+    table_lines,
+)
+from walkerlab.views.report.words import MODEL_NAMES, WALKED_LABEL, describe_error, describe_limp, legs_differ, words
+from walkerlab.views.report.words import walks as walk_text
 
 Summary = Mapping[str, Any]
 Answer = Callable[[Summary], Sequence[str | Table]]
@@ -277,9 +285,9 @@ def identified_walker(summary: Summary) -> list[str | Table]:
 
 
 def measurements_to_make(summary: Summary) -> list[str | Table]:
-    from walkerlab.views.report.sections import plan
+    from walkerlab.views.report.sections import identification
 
-    return [*plan.findings(summary), *plan.tables(summary)]
+    return [*identification.plan_findings(summary), *identification.plan_tables(summary)]
 
 
 def engines(summary: Summary) -> list[str | Table]:

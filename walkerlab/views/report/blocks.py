@@ -1,14 +1,19 @@
-"""Building blocks of a section. Texts are plain, and the templates turn them into HTML."""
+"""Blocks and sections of the page, and the stored results that sections are made from."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import wraps
+from typing import Any, ClassVar, Literal
 
 from markupsafe import Markup
 
+from walkerlab.config.schema import Config
+from walkerlab.pipeline.headlines import claims
+from walkerlab.pipeline.store.content import Content, Group
+from walkerlab.scene.omissions import LeftOut
 from walkerlab.views.report.tables import Table, Tone
 from walkerlab.views.report.tracks import Track
 
@@ -218,3 +223,56 @@ class Section:
         """Create a section of the blocks that are not empty, or return None if all are empty."""
         filled = tuple(block for block in blocks if block)
         return cls(anchor, title, filled, finding, page) if filled else None
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """Results of a run and what is missing, as used by the report."""
+
+    config: Config
+    stored: Mapping[str, Content] = field(default_factory=dict)  # up-to-date results by stage
+    pictures: tuple[Picture, ...] = ()  # embedded figures of `plot`
+    absent: tuple[LeftOut, ...] = ()  # missing results, with reasons
+    pending: tuple[LeftOut, ...] = ()  # results still being computed, or not yet when the command was stopped
+    failed: frozenset[str] = frozenset()  # stages that were run and failed
+
+    @property
+    def departures(self) -> Sequence[str] | None:
+        """Differences between this scene and that of the paper: none if both are equal, None if they were
+        not compared.
+        """
+        departures: Sequence[str] | None = self.summary("compare").get("departures")
+        return departures
+
+    @property
+    def claims(self) -> Sequence[Mapping[str, Any]]:
+        """Values claimed by a study for this scene, with verdicts. It is empty for other scenes."""
+        return claims(self.summary("compare"))
+
+    def summary(self, stage: str) -> Mapping[str, Any]:
+        """Return the summary of a stage's result, or an empty one if there is no result."""
+        return self.stored[stage].summary if stage in self.stored else {}
+
+    def group(self, stage: str, path: str) -> Group | None:
+        """Return a group of a stage's result, or None if it does not exist."""
+        result = self.stored.get(stage)
+        return None if result is None else result.groups.get(path)
+
+
+SectionMaker = Callable[[Results], Section | None]
+
+
+def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
+    """Pass a stage's summary to the decorated function. There is no section if the summary is empty or lacks the key
+    `needed`.
+    """
+
+    def section_of(make: Callable[..., Section | None]) -> SectionMaker:
+        @wraps(make)
+        def section(results: Results) -> Section | None:
+            summary = results.summary(stage)
+            return make(results, summary) if (summary.get(needed) if needed else summary) else None
+
+        return section
+
+    return section_of

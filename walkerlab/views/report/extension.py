@@ -1,7 +1,5 @@
 """Figures and page as stages, after all others."""
 
-from __future__ import annotations
-
 from walkerlab.config import reads
 from walkerlab.extensions import INTERFACE, Extension
 from walkerlab.pipeline.plan.stage import STRIDES, WALKED, Stage, walks_and

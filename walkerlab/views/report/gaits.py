@@ -1,4 +1,4 @@
-"""Table of a gait's fixed point, multipliers and step quantities, for pages and the terminal."""
+"""Gaits: their values and multipliers, and the section that lists all gaits found."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -6,15 +6,25 @@ from functools import partial
 from typing import Any
 
 from walkerlab.labels import add_unit, unit_by_name
-from walkerlab.views.report.numbers import MINUS, NONE, drop_rounding, fixed, number, power_of_ten
-from walkerlab.views.report.outcomes import legs_differ
-from walkerlab.views.report.symbols import DOT, SUBSCRIPTS, typeset
-from walkerlab.views.report.tables import Column, Table, measured, side_by_side
+from walkerlab.views.report.blocks import Paragraph, Results, Section, stage_section
+from walkerlab.views.report.numbers import (
+    DOT,
+    MINUS,
+    NONE,
+    SUBSCRIPTS,
+    drop_rounding,
+    fixed,
+    number,
+    power_of_ten,
+    typeset,
+)
+from walkerlab.views.report.tables import Column, Table, measured, side_by_side, table
+from walkerlab.views.report.words import legs_differ, words
 
 COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body>[a-z]\w*))?")
 COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 """Coordinates of a compass; results of other walkers store the names of their coordinates."""
-ROLES = {"1": "swing", "2": "stance"}
+LEG_ROLES = {"1": "swing", "2": "stance"}
 """What each leg does in the step that begins in a gait's state."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """Sets of equations: stored name and display name."""
@@ -107,7 +117,7 @@ def coordinate(name: str) -> str:
     """Label a coordinate just after heel strike: 'theta_1' is 'θ₁, swing leg (rad)'."""
     unit = "rad/s" if name.startswith("d") else "rad"
     match = COORDINATE_NAME.fullmatch(name)
-    role = ROLES.get(match["index"] or "") if match else None
+    role = LEG_ROLES.get(match["index"] or "") if match else None
     if match is None or role is None:
         return f"{symbol(name)} ({unit})"
     letter, _, _ = symbol(name).partition(",")
@@ -135,3 +145,39 @@ def complex_number(real: float, imaginary: float) -> str:
     if imaginary == 0:
         return fixed(real, 4)
     return f"{fixed(real, 4)} {'+' if imaginary > 0 else MINUS} {fixed(abs(imaginary), 4)}i"
+
+
+@stage_section("fixedpoint")
+def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
+    names = summary.get("state_names", COMPASS_STATE)
+    set_names = SETS if results.claims else (summary["equations"],)
+    sets = summary.get("equation_sets", {summary.get("equations"): summary})
+    selected = {name: sets[name] for name in set_names if name in sets}
+    gaits = {name: gait for name, gait in selected.items() if gait.get("state")}
+    every = {name: gait["gaits"] for name, gait in selected.items() if gait.get("gaits")}
+    blocks = (
+        Paragraph(words("gait.disturbances", summary)),
+        gait_table(gaits, names, note=words("gait.equations") if len(gaits) > 1 else "") if gaits else None,
+        every_gait(every, names) if any(len(gait) > 1 for gait in every.values()) else None,
+    )
+    return Section.of("gait", "The gait", blocks, words("gait.finding", summary))
+
+
+def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:
+    """Tabulate all gaits by set of equations. A remark marks the chosen one or says why a gait is unphysical."""
+    four = partial(fixed, decimals=4)
+    five = partial(fixed, decimals=5)
+    columns = (
+        Column("gait", "gait", numeric=True),
+        measured("T", "period_s", five),
+        measured("S", "step_length_m", five),
+        *(Column(symbol(name), partial(state_at, place), four, numeric=True) for place, name in enumerate(names)),
+        Column("spectral radius", "spectral_radius", four, numeric=True),
+        Column("stable", "stable"),
+        Column("remark", lambda gait: "chosen" if gait["chosen"] else gait["objection"]),
+    )
+    alone = list(sets) == ["corrected"]
+    numbered = {name: [{**gait, "gait": place} for place, gait in enumerate(found, 1)] for name, found in sets.items()}
+    gaits = {"" if alone else SETS[name]: found for name, found in numbered.items()}
+    differ = any(legs_differ(gait) for found in sets.values() for gait in found)
+    return table(f"All {'gaits of one stride' if differ else 'one-step gaits'} found", columns, gaits)

@@ -11,20 +11,16 @@ from walkerlab.config.files import DEFAULT
 from walkerlab.config.schema import Config
 from walkerlab.config.walkers import is_passive_compass, why_rigid_alone
 from walkerlab.extensions import extensions, load
-from walkerlab.views.report.blocks import MAIN, Section
+from walkerlab.views.report import gaits
+from walkerlab.views.report.blocks import MAIN, Results, Section, SectionMaker
 from walkerlab.views.report.page import Page
-from walkerlab.views.report.results import Results, SectionMaker
 from walkerlab.views.report.sections import (
     accuracy,
     adjustment,
     closing,
     families,
-    gaits,
     identification,
-    models,
     motion,
-    plan,
-    provenance,
     robustness,
     verdict,
     walks,
@@ -53,15 +49,15 @@ SECTIONS: tuple[SectionMaker, ...] = (
     families.basin,
     robustness.section,
     identification.section,
-    plan.section,
-    models.section,
+    identification.plan_section,
+    verdict.models_section,
     *added("evidence"),
     accuracy.section,
     *added("benchmarks"),
     adjustment.limit,
     closing.glossary,
     closing.omissions_section,
-    provenance.section,
+    closing.provenance_section,
 )
 
 

@@ -7,16 +7,14 @@ from pathlib import Path
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.store import index
+from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.files import storing, write_atomically
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
-from walkerlab.views.report.blocks import MAIN
-from walkerlab.views.report.page import Page, render
-from walkerlab.views.report.pictures import pictures
+from walkerlab.views.report.blocks import MAIN, Results
+from walkerlab.views.report.page import Page, pictures, render
 from walkerlab.views.report.registry import pages_of
-from walkerlab.views.report.results import Results
 from walkerlab.views.report.sections.closing import TITLES
 from walkerlab.views.report.tables import Table
 
@@ -37,7 +35,7 @@ def run(
     progress.advance()
     blocks = (block for page in written for section in page.sections for block in section.blocks)
     return Content(
-        {index.GROUP: index.index(folder, [folder / page.file for page in written])},
+        {artifact.FILES_GROUP: artifact.index_files(folder, [folder / page.file for page in written])},
         {
             "html": MAIN,
             "pages": [page.file for page in written],

@@ -8,7 +8,7 @@ from walkerlab.errors import ConfigError
 from walkerlab.pipeline.headlines import HEADLINES
 from walkerlab.pipeline.store.content import Group
 from walkerlab.pipeline.store.files import make_folder, write_atomically
-from walkerlab.pipeline.store.runfolder import RunFolder
+from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.pipeline.sweeps.question import SweptStage
 from walkerlab.pipeline.sweeps.sweep import Swept
 from walkerlab.views.figures import robustness
@@ -17,8 +17,7 @@ from walkerlab.views.figures.stage import paths_of
 from walkerlab.views.figures.sweep import choose, illustration, is_number
 from walkerlab.views.report.blocks import Gallery, Picture, Section
 from walkerlab.views.report.numbers import number
-from walkerlab.views.report.page import Page, render
-from walkerlab.views.report.pictures import picture
+from walkerlab.views.report.page import Page, picture, render
 from walkerlab.views.report.tables import Column, table
 from walkerlab.views.report.words import words
 

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from walkerlab.views.report.symbols import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
+from walkerlab.views.report.numbers import DOT, LETTERS, SUBSCRIPTS, SUPERSCRIPTS
 from walkerlab.views.report.tables import Table, flatten
 
 COLUMN_DIGITS: Final = 5

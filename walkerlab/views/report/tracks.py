@@ -1,7 +1,5 @@
 """Motion data for the page's player: joints, ground forces, slip and energies, thinned in time."""
 
-from __future__ import annotations
-
 import base64
 import math
 from dataclasses import dataclass
@@ -46,12 +44,12 @@ class Track:
     def end(self) -> float:
         return float(self["t"][-1])
 
-    def cut(self, time: float) -> Track:
+    def cut(self, time: float) -> "Track":
         """Return the part up to a time (s)."""
         inside = self["t"] <= time + 1e-9
         return Track({name: values[inside] for name, values in self.channels.items()})
 
-    def thin(self, gap: float) -> Track:
+    def thin(self, gap: float) -> "Track":
         """Keep the first and the most loaded sample of each interval of `gap` s, and both sides of every jump."""
         time = self["t"]
         bins = np.floor(time / gap).astype(np.int64)

@@ -6,9 +6,8 @@ from typing import Any
 
 from walkerlab.evidence.benchmarks.engines import rows as engines
 from walkerlab.evidence.benchmarks.engines.rows import OWN_LAW, SAME_LAW
-from walkerlab.views.report.blocks import Paragraph, Section, Statement, Statements
+from walkerlab.views.report.blocks import Paragraph, Results, Section, Statement, Statements, stage_section
 from walkerlab.views.report.numbers import NONE, fixed, number, power_of_ten
-from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, grouped, measured, table
 from walkerlab.views.report.words import words
 

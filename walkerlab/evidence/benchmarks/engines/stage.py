@@ -26,8 +26,7 @@ from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.labels import labels_of
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
-from walkerlab.pipeline.store.columns import rows_group
-from walkerlab.pipeline.store.content import Content
+from walkerlab.pipeline.store.content import Content, rows_group
 
 RATIO_LEVELS = (1e-3, 1e-5)
 THREE_DIGITS = 5e-4  # relative error

@@ -6,9 +6,18 @@ from typing import Any
 
 from walkerlab.labels import join_words
 from walkerlab.outcome import Outcome
-from walkerlab.views.report.blocks import COSTS, Gallery, PageBlock, Paragraph, Section, Statement, Statements
+from walkerlab.views.report.blocks import (
+    COSTS,
+    Gallery,
+    PageBlock,
+    Paragraph,
+    Results,
+    Section,
+    Statement,
+    Statements,
+    stage_section,
+)
 from walkerlab.views.report.numbers import NONE, format_integer, number, power_of_ten
-from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.views.report.words import words
 

@@ -5,14 +5,11 @@ from functools import partial
 from typing import Any
 
 from walkerlab.labels import join_words
-from walkerlab.views.report.blocks import COSTS, Paragraph, Section
+from walkerlab.views.report.blocks import COSTS, Paragraph, Results, Section, stage_section
 from walkerlab.views.report.gaits import symbol, works
-from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity
-from walkerlab.views.report.outcomes import tone
-from walkerlab.views.report.results import Results, stage_section
-from walkerlab.views.report.symbols import typeset
+from walkerlab.views.report.numbers import NONE, fixed, length, number, quantity, typeset
 from walkerlab.views.report.tables import Cell, Column, Table, measured, side_by_side, table
-from walkerlab.views.report.words import words
+from walkerlab.views.report.words import tone, words
 
 Summary = Mapping[str, Any]
 

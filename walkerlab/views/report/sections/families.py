@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from walkerlab.labels import add_unit, axis_label
 from walkerlab.pipeline.store.content import Group
-from walkerlab.views.report.blocks import Diagram, GaitMark, Paragraph, Section, Walker
+from walkerlab.views.report.blocks import Diagram, GaitMark, Paragraph, Results, Section, Walker, stage_section
 from walkerlab.views.report.gaits import complex_number
 from walkerlab.views.report.numbers import format_integer, number
-from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.tracks import sampling_gap, track_in
 from walkerlab.views.report.words import words

@@ -1,13 +1,12 @@
-"""The parameters identified from a measured walk."""
+"""Parameters identified from a measured walk, and measurements that would determine them."""
 
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from walkerlab.labels import add_unit, axis_label, join_words, unit_by_name
-from walkerlab.views.report.blocks import PageBlock, Paragraph, Section
-from walkerlab.views.report.numbers import fixed, number, quantity
-from walkerlab.views.report.results import Results, stage_section
+from walkerlab.views.report.blocks import PageBlock, Paragraph, Results, Section, stage_section
+from walkerlab.views.report.numbers import fixed, format_integer, number, quantity
 from walkerlab.views.report.sections import motion
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
@@ -17,7 +16,7 @@ NO_EFFECT = 1e-6
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
 NOTABLE_CHANGE = 0.5  # of an estimate, in standard errors, if a fixed parameter is 1 % larger
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
-REFERENCES = {"time_offset_s": " from the first heel strike"}
+TIME_ORIGINS = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
     "step_length_m": "steps of {}",
     "period_s": "a period of {}",
@@ -195,7 +194,7 @@ def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str,
 def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     return capitalised(
         join_words(
-            f"the {axis_label(name)}{REFERENCES.get(name, '')} is "
+            f"the {axis_label(name)}{TIME_ORIGINS.get(name, '')} is "
             f"{value_and_error(row['value'], row['standard_error'], unit_by_name(name))}"
             for name, row in nuisances.items()
         )
@@ -235,3 +234,61 @@ def noise_in_words(summary: Mapping[str, Any]) -> str:
 
 def capitalised(sentence: str) -> str:
     return sentence[:1].upper() + sentence[1:]
+
+
+@stage_section("plan", "measurements")
+def plan_section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
+    first, *rest = plan_findings(summary)
+    return Section.of("plan", "Measurements to make", (Paragraph(" ".join(rest)), *plan_tables(summary)), first)
+
+
+def plan_findings(summary: Mapping[str, Any]) -> list[str]:
+    """Return the answer in sentences: the simplest measurement, the steps for each target error, the assumptions."""
+    return words.parts("plan.findings", summary, [goal for goal in goals(summary) if goal])
+
+
+def goals(summary: Mapping[str, Any]) -> list[str]:
+    """Return a sentence for each target error, with the fewest steps that reach it."""
+    rows = summary["measurements"]
+    return [
+        goal(rows, place, summary["max_steps"]) for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry
+    ]
+
+
+def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
+    entry = rows[0]["errors"][place]
+    unit = UNITS_IN_WORDS.get(entry["unit"], f" {entry['unit']}")
+    wanted = f"{axis_label(entry['key'])} to ± {number(entry['wanted'])}{unit}"
+    reached = [row for row in rows if row["errors"][place]["steps_needed"]]
+    if not reached:
+        return f"The {wanted}: {format_integer(most)} steps do not suffice."
+    best = min(reached, key=lambda row: row["errors"][place]["steps_needed"])
+    needed = best["errors"][place]["steps_needed"]
+    steps = "1 step" if needed == 1 else f"{format_integer(needed)} steps"
+    return f"The {wanted}: {steps} of {best['measurement']}, {best['start']}."
+
+
+def plan_tables(summary: Mapping[str, Any]) -> list[Table]:
+    entries = summary["measurements"][0]["errors"]
+    columns = [Column("measurement", "measurement"), Column("start", "start")]
+    for place, entry in enumerate(entries):
+        columns.append(Column(f"± {axis_label(entry['key'])} ({entry['unit']})", error_of(place), numeric=True))
+        if "wanted" in entry:
+            columns.append(Column(f"steps for ± {number(entry['wanted'])}", steps_of(place), numeric=True))
+    return [table(f"Standard errors after {summary['steps']} steps", columns, summary["measurements"])]
+
+
+def error_of(place: int) -> Any:
+    def text(row: Mapping[str, Any]) -> str:
+        error = row["errors"][place]["standard_error"]
+        return "open" if error is None else number(error, 2)
+
+    return text
+
+
+def steps_of(place: int) -> Any:
+    def text(row: Mapping[str, Any]) -> str:
+        needed = row["errors"][place]["steps_needed"]
+        return "" if needed is None else format_integer(needed)
+
+    return text

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.pipeline.store.footholds import ground_levels
-from walkerlab.views.report.blocks import MAIN, Gallery, Pad, Paragraph, Player, Section, Walker
-from walkerlab.views.report.outcomes import CONTACT_STAGE, MODEL_NAMES, RIGID_STAGE, WALKED_LABEL, ends
-from walkerlab.views.report.results import Results
+from walkerlab.views.report.blocks import MAIN, Gallery, Pad, Paragraph, Player, Results, Section, Walker
 from walkerlab.views.report.tracks import Array, Track, sampling_gap, track_in
-from walkerlab.views.report.words import words
+from walkerlab.views.report.words import MODEL_NAMES, WALKED_LABEL, ends, words
 
 MAX_SHOWN_STEPS = 10
 WALKER_STYLES = {RIGID_STAGE: "rigid", CONTACT_STAGE: "contact"}

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from walkerlab.views.report.blocks import Paragraph, Section
+from walkerlab.views.report.blocks import Paragraph, Results, Section, stage_section
 from walkerlab.views.report.numbers import format_integer, length, number
-from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Column, Table, table
 from walkerlab.views.report.words import words
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from itertools import zip_longest
 from typing import Any
 
-from walkerlab.labels import ERROR_OF_EACH_STEP
+from walkerlab.labels import CONTACT_STAGE, ERROR_OF_EACH_STEP, RIGID_STAGE
 from walkerlab.physics.energy_channels import CHANNELS
-from walkerlab.views.report.blocks import Paragraph, Section
+from walkerlab.views.report.blocks import Paragraph, Results, Section, stage_section
 from walkerlab.views.report.gaits import WORK_SOURCES
 from walkerlab.views.report.numbers import (
     NONE,
@@ -19,10 +19,8 @@ from walkerlab.views.report.numbers import (
     quantity,
     span,
 )
-from walkerlab.views.report.outcomes import CONTACT_STAGE, MODEL_NAMES, RIGID_STAGE, tone
-from walkerlab.views.report.results import Results, stage_section
 from walkerlab.views.report.tables import Cell, Column, table
-from walkerlab.views.report.words import words
+from walkerlab.views.report.words import MODEL_NAMES, tone, words
 
 QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("meaning", wide=True))
 
@@ -70,7 +68,7 @@ def joules(value: float, digits: int = 4) -> str:
 HOLDS = Cell("holds", "good")
 FAILS = Cell("does not hold", "bad")
 NOTED = Cell("does not hold (ignored)", "fair")
-RELATIVE_ROUNDING = 1e-6
+NEGLIGIBLE = 1e-6
 """Largest relative energy drift, and largest scuffing depth in leg lengths, that count as zero."""
 ASSUMPTION_COLUMNS = (
     Column("assumption", "assumption"),
@@ -107,9 +105,9 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
             return number(value, 4), Cell("needs friction", "fair")
         return number(value, 4), HOLDS if value <= ground.static_friction else FAILS
     if key == "max_scuff_depth_m":
-        seen = value > RELATIVE_ROUNDING * results.config.walker.leg_length_m
+        seen = value > NEGLIGIBLE * results.config.walker.leg_length_m
         return length(value if seen else 0.0, 3), NOTED if seen else HOLDS
-    return joules(value, 3), HOLDS if value <= RELATIVE_ROUNDING * abs(summary.get("mean_energy_J") or 1.0) else FAILS
+    return joules(value, 3), HOLDS if value <= NEGLIGIBLE * abs(summary.get("mean_energy_J") or 1.0) else FAILS
 
 
 HEAD_STEPS = 20
