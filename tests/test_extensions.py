@@ -203,6 +203,87 @@ def test_walk_on_the_normal_force_of_an_extension_balances_its_energy(site):
     assert "The normal-force law HuntCrossley cannot be exported." in done.stderr
 
 
+RODS = """
+from typing import ClassVar, Literal
+from walkerlab.config.drives import Hip
+from walkerlab.config.fields import key
+from walkerlab.config.walkers import (
+    AssembledWalker, KneeJoint, PartBody, PartFoot, PartHinge, PartParticle, Torso, length, mass,
+)
+
+class Rods(AssembledWalker):
+    \'\'\'Two uniform rods and a mass at the hip.\'\'\'
+
+    type: Literal["rods"] = key("rods", "", "kind of walker")
+    leg_length_m: float = length(1.0, "length of a rod")
+    leg_mass_kg: float = mass(5.0, "mass of a rod")
+    hip_mass_kg: float = mass(10.0, "mass at the hip")
+    knee: KneeJoint = KneeJoint()
+    torso: Torso | None = None
+    hip: Hip = Hip()
+    legs: ClassVar = (("rod 1",), ("rod 2",))
+    couplings: ClassVar = ()
+
+    @property
+    def bodies(self):
+        middle, inertia = (0.0, 0.5 * self.leg_length_m), self.leg_mass_kg * self.leg_length_m**2 / 12.0
+        rod = dict(mass_kg=self.leg_mass_kg, centre_m=middle, inertia_kg_m2=inertia)
+        return tuple(PartBody(name=name, **rod) for (name,) in self.legs)
+
+    @property
+    def hinges(self):
+        top = (0.0, self.leg_length_m)
+        return (PartHinge(name="hip", parent="rod 1", parent_point_m=top, child="rod 2", child_point_m=top),)
+
+    @property
+    def particles(self):
+        return (PartParticle(name="hip", mass_kg=self.hip_mass_kg, body="rod 1", at_m=(0.0, self.leg_length_m)),)
+
+    @property
+    def feet(self):
+        return tuple(PartFoot(body=name, centre_m=(0.0, 0.0), radius_m=0.0) for (name,) in self.legs)
+"""
+
+
+def install_rods(site, module=RODS):
+    declaration = "Extension(1, walkers={'rods': 'rods_walker:Rods'})"
+    add(site.packages, "rods", f"from walkerlab.extensions import Extension\nEXTENSION = {declaration}\n")
+    (site.packages / "rods_walker.py").write_text(module)
+
+
+def test_walker_type_of_an_extension_walks_as_its_parts_do(site):
+    install_rods(site)
+    (site.folder / "rods.yaml").write_text("name: rods\nslope_deg: 3\nwalker: {type: rods, leg_mass_kg: 4}\n")
+    equal = {"leg_length_m": 1.0, "leg_mass_kg": 4.0, "leg_mass_below_hip_m": 0.5, "leg_inertia_kg_m2": 4.0 / 12.0}
+    walker = {"type": "straight-legs", **equal, "hip_mass_kg": 10.0, "foot_radius_m": 0.0}
+    (site.folder / "equal.yaml").write_text(f"name: equal\nslope_deg: 3\nwalker: {json.dumps(walker)}\n")
+    done = site("fixedpoint", "-c", "rods.yaml", "--json")
+    assert done.returncode == 0, done.stderr
+    own, same = json.loads(done.stdout), json.loads(site("fixedpoint", "-c", "equal.yaml", "--json").stdout)
+    assert own["step_period_s"] == pytest.approx(same["step_period_s"], rel=1e-10)
+    assert own["state"] == pytest.approx(same["state"], abs=1e-10)
+    done = site("sweep", "-c", "rods.yaml", "--over", "walker.leg_mass_kg=4:6:2", "--stage", "fixedpoint", "--json")
+    assert done.returncode == 0, done.stderr
+    assert "rods" in site("extensions").stdout
+    assert "length of a rod" in " ".join(site("schema", "walker").stdout.split())
+
+
+def test_unknown_key_of_an_extension_walker_is_refused_with_the_nearest(site):
+    install_rods(site)
+    (site.folder / "rods.yaml").write_text("name: rods\nwalker: {type: rods, leg_mas_kg: 4}\n")
+    done = site("fixedpoint", "-c", "rods.yaml")
+    assert done.returncode == 3
+    assert "rods.yaml:2" in done.stderr
+    assert "leg_mass_kg" in done.stderr
+
+
+def test_walker_type_that_cannot_be_imported_is_reported(site):
+    install_rods(site, "raise ImportError('no rods today')")
+    done = site("fixedpoint")
+    assert done.returncode == 3
+    assert "the walker type rods of an extension cannot be imported: ImportError: no rods today." in done.stderr
+
+
 KERNEL = """
 import math
 from types import SimpleNamespace

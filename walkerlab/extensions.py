@@ -31,10 +31,13 @@ INTERFACE: Final = 1
 """Version of the interface, that is, of the fields of `Extension` and `Study`."""
 WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "equations": ("corrected",),
+    "walkers": ("compass", "straight-legs", "kneed", "parts"),
     "normal_force": ("impact",),
     "friction": ("coulomb", "none"),
 }
-"""Built-in values of the config keys to which extensions can add values, by the last part of the key."""
+"""Built-in values of the config keys to which extensions can add values, by the last part of the key. Values of
+`walkers` are those of `walker.type`.
+"""
 SLOTS: Final = ("task", "walks", "evidence", "benchmarks")
 """Positions in the page where extensions add sections: after the task, the walks, the models, and the accuracy."""
 SETTLED_NS: Final = 2_000_000_000  # a folder that changed more recently may change again without a new time
@@ -61,6 +64,7 @@ class Extension:
     sections: Mapping[str, Sequence[str]] = field(default_factory=dict)  # makers of sections, by `SLOTS` of the page
     answers: Mapping[str, str] = field(default_factory=dict)  # what a stage's command prints, by stage
     tables: Mapping[str, str] = field(default_factory=dict)  # tables of a stage's summary for export, by stage
+    walkers: Mapping[str, str] = field(default_factory=dict)  # types of walkers, by word
     normal_force: Mapping[str, str] = field(default_factory=dict)  # classes of normal-force laws, by word
     friction: Mapping[str, str] = field(default_factory=dict)  # classes of friction laws, by word
     studies: Sequence[Study] = ()

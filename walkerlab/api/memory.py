@@ -106,7 +106,7 @@ def passed(keys: Mapping[str, object]) -> dict[str, Setting]:
     return {name: cast(Setting, value) for name, value in keys.items() if value is not None}
 
 
-def walker(type: Literal["compass", "straight-legs", "kneed", "parts"], **keys: Setting) -> Walker:
+def walker(type: str, **keys: Setting) -> Walker:
     """Build the config block of a walker.
 
     type  type of the walker

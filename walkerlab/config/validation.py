@@ -23,7 +23,7 @@ from walkerlab.config.problems import (
 )
 from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, as_typed, plain
-from walkerlab.config.walkers import Kneed, PartsWalker, followers, second_of
+from walkerlab.config.walkers import AssembledWalker, Kneed, followers, second_of
 from walkerlab.extensions import WORDS, foreign
 
 Location: TypeAlias = tuple[int | str, ...]
@@ -145,7 +145,7 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     bodies = len(stated) // 2
     values = [0.0 if value is None else value for value in stated]
     following = dict[int, FollowingValue]()
-    if not isinstance(config.start, MidStep) and not isinstance(walker, PartsWalker):
+    if not isinstance(config.start, MidStep) and not isinstance(walker, AssembledWalker):
         because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
         values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
         if second_of(walker) is not walker:
@@ -166,7 +166,7 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
 def check_bodies(config: Config, tree: BlockNode) -> None:
     """Raise ConfigError with positions for parts on unknown bodies or feet on the wrong leg."""
     walker = config.walker
-    if not isinstance(walker, PartsWalker):
+    if not isinstance(walker, AssembledWalker):
         return
     bodies = [body.name for body in walker.bodies]
     problems = []
@@ -186,7 +186,7 @@ def check_bodies(config: Config, tree: BlockNode) -> None:
         raise problems_error(sorted(problems, key=_place), "docs/walkers.md shows a walker described by its parts.")
 
 
-def body_references(walker: PartsWalker) -> Iterator[tuple[Location, str]]:
+def body_references(walker: AssembledWalker) -> Iterator[tuple[Location, str]]:
     for key, names in NAMES_OF_BODIES.items():
         for k, part in enumerate(getattr(walker, key)):
             yield from (((key, k, name), getattr(part, name)) for name in names)
@@ -215,7 +215,8 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
         word = str(node.value) if isinstance(node, Scalar) else ""
         beyond = explain_missing_feature(word)
         text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
-        return Problem(position, text, f"one of {', '.join(kinds)}", "" if beyond else nearest(word, kinds))
+        allowed = f"one of {', '.join(kinds)}{advise_extensions()}"
+        return Problem(position, text, allowed, "" if beyond else nearest(word, kinds))
     # pydantic inserts the kind of value that it tried
     if len(location) > 1 and location[1] in (*kinds, MID_STEP):
         location = (location[0], *location[2:])
@@ -242,9 +243,14 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
         meant = word.replace(",", ".")
     right = describe_allowed(field) if what in _REASONS else ""
     if path[-1] in WORDS and what == "literal_error":
-        names = ", ".join(found.name for found in foreign() if found.extension) or "none"
-        right += f", or a word of an extension: install the one that adds it (installed: {names})"
+        right += advise_extensions()
     return Problem(position, f"{key}: {value} {reason}", right, meant if meant != word else "")
+
+
+def advise_extensions() -> str:
+    """Return the advice for a word that an extension may add."""
+    names = ", ".join(found.name for found in foreign() if found.extension) or "none"
+    return f", or a word of an extension: install the one that adds it (installed: {names})"
 
 
 def _is_later(place: Position, earlier: Position) -> bool:

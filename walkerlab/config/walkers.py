@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, reduce
 from itertools import pairwise
+from operator import or_
 from types import SimpleNamespace
-from typing import Annotated, Any, Final, Literal, TypeGuard
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeGuard
 
 from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
@@ -15,6 +16,7 @@ from walkerlab.config.drives import QUICKEST, Hip, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.numbers import short_number
 from walkerlab.errors import ConfigError
+from walkerlab.extensions import declared, load
 
 WISSE: Final = "Wisse, Schwab, Int. J. Robotics Research 24 (2005): arc feet"
 MCGEER: Final = "McGeer, Passive walking with knees, IEEE Int. Conf. Robotics and Automation (1990)"
@@ -481,7 +483,43 @@ class PartCoupling(Block):
     weights: tuple[float, ...] = key(..., "1", "their weights", bounds="a list of numbers", sequence=True)
 
 
-class PartsWalker(_Legged):
+class AssembledWalker(_Legged):
+    """A walker made of parts.
+
+    An extension derives a type of walker from this class. The class has keys of its own, properties that make the parts
+    from them, `leg_length_m`, and the keys `knee`, `torso` and `hip` of `PartsWalker`.
+    """
+
+    if TYPE_CHECKING:
+        type: str
+        bodies: tuple[PartBody, ...]
+        hinges: tuple[PartHinge, ...]
+        particles: tuple[PartParticle, ...]
+        feet: tuple[PartFoot, PartFoot]
+        couplings: tuple[PartCoupling, ...]
+        legs: tuple[LegBodies, LegBodies]
+        leg_length_m: float
+        knee: KneeJoint
+        torso: Torso | None
+        hip: Hip
+
+    @property
+    def foot_radius_m(self) -> float:
+        return self.feet[0].radius_m
+
+    @property
+    def foot_radii_m(self) -> tuple[float, float]:
+        """Radius (m) of each leg's foot."""
+        first, second = self.feet
+        return first.radius_m, second.radius_m
+
+    @property
+    def total_mass_kg(self) -> float:
+        masses = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
+        return sum(masses) + torso_mass(self.torso)
+
+
+class PartsWalker(AssembledWalker):
     """A walker described by its bodies, hinges, particles, feet and couplings."""
 
     type: Literal["parts"] = key(..., "", "kind of walker")
@@ -508,21 +546,6 @@ class PartsWalker(_Legged):
             return value
         upright = f"standing upright, it is {length:.9g} m from the hip's hinge to the first leg's sole"
         raise meaning_error(f"disagrees with the parts: {upright}")
-
-    @property
-    def foot_radius_m(self) -> float:
-        return self.feet[0].radius_m
-
-    @property
-    def foot_radii_m(self) -> tuple[float, float]:
-        """Radius (m) of each leg's foot."""
-        first, second = self.feet
-        return first.radius_m, second.radius_m
-
-    @property
-    def total_mass_kg(self) -> float:
-        masses = [body.mass_kg for body in self.bodies] + [particle.mass_kg for particle in self.particles]
-        return sum(masses) + torso_mass(self.torso)
 
 
 def hip_to_sole(
@@ -565,14 +588,14 @@ def torso_mass(torso: Torso | None) -> float:
 
 def rigid_bodies(walker: Any) -> int:
     """Return the number of angles in the rigid model's state: swing leg, stance leg, other swinging bodies, torso."""
-    bodies = len(walker.bodies) - len(walker.legs[1]) + 1 if isinstance(walker, PartsWalker) else 2
+    bodies = len(walker.bodies) - len(walker.legs[1]) + 1 if isinstance(walker, AssembledWalker) else 2
     return bodies + int(isinstance(walker, Kneed)) + int(walker.torso is not None)
 
 
 def followers(walker: Any) -> dict[int, tuple[str, dict[int, float]]]:
     """Map the index of each coupled angle of the rigid state to its body and the weights of the angles it follows."""
     coupled = {}
-    if isinstance(walker, PartsWalker):
+    if isinstance(walker, AssembledWalker):
         swinging, stance = walker.legs
         shared = [body.name for body in walker.bodies if body.name not in (*swinging, *stance)]
         place = {name: k for k, name in enumerate((swinging[0], stance[0], *swinging[1:], *shared))}
@@ -671,10 +694,10 @@ def contact_to_add(walker: Any) -> str:
     return f"contact: {{{numbers}, terrain: {'plane' if has_knees(walker) else 'after-mid-swing'}}}"
 
 
-def has_knees(walker: Any) -> TypeGuard["Kneed | PartsWalker"]:
+def has_knees(walker: Any) -> TypeGuard["Kneed | AssembledWalker"]:
     """Whether the walker has knees, so that its swing leg can clear plane ground."""
     return isinstance(walker, Kneed) or (
-        isinstance(walker, PartsWalker) and any(hinge.locks for hinge in walker.hinges)
+        isinstance(walker, AssembledWalker) and any(hinge.locks for hinge in walker.hinges)
     )
 
 
@@ -690,12 +713,29 @@ def contact_required_error(request: str, walker: Any, instead: str) -> ConfigErr
     return ConfigError(f"{request} needs a contact block, but the config has none.", instead)
 
 
-Walker = Annotated[
-    Annotated[CompassWalker, Tag("compass")]
-    | Annotated[StraightLegs, Tag("straight-legs")]
-    | Annotated[Kneed, Tag("kneed")]
-    | Annotated[PartsWalker, Tag("parts")],
-    Discriminator(
-        lambda data: data.get("type", "compass") if isinstance(data, dict) else getattr(data, "type", "compass")
-    ),
-]
+def load_walkers() -> dict[str, type[Block]]:
+    """Import the types of walkers that extensions add, by word.
+
+    Raises ConfigError if one cannot be imported.
+    """
+    found = {}
+    for word, code in declared("walkers").items():
+        try:
+            found[word] = load(code)
+        except Exception as error:
+            why = f"the walker type {word} of an extension cannot be imported: {type(error).__name__}: {error}."
+            raise ConfigError(why, "Mend or uninstall the extension.") from error
+    return found
+
+
+OWN_WALKERS: Final = {"compass": CompassWalker, "straight-legs": StraightLegs, "kneed": Kneed, "parts": PartsWalker}
+if TYPE_CHECKING:
+    Walker = CompassWalker | StraightLegs | Kneed | AssembledWalker
+else:
+    kinds = {**OWN_WALKERS, **load_walkers()}
+    Walker = Annotated[
+        reduce(or_, (Annotated[block, Tag(word)] for word, block in kinds.items())),
+        Discriminator(
+            lambda data: data.get("type", "compass") if isinstance(data, dict) else getattr(data, "type", "compass")
+        ),
+    ]

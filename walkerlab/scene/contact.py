@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkerlab.config.walkers import Kneed, PartsWalker
+from walkerlab.config.walkers import AssembledWalker, Kneed
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.extensions import declared, load
 from walkerlab.physics.ground.compliant import KneeRules, contact_walker
@@ -135,7 +135,7 @@ def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
 
 
 def knee_rules(walker: AnyWalker) -> KneeRules:
-    if not isinstance(walker, Kneed | PartsWalker):
+    if not isinstance(walker, Kneed | AssembledWalker):
         return KneeRules()
     knee = walker.knee
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"

@@ -73,9 +73,9 @@ def contact_walk_omissions(config: ContactSimConfig) -> tuple[Entry, ...]:
 
 def count_step_angles(walker: Walker) -> int:
     """Count the angles during a step. A compliant knee stop adds one for the stance shank."""
-    from walkerlab.config.walkers import rigid_bodies  # imported late to keep the help fast
+    from walkerlab.config.walkers import Kneed, rigid_bodies  # imported late to keep the help fast
 
-    return rigid_bodies(walker) + int(walker.type == "kneed" and walker.knee.lock == "compliant")
+    return rigid_bodies(walker) + int(isinstance(walker, Kneed) and walker.knee.lock == "compliant")
 
 
 def leg_omissions(config: RigidConfig) -> Iterator[Entry]:

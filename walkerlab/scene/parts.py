@@ -5,9 +5,9 @@ from typing import Any
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import (
     LIGHTEST_CONTACT,
+    AssembledWalker,
     CompassWalker,
     Kneed,
-    PartsWalker,
     StraightLegs,
     second_of,
     torso_mass,
@@ -17,7 +17,7 @@ from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling
 from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, replace_second_leg, straight_legs
 
 PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
-AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
+AnyWalker = CompassWalker | StraightLegs | Kneed | AssembledWalker
 
 
 def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
@@ -60,7 +60,7 @@ def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
     return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - present)
 
 
-def own_parts(walker: PartsWalker) -> Assembly:
+def own_parts(walker: AssembledWalker) -> Assembly:
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),
@@ -93,4 +93,4 @@ def damper(damping: float) -> tuple[float, float, float]:
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:
     """Whether the trailing knee is rigid during heel strike."""
-    return not isinstance(walker, Kneed | PartsWalker) or walker.knee.at_heel_strike == "locked"
+    return not isinstance(walker, Kneed | AssembledWalker) or walker.knee.at_heel_strike == "locked"

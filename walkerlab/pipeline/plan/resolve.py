@@ -19,7 +19,7 @@ from walkerlab.config.loader import LoadedConfig, key_of, load
 from walkerlab.config.problems import problem_error
 from walkerlab.config.reads import flatten
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import PartsWalker
+from walkerlab.config.walkers import AssembledWalker
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
@@ -125,7 +125,7 @@ def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str]
 def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
     """Raise ConfigError, with a position in the file, if the parts listed in a config do not form a walker."""
     config = read.config
-    if not isinstance(config.walker, PartsWalker):
+    if not isinstance(config.walker, AssembledWalker):
         return
     # Imported here: mechanics take long to import, and walkers of other types are valid by construction.
     from walkerlab.scene.rigid import level_walker

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from walkerlab.config.walkers import CompassWalker, Kneed, PartsWalker, StraightLegs, second_of
+from walkerlab.config.walkers import AssembledWalker, CompassWalker, Kneed, StraightLegs, second_of
 from walkerlab.views.figures.canvas import blank, figure_style, files_of
 from walkerlab.views.figures.style import BLACK, BLUE, FIGURE_WIDTH, GREEN, GREY, ORANGE, PALE, POINT, VERMILLION
 
-AnyWalker = CompassWalker | StraightLegs | Kneed | PartsWalker
+AnyWalker = CompassWalker | StraightLegs | Kneed | AssembledWalker
 Point = tuple[float, float]
 
 FIGURE_HEIGHT = 4.6
@@ -138,7 +138,7 @@ def draw_measures(walker: AnyWalker, name: str, kind: str = "svg") -> bytes:
     """Draw the walker's dimensions as a file of one kind (svg, pdf, png). Equal walkers and names give equal bytes."""
     title = f"Dimensions of a walker of type {walker.type}"
     with figure_style():
-        figure = draw_parts(walker) if isinstance(walker, PartsWalker) else draw_upright(walker)
+        figure = draw_parts(walker) if isinstance(walker, AssembledWalker) else draw_upright(walker)
         return files_of(figure, name, title, [kind])[0]
 
 
@@ -291,7 +291,7 @@ def draw_length(axes: Axes, measure: Length, x: float, letter: float) -> None:
     axes.text(x + letter, 0.5 * (high + low), measure.label, color=BLUE, fontsize=SMALL, va="center")
 
 
-def draw_parts(walker: PartsWalker) -> Figure:
+def draw_parts(walker: AssembledWalker) -> Figure:
     """Draw all bodies, each in its own frame. Of two equal legs, only the second is drawn."""
     # Imported here: only walkers of parts need their mechanics.
     from walkerlab.scene.rigid import level_walker
@@ -327,7 +327,7 @@ def draw_parts(walker: PartsWalker) -> Figure:
     return figure
 
 
-def marks_of(walker: PartsWalker, body: str, centre: Point) -> Iterator[tuple[str, str, str, Point]]:
+def marks_of(walker: AssembledWalker, body: str, centre: Point) -> Iterator[tuple[str, str, str, Point]]:
     """Yield the points that the config defines on a body: label, colour, marker and position (m)."""
 
     def spot(point: Point) -> str:
