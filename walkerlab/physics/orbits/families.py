@@ -142,45 +142,14 @@ class Seed(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BranchFollower:
+class BranchTracer:
+    """Follows one branch of gaits, from one of them to its end."""
+
     step_map: StepMap
     span: ValueSpan
     control: StepControl = field(default_factory=StepControl)
     most: int = MAX_BRANCH_POINTS  # maximum number of points on a branch
     advance: Callable[[], None] = lambda: None  # called after each point
-
-    def family(
-        self, seeds: Iterable[Seed], periods: int, previous: tuple[GaitBranch, ...] = ()
-    ) -> tuple[GaitBranch, ...]:
-        """Return `previous`, new branches through the seeds, and cascades beyond flips, up to period `periods`."""
-        branches = list(previous)
-        for seed in seeds:
-            start = self.solve_at(seed.z, seed.value, seed.steps)
-            if start is None:
-                continue
-            gait = start.evaluated.data
-            like = [branch for branch in branches if branch.period == seed.steps]
-            if self.steps_to_repeat(gait) < seed.steps or any(self.lies_on(branch, gait) for branch in like):
-                continue
-            rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
-            branch_ahead = self.trace(rising, seed.steps)
-            if not branch_ahead.closed:
-                behind = self.trace(replace(rising, tangent=-rising.tangent), seed.steps)
-                branch_ahead = GaitBranch(
-                    seed.steps,
-                    (*reversed(behind.points[1:]), *branch_ahead.points),
-                    (behind.ends[1], branch_ahead.ends[1]),
-                    (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
-                    (*reversed(behind.crossings), *branch_ahead.crossings),
-                )
-            # `lies_on` misses gaits beyond a branch's ends, so look for the branch's own gaits on the new one
-            within = [branch for branch in like if self.covers(branch_ahead, branch)]
-            if all(branch.reach < branch_ahead.reach and branch not in previous for branch in within):
-                branches = [*(branch for branch in branches if branch not in within), branch_ahead]
-        for branch in branches:  # the list grows during the loop
-            if 2 * branch.period <= periods and branch not in previous:
-                branches.extend(self.follow_doubled(branch, branches))
-        return tuple(close_on_flips(branch, branches) for branch in branches)
 
     def equations(self, period: int) -> GaitEquations:
         return GaitEquations(self.step_map, period, self.span.size)
@@ -190,50 +159,6 @@ class BranchFollower:
         tolerance = self.control.tolerance
         solution = correct(self.equations(period), x, np.eye(x.size)[-1], tolerance, SEED_EVALUATIONS)
         return None if isinstance(solution, NotConverged) else solution
-
-    def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
-        starts = [gait.z, *(step.z for step in gait.steps)]
-        effort = Effort(self.control.tolerance, SEED_EVALUATIONS)
-        for _, guess in branch.passing(gait.value):
-            neighbour = gait_near(self.step_map, guess, gait.value, effort, branch.period)
-            if isinstance(neighbour, Cycle) and min(np.abs(neighbour.z - z).max() for z in starts) < SAME_STATE:
-                return True
-        return False
-
-    def covers(self, branch: GaitBranch, other: GaitBranch) -> bool:
-        """Whether a gait well inside another branch, a quarter of the way along it, lies on a branch."""
-        # half of the way along may be a fold, near which gaits of both arms are hardly distinct
-        covered = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
-        return self.lies_on(branch, other.points[int(np.searchsorted(covered, 0.25 * other.reach))])
-
-    def follow_doubled(self, parent: GaitBranch, previous: Iterable[GaitBranch]) -> list[GaitBranch]:
-        branches: list[GaitBranch] = []
-        for flip in parent.bifurcations:
-            like = [branch for branch in (*previous, *branches) if branch.period == 2 * parent.period]
-            if flip.kind != "flip" or any(any(branch.closes_on(flip)) for branch in like):
-                continue
-            form = flip_form(self.equations(parent.period), flip)
-            start = None if form is None else self.enter_doubled(flip, form, parent.period)
-            if start is not None:
-                branch = self.trace(start, 2 * parent.period)
-                first = BranchEnd(flip.value, f"flip of the gait of {parent.period} {steps_word(parent.period)}")
-                if not any(self.covers(other, branch) for other in like):
-                    branches.append(replace(branch, ends=(first, branch.ends[1])))
-        return branches
-
-    def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
-        """Return the first gait of twice the period, at the normal form's amplitude, or None if Newton's
-        method fails.
-        """
-        # the tangent must point away from the flip: the halves of the cycle must move apart along it
-        for halving in range(AMPLITUDE_HALVINGS):
-            guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
-            point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
-            if isinstance(point, CurvePoint) and np.linalg.norm(point.x - guess) < 0.5 * xi:
-                half = self.equations(period)(point.x)
-                parting = half.value @ (half.jacobian @ point.tangent)
-                return point if parting > 0.0 else replace(point, tangent=-point.tangent)
-        return None
 
     def trace(self, start: CurvePoint[Cycle], period: int) -> GaitBranch:
         equations = self.equations(period)
@@ -353,6 +278,87 @@ class BranchFollower:
         self.advance()
         gait = solved.evaluated.data
         return replace(gait, monitors=self.step_map.watch(gait.z, gait.value, len(gait.steps)))
+
+
+class BranchFollower(BranchTracer):
+    """Finds the branches that pass through gaits, and those that leave them at flips."""
+
+    def family(
+        self, seeds: Iterable[Seed], periods: int, previous: tuple[GaitBranch, ...] = ()
+    ) -> tuple[GaitBranch, ...]:
+        """Return `previous`, new branches through the seeds, and cascades beyond flips, up to period `periods`."""
+        branches = list(previous)
+        for seed in seeds:
+            start = self.solve_at(seed.z, seed.value, seed.steps)
+            if start is None:
+                continue
+            gait = start.evaluated.data
+            like = [branch for branch in branches if branch.period == seed.steps]
+            if self.steps_to_repeat(gait) < seed.steps or any(self.lies_on(branch, gait) for branch in like):
+                continue
+            rising = start if start.tangent[-1] > 0.0 else replace(start, tangent=-start.tangent)
+            branch_ahead = self.trace(rising, seed.steps)
+            if not branch_ahead.closed:
+                behind = self.trace(replace(rising, tangent=-rising.tangent), seed.steps)
+                branch_ahead = GaitBranch(
+                    seed.steps,
+                    (*reversed(behind.points[1:]), *branch_ahead.points),
+                    (behind.ends[1], branch_ahead.ends[1]),
+                    (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
+                    (*reversed(behind.crossings), *branch_ahead.crossings),
+                )
+            # `lies_on` misses gaits beyond a branch's ends, so look for the branch's own gaits on the new one
+            within = [branch for branch in like if self.covers(branch_ahead, branch)]
+            if all(branch.reach < branch_ahead.reach and branch not in previous for branch in within):
+                branches = [*(branch for branch in branches if branch not in within), branch_ahead]
+        for branch in branches:  # the list grows during the loop
+            if 2 * branch.period <= periods and branch not in previous:
+                branches.extend(self.follow_doubled(branch, branches))
+        return tuple(close_on_flips(branch, branches) for branch in branches)
+
+    def lies_on(self, branch: GaitBranch, gait: Cycle) -> bool:
+        starts = [gait.z, *(step.z for step in gait.steps)]
+        effort = Effort(self.control.tolerance, SEED_EVALUATIONS)
+        for _, guess in branch.passing(gait.value):
+            neighbour = gait_near(self.step_map, guess, gait.value, effort, branch.period)
+            if isinstance(neighbour, Cycle) and min(np.abs(neighbour.z - z).max() for z in starts) < SAME_STATE:
+                return True
+        return False
+
+    def covers(self, branch: GaitBranch, other: GaitBranch) -> bool:
+        """Whether a gait well inside another branch, a quarter of the way along it, lies on a branch."""
+        # half of the way along may be a fold, near which gaits of both arms are hardly distinct
+        covered = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
+        return self.lies_on(branch, other.points[int(np.searchsorted(covered, 0.25 * other.reach))])
+
+    def follow_doubled(self, parent: GaitBranch, previous: Iterable[GaitBranch]) -> list[GaitBranch]:
+        branches: list[GaitBranch] = []
+        for flip in parent.bifurcations:
+            like = [branch for branch in (*previous, *branches) if branch.period == 2 * parent.period]
+            if flip.kind != "flip" or any(any(branch.closes_on(flip)) for branch in like):
+                continue
+            form = flip_form(self.equations(parent.period), flip)
+            start = None if form is None else self.enter_doubled(flip, form, parent.period)
+            if start is not None:
+                branch = self.trace(start, 2 * parent.period)
+                first = BranchEnd(flip.value, f"flip of the gait of {parent.period} {steps_word(parent.period)}")
+                if not any(self.covers(other, branch) for other in like):
+                    branches.append(replace(branch, ends=(first, branch.ends[1])))
+        return branches
+
+    def enter_doubled(self, flip: Bifurcation, form: FlipForm, period: int) -> CurvePoint[Cycle] | None:
+        """Return the first gait of twice the period, at the normal form's amplitude, or None if Newton's
+        method fails.
+        """
+        # the tangent must point away from the flip: the halves of the cycle must move apart along it
+        for halving in range(AMPLITUDE_HALVINGS):
+            guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
+            point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
+            if isinstance(point, CurvePoint) and np.linalg.norm(point.x - guess) < 0.5 * xi:
+                half = self.equations(period)(point.x)
+                parting = half.value @ (half.jacobian @ point.tangent)
+                return point if parting > 0.0 else replace(point, tangent=-point.tangent)
+        return None
 
 
 def passes_through(segment: Segment[Cycle], gait: CurvePoint[Cycle], turn: float) -> bool:

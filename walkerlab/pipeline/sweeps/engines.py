@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.run.interrupts import raise_on
 from walkerlab.pipeline.run.work import JobEndedError, JobEndsError
-from walkerlab.pipeline.run.workers import ONE_THREAD, SizedExecutor, WorkerPool
+from walkerlab.pipeline.run.workers import ONE_THREAD, SizedExecutor, WorkerPool, raise_on
 from walkerlab.pipeline.store.files import storing
 from walkerlab.private_files import make_private, make_private_folder, may_be_foreign
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from walkerlab.errors import StoppedError
-from walkerlab.pipeline.run.interrupts import raise_on
+from walkerlab.pipeline.run.workers import raise_on
 from walkerlab.views.cli.request import OUTPUT_FIELDS, Offer, Request
 from walkerlab.views.figures.style import EXPORT_DPI
 

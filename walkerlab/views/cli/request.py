@@ -23,7 +23,7 @@ from typer.core import TyperCommand
 from walkerlab.errors import ConfigError, StoppedError, StorageError, WalkerlabError, add_run_options, escape_controls
 from walkerlab.extensions import check_names, foreign
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
-from walkerlab.pipeline.run.interrupts import raise_on
+from walkerlab.pipeline.run.workers import raise_on
 from walkerlab.views.cli.console import Console
 
 if TYPE_CHECKING:

@@ -1,10 +1,18 @@
-"""The server of `walkerlab explore`: loopback only, protected by a token, with worker processes."""
+"""The server of `walkerlab explore`: loopback only, protected by a token, with worker processes.
+
+Background jobs write a report or a GIF into the runs folder. The page is the report's player and style with a script
+that queries the server.
+"""
 
 import contextlib
 import json
 import os
+import re
 import secrets
+import signal
+import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -13,14 +21,151 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from mimetypes import guess_type
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import parse_qs, quote, unquote, urlsplit
 
+from jinja2 import FileSystemLoader
+from markupsafe import Markup
+
+from walkerlab.config.files import DEFAULT, builtin_names
 from walkerlab.errors import ConfigError
-from walkerlab.pipeline.run.workers import Worker, WorkerDiedError
+from walkerlab.pipeline.run.workers import STORING_PATIENCE_S, Worker, WorkerDiedError
 from walkerlab.views.explore import walks
-from walkerlab.views.explore.jobs import Job
-from walkerlab.views.explore.page import choices, render_page, start_name
 from walkerlab.views.explore.walks import GIVE_WAY, SUPERSEDED, Answered, ExploredConfig
+from walkerlab.views.report import page as report
+from walkerlab.views.report.blocks import Player
+
+KINDS = ("report", "gif")
+EARLY_PAGE = re.compile(r"page: (.+) \(partial")
+"""Progress line that announces a partial page."""
+JOB_PROGRAM = (
+    "from walkerlab.pipeline.run.workers import end_with_parent; end_with_parent(); "
+    "from walkerlab.views.cli.main import main; main()"
+)
+"""Program that runs a command as `python -m walkerlab` does, and ends when the server ends."""
+
+
+class Job:
+    """Runs one job at a time, as the command that a user would type."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+        self._runs = Path()
+        self._lock = threading.Lock()
+        self._status: dict[str, Any] = {"running": False}
+
+    def begin(self, kind: object, question: ExploredConfig) -> Answered:
+        """Start a job, or return status 409 while another one runs."""
+        if kind not in KINDS:
+            raise TypeError
+        with self._lock:
+            if self._status["running"]:
+                return 409, {"error": {"message": "another export is running", "advice": "Wait until it has finished."}}
+            self._status = {"running": True, "kind": kind, "progress": ""}
+        threading.Thread(target=self._make, args=(str(kind), question), daemon=True).start()
+        return 200, dict(self._status)
+
+    def progress(self) -> dict[str, Any]:
+        """Return the latest progress message and, as soon as the file exists, its address."""
+        return dict(self._status)
+
+    def close(self) -> None:
+        """End the running job and its child processes."""
+        if (process := self._process) is not None:
+            process.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(STORING_PATIENCE_S)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+    def _make(self, kind: str, question: ExploredConfig) -> None:
+        self._runs = runs = question.runs.resolve()
+        of_config = [*question.options, "--runs", str(runs), "--json"]
+        try:
+            if kind == "report":
+                made = self._command("report", *of_config)
+                file = Path(made["run_dir"]) / made["html"]
+            else:
+                walk = "simulate" if question.models == ["rigid"] else "contact-sim"
+                folder = Path(self._command(walk, *of_config)["run_dir"])
+                file = folder / f"{walk}.gif"
+                self._command("animate", str(folder), "--model", walk, "--to", "gif", "-o", str(file))
+            self._status = {"running": False, "kind": kind, "url": self._url(file)}
+        except (RuntimeError, OSError, KeyError, ValueError) as error:
+            self._status = {"running": False, "kind": kind, "error": {"message": str(error), "advice": ""}}
+
+    def _url(self, file: Path) -> str:
+        return "/runs/" + quote(str(file.resolve().relative_to(self._runs)))
+
+    def _command(self, *words: str) -> dict[str, Any]:
+        """Run a command and return its JSON output.
+
+        Raises RuntimeError with its last message if it fails.
+        """
+        command = [sys.executable, "-P", "-c", JOB_PROGRAM, *words]
+        lines = []
+        # stdout goes to a file, since a pipe would fill while only stderr is read
+        with tempfile.TemporaryFile("w+") as output:
+            with subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True
+            ) as self._process:
+                assert self._process.stderr is not None
+                for line in self._process.stderr:
+                    lines.append(line.strip())
+                    self._status = {**self._status, "progress": line.strip()}
+                    if (early := EARLY_PAGE.search(line)) is not None:
+                        self._status = {**self._status, "url": self._url(Path(early[1]))}
+                status = self._process.wait()
+            output.seek(0)
+            printed = output.read()
+        if status != 0:
+            raise RuntimeError(next((line for line in lines if line.startswith("error:")), "\n".join(lines[-2:])))
+        with contextlib.suppress(json.JSONDecodeError):
+            found: dict[str, Any] = json.loads(printed)
+            return found
+        return {}
+
+
+TEMPLATES = Path(__file__).parent / "templates"
+SEEN = (
+    "Wide outline: rigid model; narrow: contact model. Each leg is a line from hip to foot;"
+    " leg 2 is hollow. Arrows are ground forces; a red arrow is a push-off."
+)
+
+
+LONGEST_NAME = 60
+
+
+def start_name(base: ExploredConfig) -> str:
+    name = base.called or base.config or DEFAULT
+    changed = f"{name} with {', '.join(base.sets)}"
+    return name if base.called or not base.sets else changed if len(changed) <= LONGEST_NAME else f"{name}, changed"
+
+
+def choices(base: ExploredConfig) -> list[str]:
+    """List the other configs to choose from: built-in ones, and the YAML files in the working folder."""
+    own = sorted(path.name for path in Path().glob("*.yaml"))
+    return [name for name in (*builtin_names(), *own) if name != start_name(base)]
+
+
+def render_page(base: ExploredConfig) -> tuple[str, str]:
+    """Return the page's HTML and its content security policy."""
+    own = (TEMPLATES / "explore.js").read_text(encoding="utf-8").strip()
+    script = f'\n"use strict";\n{report.source("player.js")}\n{own}\n'
+    environment = report.environment()
+    environment.loader = FileSystemLoader([report.TEMPLATE_FOLDER, TEMPLATES])
+    html = environment.get_template("explore.html.j2").render(
+        start_name=start_name(base),
+        configs=choices(base),
+        anchor="walk",
+        # An empty player, which the script fills.
+        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, (0.0, 0.0), 1.0, (0, 0, 1, 1)),
+        # Markup only for the package's own files; all other texts are escaped.
+        style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
+        script=Markup(script),
+    )
+    allowed = "default-src 'none'; img-src data: blob:; connect-src 'self'; style-src 'unsafe-inline'"
+    return html, f"{allowed}; script-src 'sha256-{report.digest_of(script)}'; base-uri 'none'; form-action 'none'"
+
 
 LONGEST_BODY = 100_000
 NICE = 15
