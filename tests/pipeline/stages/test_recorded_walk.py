@@ -15,7 +15,7 @@ import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.config.reads import only
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.paper.sections import recorded_tables, recorded_words
+from walkerlab.evidence.paper.sections import describe_recorded, recorded_tables
 from walkerlab.exchange.walk_in_steps import MOST_SAMPLES
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import MemoryResults
@@ -159,7 +159,7 @@ def test_comparison_shows_the_recorded_walk_in_a_third_column(tmp_path):
     characteristics, differences = recorded_tables(summary)
     assert characteristics.columns[-1].title == "mine"
     assert len(differences.groups[""]) == 4
-    assert "mine: the last step takes 0.7036 s" in recorded_words(summary)
+    assert "mine: the last step takes 0.7036 s" in describe_recorded(summary)
 
 
 def test_figures_label_the_recorded_walk_with_its_name(tmp_path):
@@ -345,7 +345,7 @@ def test_comparison_lists_unused_parts_of_a_recording(tmp_path):
         "steps": {"recorded": {"period_s": 0.7, "length_m": 0.37}},
         "doubts": read.summary["doubts"],
     }
-    assert "Not used: kinetic_J" in recorded_words(stored)
+    assert "Not used: kinetic_J" in describe_recorded(stored)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")

@@ -18,7 +18,7 @@ CONTACT_MODEL_KEYS: Final = ("foot_radius_m",)
 SI_KEYS: Final = ("stiffness", "damping", *BOUNDS_SI)
 """Keys of the contact block whose values depend on the block's units."""
 UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not in (*SI_KEYS, "units", "stance"))
-"""Remaining keys of the contact block, except `stance`, since the paper pins the first stance foot, too (section 4)."""
+"""Remaining keys of the contact block. `stance` is left out, because the paper also pins the first stance foot."""
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:

@@ -283,7 +283,7 @@ PROBLEMS: Final = (
 
 
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Solve every problem. Wrong answers are stored like right ones, and the stage `stability` reports them."""
+    """Solve every problem. Wrong answers are stored like right ones, because the stage `stability` reports them."""
     rows = []
     for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
         result = problem()

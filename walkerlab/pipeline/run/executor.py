@@ -231,8 +231,8 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Draw what the results so far suffice for. `why` is the reason why those of the `unsettled` stages are
-        missing.
+        """Make the drawings for which the results so far suffice. `why` explains the missing results of `unsettled`
+        stages.
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """

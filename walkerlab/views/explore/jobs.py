@@ -85,7 +85,7 @@ class Job:
         """
         command = [sys.executable, "-P", "-c", JOB_PROGRAM, *words]
         lines = []
-        # stdout goes to a file, since a pipe would fill while only stderr is read
+        # The output goes to a file, because a pipe would fill up while only stderr is read.
         with tempfile.TemporaryFile("w+") as output:
             with subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True

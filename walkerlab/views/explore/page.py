@@ -43,7 +43,17 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
         configs=choices(base),
         anchor="walk",
         # An empty player, which the script fills.
-        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, (0.0, 0.0), 1.0, (0, 0, 1, 1)),
+        block=Player(
+            title="The walk.",
+            caption=SEEN,
+            alt="The walker",
+            walkers=(),
+            slope_rad=0.0,
+            leg_m=1.0,
+            foot_radii_m=(0.0, 0.0),
+            closeup_m=1.0,
+            view=(0, 0, 1, 1),
+        ),
         # Markup only for the package's own files; all other texts are escaped.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),

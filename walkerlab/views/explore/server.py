@@ -59,7 +59,7 @@ class Desk:
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
             deaths = 0
-            # repeat the call if the signal for an earlier request arrived late, or if the worker died while idle
+            # The call is repeated if the signal for an earlier request arrived late, or if the worker died while idle.
             while number == self._newest:
                 try:
                     answer = self.worker.do(call)
@@ -92,7 +92,7 @@ class Server(ThreadingHTTPServer):
         self.token = secrets.token_urlsafe(16)
         self.job = Job()
         self.cookie = f"walkerlab-explore-{self.server_port}"
-        # curves plotted in the background must not delay the answer to a moved slider
+        # Curves plotted in the background must not delay the answer to a moved slider, so they have their own worker.
         self.desk = Desk()
         self.background = Desk(drops=True)
         self._thread: threading.Thread | None = None

@@ -91,7 +91,7 @@ def assumptions(results: Results) -> Section | None:
     where = " (sections 3.1 and 3.2)" if results.claims else ""
     caption = f"Assumptions of the rigid model{where}, checked on its walk"
     checks = table(caption, ASSUMPTION_COLUMNS, judged, wordy=True)
-    return Section.of("assumptions", "Assumptions, checked", (checks,), words("walks.assumptions", judged))
+    return Section.create("assumptions", "Assumptions, checked", (checks,), words("walks.assumptions", judged))
 
 
 def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[str, Cell]:
@@ -139,7 +139,7 @@ def steps(results: Results) -> Section | None:
     listed = table("Periods and lengths of the steps", columns, rows, note=note)
     blocks = (listed, Paragraph(words("error.of_models", errors) if errors else ""))
     periods = {models[stage]: values for (stage, key), values in series.items() if key == "step_periods_s"}
-    return Section.of("steps", "Step by step", blocks, words("walks.periods", periods))
+    return Section.create("steps", "Step by step", blocks, words("walks.periods", periods))
 
 
 def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
