@@ -13,7 +13,7 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.paper.sections import describe_recorded, recorded_tables
 from walkerlab.exchange.walk_in_steps import MOST_SAMPLES
@@ -313,7 +313,7 @@ def test_noise_that_blurs_heel_strikes_is_reported(tmp_path, noise):
     path = written(tmp_path, table(simulated("rigid"), noise=noise))
     config, notes = load(None, (f"recording.file={json.dumps(str(path))}",)).config, Notes()
     with contextlib.suppress(ConfigError):  # a walk may be hidden altogether
-        recorded_walk.run(only(config, PIPELINE["recorded-walk"].takes), {}, notes)
+        recorded_walk.run(restrict(config, PIPELINE["recorded-walk"].takes), {}, notes)
     if noise < 0.01:
         assert notes.lines == []
         return

@@ -45,7 +45,7 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
             rigid.append(describe("slope_rad", config.slope_rad, slope))
         if contact is not None:
             of_contact += describe_differences(walker, paper, CONTACT_MODEL_KEYS)
-            of_contact += describe_differences(contact.in_si(), Contact().in_si(), SI_KEYS, "contact.{} (SI)")
+            of_contact += describe_differences(contact.to_si(), Contact().to_si(), SI_KEYS, "contact.{} (SI)")
             of_contact += describe_differences(contact, Contact(), UNITLESS_KEYS, "contact.{}")
     if start_moved:
         of_contact.append("the start is not the rigid model's fixed point")

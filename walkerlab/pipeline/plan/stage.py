@@ -188,7 +188,7 @@ class Stage:
         """Raise ConfigError if the `refuse` function of an on-demand stage's module rejects the config."""
         refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
         if refuse is not None:
-            refuse(reads.only(config, self.takes_under(config)))
+            refuse(reads.restrict(config, self.takes_under(config)))
 
     @property
     def draws(self) -> bool:

@@ -28,7 +28,7 @@ QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("m
 @stage_section(CONTACT_STAGE)
 def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
     ground = results.config.contact
-    text = "" if ground is None else words("walks.ground", ground, ground.in_si(), summary)
+    text = "" if ground is None else words("walks.ground", ground, ground.to_si(), summary)
     quantities = table("The contact model's walk", QUANTITY_COLUMNS, contact_rows(summary), wordy=True)
     residual = joules(summary["energy_balance_residual_J"])
     finding = words("walks.finding", summary, 2 * results.config.strides, residual)
