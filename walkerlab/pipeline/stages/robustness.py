@@ -127,7 +127,7 @@ def run(
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue
-        gaits = gait.by_leg()
+        gaits = gait.split_by_leg()
         answer["gait_sensitivity_norm"] += [row for each in gaits for row in norms(row_of(subject, each), each)]
         rough_walks = [*rough_ground_units(subject, config)]
         label = f"robustness: {subject.model} model"
@@ -232,7 +232,7 @@ def single_of(subject: ModelUnderTest, leg: int, disturbance: Any, sign: float, 
     reactions.
     """
     size = largest_disturbance(subject.quick_by_leg()[leg], disturbance, sign, steps)
-    gait = subject.gait_on_map().by_leg()[leg]
+    gait = subject.gait_on_map().split_by_leg()[leg]
     if disturbance == "hip-push" and isinstance(gait.step_map, RigidMap):
         return [size, *gait.step_map.ground_after_push(gait.z, gait.p, sign * size, steps, gait.swing)]
     return [size]
