@@ -275,7 +275,7 @@ def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) ->
     """The same walker and ground for the plain integration."""
     walker, contact = config.walker, config.contact
     assert contact is not None, "drawn with one"
-    si = contact.in_si()
+    si = contact.to_si()
     smooth = contact.friction == "none"
     return plain_walk.Plain(
         *plain_legs(walker), walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness,

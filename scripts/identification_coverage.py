@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import f as fisher
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
@@ -115,7 +115,7 @@ class Truth:
 
     def __init__(self, name, keys, level="steps", disturbed_by="floor"):
         self.config, self.keys, self.level = load(Path(name)).config, keys, level
-        self.gait = in_memory("fixedpoint", self.config).summary
+        self.gait = run_in_memory("fixedpoint", self.config).summary
         self.model = CONTACT if level == "contact" else RIGID
         subject = find_model_gait(self.model, self.config, self.gait, lambda _: None)
         self.family = ConfigFamily(self.config, keys)

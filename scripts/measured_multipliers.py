@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.loader import load
 from walkerlab.outcome import Outcome
 from walkerlab.physics.orbits.family_search import RIGID
@@ -43,7 +43,7 @@ def multipliers(before, after, noise=0.0):
 
 def main(name, trials):
     config = load(Path(name)).config
-    subject = find_model_gait(RIGID, config, in_memory("fixedpoint", config).summary, lambda _: None)
+    subject = find_model_gait(RIGID, config, run_in_memory("fixedpoint", config).summary, lambda _: None)
     family, draw = ConfigFamily(config, ()), np.random.default_rng(0)
     walks, z = step_map_of(subject, family), subject.z
     own = np.sort(np.abs(np.linalg.eigvals(walks.step(z, ()).DP)))[::-1]

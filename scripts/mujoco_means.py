@@ -17,7 +17,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.loader import load
 from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.exchange.export import export_model
@@ -60,7 +60,7 @@ MEANS = {
 def exported(name, *settings):
     """Text of the model, our walk, the law's depth at rest, and whether the ground consists of pads."""
     config = load(Path(name), settings).config
-    gait = in_memory("fixedpoint", config).summary
+    gait = run_in_memory("fixedpoint", config).summary
     start = gait["step_length_m"], gait["state"]
     asymmetry = gait["asymmetry"]["step_length"]
     export = prepare_export(config, *start, asymmetry)

@@ -172,7 +172,7 @@ def test_arguments_that_are_not_a_config_are_rejected(asked, message):
 
 def test_omitted_arguments_default_to_the_built_in_config(monkeypatch):
     asked = []
-    monkeypatch.setattr("walkerlab.api.memory.in_memory", lambda stage, config: asked.append(config))
+    monkeypatch.setattr("walkerlab.api.memory.run_in_memory", lambda stage, config: asked.append(config))
     walkerlab.find_gait()
     walkerlab.simulate()
     walkerlab.continue_gait()

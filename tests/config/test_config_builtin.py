@@ -49,7 +49,7 @@ def test_as_printed_differs_from_the_paper_by_the_equations_only() -> None:
 def test_wrong_units_config_reads_the_papers_values_in_si() -> None:
     contact = load(Path("contact-si")).config.contact
     assert contact is not None
-    law = contact.in_si()
+    law = contact.to_si()
     assert (law.stiffness, law.exponent, law.damping) == (1e5, 1.0, 90.0)
     assert (law.full_damping_penetration, law.static_friction, law.dynamic_friction) == (1e-4, 0.9, 0.7)
     assert (law.stiction_velocity, law.friction_velocity) == (0.1, 1.0)

@@ -21,7 +21,7 @@ from walkerlab.config.reads import (
     StartConfig,
     canonical_json,
     dotted_keys,
-    only,
+    restrict,
     slice_of,
 )
 from walkerlab.config.schema import Config, Contact
@@ -94,7 +94,7 @@ def test_slice_contains_only_the_keys_that_a_type_names() -> None:
 
 def test_missing_block_is_none() -> None:
     assert slice_of(Config(), ContactConfig)["contact"] is None
-    assert only(Config(), ContactConfig).contact is None
+    assert restrict(Config(), ContactConfig).contact is None
 
 
 def test_slice_does_not_depend_on_the_order_of_keys() -> None:
@@ -105,14 +105,14 @@ def test_slice_does_not_depend_on_the_order_of_keys() -> None:
 
 def test_slice_without_a_type_is_the_whole_config() -> None:
     assert slice_of(CONFIG, None) == CONFIG.model_dump(mode="json")
-    assert only(CONFIG, None) is CONFIG
+    assert restrict(CONFIG, None) is CONFIG
 
 
 def test_slice_with_an_unknown_key_is_a_bug() -> None:
     with pytest.raises(KeyError, match="slope_deg"):
         slice_of(CONFIG, MisspeltConfig)
     with pytest.raises(AttributeError, match="slope_deg"):
-        only(CONFIG, MisspeltConfig)
+        restrict(CONFIG, MisspeltConfig)
 
 
 def test_equal_contents_have_equal_canonical_json() -> None:
@@ -123,16 +123,16 @@ def test_equal_contents_have_equal_canonical_json() -> None:
 
 
 def test_slice_has_the_same_values_as_the_config() -> None:
-    given = only(CONFIG, SceneConfig)
+    given = restrict(CONFIG, SceneConfig)
     assert given.walker is CONFIG.walker
     assert given.contact is CONFIG.contact
     assert given.slope_rad == 0.0174
-    assert only(CONFIG, SimulateConfig).solver.rigid is CONFIG.solver.rigid
+    assert restrict(CONFIG, SimulateConfig).solver.rigid is CONFIG.solver.rigid
 
 
 @pytest.mark.parametrize("key", ["strides", "solver.rigid.atol", "solver.model_dump", "model_dump"])
 def test_slice_has_no_other_keys(key: str) -> None:
-    given, (*blocks, name) = only(CONFIG, StartThenTolerance), key.split(".")
+    given, (*blocks, name) = restrict(CONFIG, StartThenTolerance), key.split(".")
     for block in blocks:
         given = getattr(given, block)
     with pytest.raises(AttributeError, match=name):

@@ -172,7 +172,7 @@ def test_outputs_are_sorted_and_unique() -> None:
 
 
 def test_adams_units_convert_to_si() -> None:
-    in_si = Contact().in_si()
+    in_si = Contact().to_si()
     assert in_si.stiffness == pytest.approx(3.98107170553e11, rel=1e-11)  # 1e5 * 10**6.6
     assert in_si.damping == 9.0e4
     assert in_si.full_damping_penetration == pytest.approx(1e-4, rel=1e-15)
@@ -182,21 +182,21 @@ def test_adams_units_convert_to_si() -> None:
 
 @given(st.floats(1.0, 3.0), st.floats(1e-3, 1e3))
 def test_contact_force_does_not_depend_on_the_units_of_the_law(exponent: float, penetration_mm: float) -> None:
-    law = Contact(exponent=exponent).in_si()
+    law = Contact(exponent=exponent).to_si()
     in_adams_units = 1e5 * penetration_mm**exponent
     assert law.stiffness * (penetration_mm / 1000) ** exponent == pytest.approx(in_adams_units, rel=1e-12)
 
 
 @given(st.floats(1.0, 3.0))
 def test_contact_defaults_are_equal_in_both_unit_systems(exponent: float) -> None:
-    adams, si = Contact(exponent=exponent).in_si(), Contact(units="si", exponent=exponent).in_si()
+    adams, si = Contact(exponent=exponent).to_si(), Contact(units="si", exponent=exponent).to_si()
     assert adams.units == si.units == "si"
     for name in ("stiffness", "damping", "full_damping_penetration", "stiction_velocity", "friction_velocity"):
         assert getattr(adams, name) == pytest.approx(getattr(si, name), rel=1e-14)
 
 
 def test_si_values_are_not_converted() -> None:
-    law = Contact(units="si", stiffness=1e5, exponent=1.0, damping=90.0).in_si()
+    law = Contact(units="si", stiffness=1e5, exponent=1.0, damping=90.0).to_si()
     assert (law.stiffness, law.damping, law.full_damping_penetration) == (1e5, 90.0, 1e-4)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from adams_dataset import Dataset
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.loader import load
 from walkerlab.exchange.export import add_stops, export_model
 from walkerlab.exchange.exported import prepare_export
@@ -25,7 +25,7 @@ def with_gait(name, *sets):
 def gait_of(name, *sets):
     """Config and summary of its rigid gait."""
     config = load(Path(name), sets).config
-    return config, in_memory("fixedpoint", config).summary
+    return config, run_in_memory("fixedpoint", config).summary
 
 
 def asymmetry_of(name, *sets):

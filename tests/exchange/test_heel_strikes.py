@@ -20,7 +20,7 @@ from filmed_walks import (
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.columns import SAMPLE, RecordedWalk
 from walkerlab.exchange.leg_angles import mend_angles
@@ -424,8 +424,8 @@ def test_running_is_reported(tmp_path):
 @functools.cache
 def kneed_walk():
     config = load(Path("kneed"), ("strides=3",)).config
-    gait = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
-    return simulate.run(only(config, PIPELINE["simulate"].takes), gait, Silent()).groups["trajectory"], config
+    gait = {"fixedpoint": fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    return simulate.run(restrict(config, PIPELINE["simulate"].takes), gait, Silent()).groups["trajectory"], config
 
 
 @pytest.mark.parametrize(("name", "count"), [("angle", 0), ("shank_angle", 2)])

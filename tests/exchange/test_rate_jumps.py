@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.recording import Recorded
 from walkerlab.exchange.columns import as_walk
 from walkerlab.exchange.rate_jumps import MOST_FOUND, sums_at_jumps
@@ -24,13 +24,13 @@ RATE_HZ = 100.0
 
 
 def found_gait(config):
-    return {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    return {"fixedpoint": fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
 
 
 def recorded(name, strides=4):
     """Return the config's walker, and times and noisy angles (samples, 2) of its gait."""
     config = load(Path(name), (f"strides={strides}",)).config
-    trajectory = simulate.run(only(config, PIPELINE["simulate"].takes), found_gait(config), Silent()).groups[
+    trajectory = simulate.run(restrict(config, PIPELINE["simulate"].takes), found_gait(config), Silent()).groups[
         "trajectory"
     ]
     rising = np.append(True, np.diff(trajectory["time"]) > 0.0)

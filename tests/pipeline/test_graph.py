@@ -21,7 +21,7 @@ from walkerlab.config.reads import (
     SceneCasesConfig,
     dotted_keys,
     keys_of,
-    only,
+    restrict,
     slice_of,
 )
 from walkerlab.config.schema import QUESTIONS, Config
@@ -65,7 +65,7 @@ def test_table_names_the_config_type_in_the_signature_of_the_stage(stage):
 def test_stage_receives_exactly_the_config_values_of_its_key(stage, config):
     loaded = load(Path(config)).config
     takes = stage.takes_under(loaded)
-    assert shown(only(loaded, takes)) == (set(Config.model_fields) if takes is None else set(dotted_keys(takes)))
+    assert shown(restrict(loaded, takes)) == (set(Config.model_fields) if takes is None else set(dotted_keys(takes)))
 
 
 def shown(given):

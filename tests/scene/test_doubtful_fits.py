@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from measured_plain_walk import measure_angles, measure_steps
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.fit import MOVE_TOLERANCE
@@ -116,7 +116,7 @@ OUTLYING_LENGTHS = (
 @cache
 def walker(*sets):
     config = load(Path("slope-3deg"), sets).config
-    gait = in_memory("fixedpoint", config).summary
+    gait = run_in_memory("fixedpoint", config).summary
     return config, gait, rigid_walker(config), np.array(gait["state"])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.files import builtin_config
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.walkers import second_of
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.exported import prepare_export
@@ -165,7 +165,7 @@ def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     block = "{over: walker.leg_2.leg_mass_kg, from: 4.9, to: 5.1, model: rigid, periods: 2, points: 30}"
     config = config_of("paper", f"continuation={block}")
     assert config.walker.leg_2 is None
-    content = continuation.run(only(config, PIPELINE["continuation"].takes), {}, Silent(), again=False)
+    content = continuation.run(restrict(config, PIPELINE["continuation"].takes), {}, Silent(), again=False)
     rows = content.summary["branches"]
     assert [row["period"] for row in rows] == [2, 2]
     assert sorted(row["stable_range"] is not None for row in rows) == [False, True]

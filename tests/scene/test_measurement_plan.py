@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.analyses import Plan
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
@@ -26,7 +26,7 @@ def config():
 
 @pytest.fixture(scope="module")
 def gait(config):
-    return in_memory("fixedpoint", config).summary
+    return run_in_memory("fixedpoint", config).summary
 
 
 @pytest.fixture(scope="module")

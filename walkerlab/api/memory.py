@@ -93,12 +93,12 @@ class ContactKeys(TypedDict, total=False):
 def shows(keys: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return a decorator that shows the names of a TypedDict as parameters, so that notebooks complete them."""
 
-    def with_signature(function: Callable[P, R]) -> Callable[P, R]:
+    def copy_signature(function: Callable[P, R]) -> Callable[P, R]:
         named = [inspect.Parameter(key, KEYWORD, default=None) for key in keys.__annotations__]
         vars(function)["__signature__"] = inspect.signature(function).replace(parameters=named)
         return function
 
-    return with_signature
+    return copy_signature
 
 
 def passed(keys: Mapping[str, object]) -> dict[str, Setting]:
@@ -185,7 +185,7 @@ def find_gait(walker: Walker | None = None, slope_deg: float | None = None, **ke
     >>> gait.stable, round(gait.period_s, 4)
     (True, 0.7343)
     """
-    return cast(Gait, in_memory("fixedpoint", config_of_scene(walker, {"slope_deg": slope_deg}, keys)))
+    return cast(Gait, run_in_memory("fixedpoint", config_of_scene(walker, {"slope_deg": slope_deg}, keys)))
 
 
 def simulate(
@@ -214,7 +214,7 @@ def simulate(
     """
     values = {"slope_deg": slope_deg, "contact": contact, "strides": strides}
     config = config_of_scene(walker, values, keys)
-    return in_memory("simulate" if contact is None else "contact-sim", config)
+    return run_in_memory("simulate" if contact is None else "contact-sim", config)
 
 
 def continue_gait(
@@ -241,7 +241,7 @@ def continue_gait(
     """
     ends = {} if span is None else dict(zip(("from", "to"), two_numbers("span", plain(span)), strict=True))
     values = {"slope_deg": slope_deg, **stage_block("continuation", keys, over=over, **ends)}
-    return in_memory("continuation", config_of_scene(walker, values, keys))
+    return run_in_memory("continuation", config_of_scene(walker, values, keys))
 
 
 def basin(
@@ -261,7 +261,7 @@ def basin(
     (6, 4)
     """
     values = {"slope_deg": slope_deg, **stage_block("basin", keys, cells=cells)}
-    return in_memory("basin", config_of_scene(walker, values, keys))
+    return run_in_memory("basin", config_of_scene(walker, values, keys))
 
 
 def robustness(
@@ -287,7 +287,7 @@ def robustness(
     True
     """
     values = {"slope_deg": slope_deg, **stage_block("robustness", keys, to=to or None, walks=walks)}
-    return in_memory("robustness", config_of_scene(walker, values, keys))
+    return run_in_memory("robustness", config_of_scene(walker, values, keys))
 
 
 def design(walker: Walker | None = None, over: Mapping[str, Setting] | None = None, **keys: Setting) -> Result:
@@ -304,7 +304,7 @@ def design(walker: Walker | None = None, over: Mapping[str, Setting] | None = No
     >>> best.best
     {'slope_deg': 3.0}
     """
-    return in_memory("design", config_of_scene(walker, stage_block("design", keys, over=over or {}), keys))
+    return run_in_memory("design", config_of_scene(walker, stage_block("design", keys, over=over or {}), keys))
 
 
 def read_walk(
@@ -334,7 +334,7 @@ def read_walk(
     stated = {name: keys.pop(name) for name in Recorded.model_fields.keys() & keys.keys()}
     recording = {"file": str(path), "columns": dict(columns or {}), "units": dict(units or {}), **stated}
     values = {"slope_deg": slope_deg, "recording": recording}
-    return in_memory("recorded-walk", config_of_scene(walker, values, keys))
+    return run_in_memory("recorded-walk", config_of_scene(walker, values, keys))
 
 
 def identify(
@@ -368,7 +368,7 @@ def identify(
             return identify(path, config, fit, prior, **keys)
     bounds = dict(fit) if isinstance(fit, Mapping) else dict.fromkeys(fit)
     block: dict[str, Setting] = {**keys, "data": str(walk), "fit": bounds, "prior": dict(prior or {})}
-    return in_memory("identify", with_blocks(config, identify=block))
+    return run_in_memory("identify", add_blocks(config, identify=block))
 
 
 def check(
@@ -392,7 +392,7 @@ def check(
     start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
     known = {} if start.check is None else start.check.model_dump(mode="json", exclude_none=True, by_alias=True)
     block = {**known, **keys, **({} if printed is None else {"printed": dict(printed)})}
-    return in_memory("check", with_blocks(start, **({"check": block} if block else {})))
+    return run_in_memory("check", add_blocks(start, **({"check": block} if block else {})))
 
 
 def plan_measurements(
@@ -418,7 +418,7 @@ def plan_measurements(
     'angles over time'
     """
     question: dict[str, Setting] = {"fit": dict.fromkeys(fit), "prior": dict(prior or {}), "model": model}
-    return in_memory("plan", with_blocks(config, identify=question, plan=keys))
+    return run_in_memory("plan", add_blocks(config, identify=question, plan=keys))
 
 
 def explore(
@@ -453,7 +453,7 @@ def explore(
     return server
 
 
-def in_memory(stage: str, config: Config) -> Result:
+def run_in_memory(stage: str, config: Config) -> Result:
     """Compute a stage and its inputs without files.
 
     Raises ConfigError if the config lacks a block that the stage needs.
@@ -484,13 +484,13 @@ def config_of_scene(walker: Walker | None, values: Mapping[str, Setting], keys: 
     lines = {key: plain(value) for key, value in {"name": "memory", **keys, **scene}.items()}
     replaced = {"source", "contact", *({"walker"} & lines.keys())}
     upper = tree_of(lines, NOWHERE)
-    tree = merge_layers([*(layer.without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
+    tree = merge_layers([*(layer.copy_without(*replaced) for layer in read_layers(builtin_config(DEFAULT))), upper])
     config, moved = align_start(validate_tree(tree), tree)
     warn([*suspicious_values(config, tree), *moved], inside=1)
     return config
 
 
-def with_blocks(config: str | Path | Config, **blocks: Setting) -> Config:
+def add_blocks(config: str | Path | Config, **blocks: Setting) -> Config:
     """Return a config with some blocks replaced. `config` may also be a file, a built-in name or a run."""
     start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
     tree = {**start.model_dump(mode="json", exclude_none=True, by_alias=True), **blocks}

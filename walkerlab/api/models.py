@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from walkerlab.api.memory import config_of_scene, in_memory, plain, with_blocks
+from walkerlab.api.memory import add_blocks, config_of_scene, plain, run_in_memory
 from walkerlab.api.results import Gait, Result, Setting
 from walkerlab.api.runs import Run
 from walkerlab.config.contact import Contact
@@ -101,7 +101,7 @@ def mujoco_model(
     if isinstance(config, Gait):
         gait, config = config, _config_of(config)
     start = config.config if isinstance(config, Run) else config
-    scene = with_blocks(start, **{name: plain(value) for name, value in blocks.items()})
+    scene = add_blocks(start, **{name: plain(value) for name, value in blocks.items()})
     if isinstance(start, Config) and _identity_of_gait(start) != _identity_of_gait(scene):
         gait = None
     text = next(iter(_export_texts(scene, "mjcf", "contact", slope, None, gait).values()))
@@ -133,7 +133,7 @@ def _export_texts(
 
     inputs = {}
     if config.start == "fixed-point":
-        gait = gait or in_memory("fixedpoint", config)
+        gait = gait or run_in_memory("fixedpoint", config)
         if gait.no_answer is not None:
             raise NoAnswer(gait.no_answer)
         inputs["fixedpoint"] = gait.content

@@ -138,7 +138,7 @@ class PrintedAngles(_From):
 
     @field_validator("order")
     @classmethod
-    def _once(cls, value: tuple[Body, ...] | None) -> tuple[Body, ...] | None:
+    def _check_unique(cls, value: tuple[Body, ...] | None) -> tuple[Body, ...] | None:
         if value is not None and (len(set(value)) < len(value) or not value):
             raise meaning_error("must name each body once")
         return value

@@ -142,5 +142,5 @@ class Contact(Block):
         """Return the unit in use from a pair of units such as `mm or m`."""
         return either.split(" or ")[-1 if self.units == "si" else 0]
 
-    def in_si(self) -> Self:
+    def to_si(self) -> Self:
         return self if self.units == "si" else self.model_copy(update=from_mm(vars(self), self.exponent))

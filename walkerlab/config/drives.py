@@ -45,7 +45,7 @@ def drives_of(config: Any) -> tuple[str, ...]:
     """Describe the drives that supply energy to a config's walker."""
     push = config.push_off.impulse_N_s
     torque = config.walker.hip.torque_N_m
-    return nonzero_words(
+    return describe_nonzero(
         {f"a push-off of {short_number(push)} N s": push, f"a hip torque of {short_number(torque)} N m": torque}
     )
 
@@ -54,13 +54,13 @@ def springs_of(config: Any) -> tuple[str, ...]:
     """Describe the spring and damper between a walker's legs, which supply no energy."""
     stiffness = config.walker.hip.spring_N_m_per_rad
     damping = config.walker.hip.damping_N_m_s_per_rad
-    return nonzero_words({
+    return describe_nonzero({
         f"a hip spring of {short_number(stiffness)} N m/rad": stiffness,
         f"a hip damper of {short_number(damping)} N m s/rad": damping,
     })  # fmt: skip
 
 
-def nonzero_words(acting: Mapping[str, float]) -> tuple[str, ...]:
+def describe_nonzero(acting: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(words for words, value in acting.items() if value != 0.0)
 
 

@@ -75,7 +75,7 @@ def read_layers(file: ConfigFile) -> list[BlockNode]:
     refers to another file.
     """
     layers = [
-        replace_cases_file(root.without("extends"), layer_file.path.parent)
+        replace_cases_file(root.copy_without("extends"), layer_file.path.parent)
         for layer_file, root in files_and_blocks(file)
     ]
     return layers[::-1]
@@ -152,8 +152,8 @@ def replace_cases_file(layer: BlockNode, folder: Path) -> BlockNode:
     cases = read(_text_of(file, position, "a file that holds a list of cases"), file.label)
     if not isinstance(cases, ListNode):
         raise problem_error(Position(file.label, 1, 1), "the file does not hold a list", "a list of stability cases")
-    result = layer.without()
-    inner = block.without()
+    result = layer.copy_without()
+    inner = block.copy_without()
     inner.put("cases", cases, block.keys["cases"])
     result.put("stability", inner, layer.keys["stability"])
     return result
@@ -225,15 +225,15 @@ def merge_layers(layers: Sequence[BlockNode]) -> BlockNode:
     _refuse_two_slopes(merged.keys)
     for layer in layers[1:]:
         _refuse_two_slopes(layer.keys)
-        lower = merged.without("name")
+        lower = merged.copy_without("name")
         if any(name in layer.entries for name in SLOPE_KEYS):
-            lower = lower.without(*SLOPE_KEYS)
+            lower = lower.copy_without(*SLOPE_KEYS)
         merged = _merge_blocks(lower, layer)
     return merged
 
 
 def _merge_blocks(lower: BlockNode, upper: BlockNode) -> BlockNode:
-    result = lower.without()
+    result = lower.copy_without()
     for name, node in upper.entries.items():
         below = lower.entries.get(name)
         if isinstance(below, BlockNode) and isinstance(node, BlockNode):
@@ -283,14 +283,14 @@ def apply_settings(tree: BlockNode, settings: Sequence[ConfigSetting]) -> BlockN
     copies: dict[int, BlockNode] = {}
     for setting in settings:
         if setting.path[0] in SLOPE_KEYS:
-            tree = tree.without(*SLOPE_KEYS)
+            tree = tree.copy_without(*SLOPE_KEYS)
         tree = _place_setting(tree, setting, 0, copies)
     return tree
 
 
 def _place_setting(block: BlockNode, setting: ConfigSetting, depth: int, copies: dict[int, BlockNode]) -> BlockNode:
     """Place a setting in a copy of a block. `copies` holds, by id, the copies that earlier settings made."""
-    result = copies.get(id(block)) or block.without()
+    result = copies.get(id(block)) or block.copy_without()
     copies[id(result)] = result
     name = setting.path[depth]
     if depth == len(setting.path) - 1:

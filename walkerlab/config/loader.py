@@ -65,7 +65,7 @@ class LoadedConfig:
         """The config without settings."""
         return align_start(validate_tree(self.base_tree), self.base_tree)[0]
 
-    def placed(self, error: ConfigError) -> ConfigError:
+    def add_position(self, error: ConfigError) -> ConfigError:
         """Prepend the position of the key at fault to an error's message, if the key is in the config's text."""
         where = node_at(self.tree, error.key)[1] if error.key and self.tree.entries.get(str(error.key[0])) else None
         return ConfigError(f"{where}: {error.message}", error.advice) if where else error
@@ -99,7 +99,7 @@ def load(
     start = Position(file.label, 1, 1)
     if "name" not in tree.entries:
         safe = safe_name(file.path.stem)
-        tree = tree.without()
+        tree = tree.copy_without()
         tree.put("name", Scalar(start, safe, safe), start)
     settings = [parse_setting(text) for text in sets]
     options = {"strides": strides, "name": name}
@@ -242,7 +242,7 @@ def paper_config_with_tree(upper: BlockNode) -> Config:
     contact = upper.entries.get("contact")
     units = contact.entries.get("units") if isinstance(contact, BlockNode) else None
     if isinstance(units, Scalar) and units.value == "si":
-        layers = [layer.without("contact") for layer in layers]
+        layers = [layer.copy_without("contact") for layer in layers]
     tree = merge_layers([*layers, upper])
     tree.put("name", Scalar(upper.position, DEFAULT, DEFAULT), upper.position)
     return align_start(validate_tree(tree), tree)[0]
@@ -274,7 +274,7 @@ def check_ground(case: Case, config: Config, lines: BlockNode) -> None:
         raise problem_error(where, f"contact: case {case.name} needs a contact block but has none", "model: rigid")
     if not isinstance(config.start, tuple):
         return
-    # Steps are judged by the length of the start's step even where it lays no pads, so it must not be 0.
+    # Walks are judged relative to the step length of the start, even on ground without pads, so it must not be 0.
     by_start = config.contact.pad_pitch == "rigid" or config.contact.terrain == "after-mid-swing"
     if by_start and config.start[0] == config.start[1]:
         where = lines.keys.get("start", lines.position)

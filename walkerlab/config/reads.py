@@ -45,11 +45,11 @@ def dotted_keys(takes: type) -> Iterator[str]:
         yield from (name,) if part is None else (f"{name}.{key}" for key in dotted_keys(part))
 
 
-def only(config: Any, takes: type | None) -> Any:
+def restrict(config: Any, takes: type | None) -> Any:
     """Return an object with only the keys of a type, or the config itself if the type is None."""
     if takes is None:
         return config
-    return SimpleNamespace(**{name: only(getattr(config, name), part) for name, part in keys_of(takes).items()})
+    return SimpleNamespace(**{name: restrict(getattr(config, name), part) for name, part in keys_of(takes).items()})
 
 
 class PushOffAtOnce(Protocol):

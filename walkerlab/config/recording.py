@@ -13,7 +13,7 @@ Tilt = Annotated[
 
 
 class Recorded(Block):
-    """Statements about a file with a recorded walk that the file does not make itself."""
+    """Properties of a recorded walk that its file does not state."""
 
     columns: dict[Text, Text] = key(
         dict,

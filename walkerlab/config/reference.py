@@ -41,7 +41,15 @@ class KeyReference:
 def keys() -> Iterator[KeyReference]:
     """Yield every key of a config file, in the schema's order."""
     builtins = ", ".join(builtin_names())
-    yield KeyReference("extends", "text", "", f"a file, {builtins}", "none", EXTENDS_MEANING, "this project")
+    yield KeyReference(
+        key="extends",
+        type="text",
+        unit="",
+        bounds=f"a file, {builtins}",
+        default="none",
+        meaning=EXTENDS_MEANING,
+        source="this project",
+    )
     for path, field in leaves(Config):
         yield _reference(path, field)
         if path == ("slope_rad",):

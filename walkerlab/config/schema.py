@@ -71,7 +71,7 @@ MID_STEP: Final = "mid-step"
 
 
 class MidStep(BaseModel):
-    """Start between two heel strikes, which is walked as it is."""
+    """Start between two heel strikes, used without change."""
 
     model_config = Block.model_config
 

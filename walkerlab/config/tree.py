@@ -51,7 +51,7 @@ class BlockNode:
         self.entries[name] = node
         self.keys[name] = position
 
-    def without(self, *names: str) -> "BlockNode":
+    def copy_without(self, *names: str) -> "BlockNode":
         entries = {name: node for name, node in self.entries.items() if name not in names}
         return BlockNode(self.position, entries, {name: self.keys[name] for name in entries})
 

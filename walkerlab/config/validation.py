@@ -217,7 +217,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
         text = f"{location[0]}.type: {printable(word)} is not a known type{f'; {beyond}' if beyond else ''}"
         allowed = f"one of {', '.join(kinds)}{advise_extensions()}"
         return Problem(position, text, allowed, "" if beyond else nearest(word, kinds))
-    # pydantic inserts the kind of value that it tried
+    # Pydantic inserts the kind of value that it tried into the location of an error.
     if len(location) > 1 and location[1] in (*kinds, MID_STEP):
         location = (location[0], *location[2:])
     if what == "extra_forbidden":

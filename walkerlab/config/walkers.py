@@ -174,7 +174,7 @@ class SecondStraightLeg(Block):
 
 
 def check_second_leg() -> Any:
-    """Validate that the keys of `leg_2` make a leg: both legs like it must make a walker."""
+    """Validate the keys of `leg_2`: a walker with two legs like it must be valid."""
 
     def makes_a_leg(cls: Any, value: Any, info: ValidationInfo) -> Any:
         if value is not None and info.data.keys() >= cls.model_fields.keys() - {"leg_2"}:
@@ -189,20 +189,20 @@ def check_second_leg() -> Any:
 
 
 def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> Any:
-    """Build the walker whose two legs are both like leg 2. `values` are the keys of the walker by name."""
+    """Build the walker with two legs like leg 2. `values` are the keys of the walker by name."""
     second = {name: value for name, value in values.items() if name != "leg_2"}
     if getattr(leg, "type", None) is not None:
         shared = {
             name: second[name] for name in ("hip_mass_kg", "foot_radius_m", "foot_centre_ahead_m", "torso", "hip")
         }
-        locked = with_locked_knee(second["thigh"], second["shank"])
+        locked = lock_knee(second["thigh"], second["shank"])
         return StraightLegs.model_validate({**shared, **locked, **leg.model_dump(exclude_none=True)})
     for name, value in leg.model_dump(exclude_none=True).items():
         second[name] = {**dict(second[name]), **value} if isinstance(value, dict) else value
     return kind.model_validate(second)
 
 
-def second_leg_in_words(walker: Any) -> str:
+def describe_second_leg(walker: Any) -> str:
     """Describe the keys of leg 2 that a config states, with their values, or return '' if it states none."""
     leg = getattr(walker, "leg_2", None)
     keys = {} if leg is None else leg.model_dump(exclude_none=True)
@@ -213,8 +213,8 @@ def second_leg_in_words(walker: Any) -> str:
     return ", ".join(stated)
 
 
-def with_locked_knee(thigh: Any, shank: Any) -> dict[str, float]:
-    """Return the keys of a straight leg that is made of a thigh and a shank."""
+def lock_knee(thigh: Any, shank: Any) -> dict[str, float]:
+    """Return the keys of the straight leg that a thigh and a shank with a locked knee form."""
     mass = thigh.mass_kg + shank.mass_kg
     below = thigh.mass_kg * thigh.mass_below_hip_m + shank.mass_kg * (thigh.length_m + shank.mass_below_knee_m)
     ahead = thigh.mass_kg * thigh.mass_ahead_m + shank.mass_kg * shank.mass_ahead_m
@@ -233,7 +233,7 @@ def with_locked_knee(thigh: Any, shank: Any) -> dict[str, float]:
 
 
 def second_of(walker: Any) -> Any:
-    """Return the walker whose two legs are both like leg 2, or the walker itself if it has no `leg_2`."""
+    """Return the walker with two legs like leg 2, or the walker itself if it has no `leg_2`."""
     return walker if getattr(walker, "leg_2", None) is None else built_second(walker)
 
 
@@ -642,7 +642,7 @@ def why_no_push_off(walker: Any) -> str:
 
 
 def why_no_push_on(walker: Any) -> str:
-    """Explain why a leading leg like the walker's first cannot take a push-off, or return '' if it can."""
+    """Explain why a leading leg like the walker's first cannot receive a push-off, or return '' if it can."""
     if not isinstance(walker, CompassWalker | StraightLegs):
         free = walker.knee.at_heel_strike == "free"
         return "cannot act: it needs a locked trailing knee, but walker.knee.at_heel_strike is free" if free else ""

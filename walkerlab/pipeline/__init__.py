@@ -1,1 +1,1 @@
-"""Pipeline of stages on three floors: `plan` decides what to do, `run` does it, and `store` keeps the results."""
+"""Pipeline of stages in three layers: `plan` decides what to do, `run` does it, and `store` keeps the results."""

@@ -1,4 +1,4 @@
-"""Headline quantities of each stage's summary, those that a sweep can record, and comparison of two runs by them."""
+"""Headline quantities of stages, quantities that a sweep can record, and comparison of two runs by headlines."""
 
 from __future__ import annotations
 

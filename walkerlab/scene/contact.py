@@ -197,7 +197,7 @@ def ground_laws(contact: Contact) -> tuple[Any, Any]:
 
     Raises ConfigError if a law that an extension added is incomplete.
     """
-    si = contact.in_si()
+    si = contact.to_si()
     normal, friction = (ground_law(key, getattr(contact, key), si) for key in LAW_KINDS)
     return normal, friction
 

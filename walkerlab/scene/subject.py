@@ -52,7 +52,10 @@ class ModelUnderTest:
     def quick_by_leg(self) -> list[GaitOnMap]:
         """Return the gait from the start of each leg's step (once for equal legs), on a map of quick walks."""
         quick = QUICK_WALKS[self.model]
-        return [gait._replace(step_map=gait.step_map.replace_tolerances(quick)) for gait in self.gait_on_map().by_leg()]
+        return [
+            gait._replace(step_map=gait.step_map.replace_tolerances(quick))
+            for gait in self.gait_on_map().split_by_leg()
+        ]
 
     @property
     def units(self) -> Units:

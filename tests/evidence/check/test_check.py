@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 import walkerlab
-from walkerlab.api.memory import with_blocks
+from walkerlab.api.memory import add_blocks
 from walkerlab.config.check import Check, digits_of, parse_printed
 from walkerlab.config.files import BUILTIN_FOLDER, builtin_names
 from walkerlab.config.loader import load
@@ -194,7 +194,7 @@ def test_gravity_of_one_and_two_steps_are_conventions():
 def test_a_leg_measured_to_the_foots_centre_is_found():
     right = find_gaits(rigid_walker(load(PUBLISHED / "passivewalker-2009.yaml").config), 0).gait
     short = {**SCRIPT, "walker": {**SCRIPT["walker"], "leg_length_m": 1.0}}
-    config = with_blocks("round-feet", **short)
+    config = add_blocks("round-feet", **short)
     answer = walkerlab.check(config, {"state": [f"{value:.8f}" for value in right.state]})
     assert answer.explanations[0]["what"] == "the stated leg length excludes the foot's radius"
 

@@ -8,7 +8,7 @@ from late_imports import import_late
 from numpy.testing import assert_allclose
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.evidence.paper import compare
 from walkerlab.evidence.paper.study import study_the_paper
 from walkerlab.pipeline.plan.graph import PIPELINE
@@ -98,7 +98,7 @@ def compared(gaits):
         rigid = simulate.run(load(None, ["solver.rigid.rtol=1e-9"]).config, {"fixedpoint": gaits}, Silent())
         walk = contact_walk(rigid, steps, *leave_out, outcome=outcome, samples=samples)
         inputs = {"fixedpoint": fixedpoint, "simulate": rigid, "contact-sim": walk}
-        return compare.run(only(config, TAKES), inputs, Silent())
+        return compare.run(restrict(config, TAKES), inputs, Silent())
 
     return result
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import NoAnswer
 from walkerlab.evidence.paper import tune
 from walkerlab.evidence.paper.tune_limit import LimitFindings, causes
@@ -25,8 +25,8 @@ from walkerlab.views.report.words import words
 def tuned(config, *sets):
     """The stage's result with a small map."""
     loaded = load(Path(config), sets).config
-    gait = fixedpoint.run(only(loaded, PIPELINE["fixedpoint"].takes), {}, Silent())
-    return tune.run(only(loaded, PIPELINE["tune"].takes), {"fixedpoint": gait}, Silent())
+    gait = fixedpoint.run(restrict(loaded, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return tune.run(restrict(loaded, PIPELINE["tune"].takes), {"fixedpoint": gait}, Silent())
 
 
 def small(config, *sets, cells=3):

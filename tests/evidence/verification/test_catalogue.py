@@ -112,5 +112,5 @@ def test_cases_of_equal_name_are_rejected():
 def test_contact_block_in_si_gives_the_same_quantities():
     si = config_of(Case(name="si", expected=("walked",), reason="none", config={"contact": {"units": "si"}}))
     paper = config_of(CASES["paper"])
-    assert si.contact.in_si().stiffness == pytest.approx(paper.contact.in_si().stiffness)
-    assert si.contact.in_si().stiction_velocity == pytest.approx(paper.contact.in_si().stiction_velocity)
+    assert si.contact.to_si().stiffness == pytest.approx(paper.contact.to_si().stiffness)
+    assert si.contact.to_si().stiction_velocity == pytest.approx(paper.contact.to_si().stiction_velocity)

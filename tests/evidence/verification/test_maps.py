@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.evidence.verification import stability_maps
 from walkerlab.evidence.verification.stability_maps import (
     ERROR_MISSING,
@@ -40,7 +40,7 @@ class CutOff(Silent):
 
 
 def run(folder, progress=None, jobs=1):
-    config = only(load(None, [f"stability.map_cells={CELLS}"]).config, PIPELINE["stability-maps"].takes)
+    config = restrict(load(None, [f"stability.map_cells={CELLS}"]).config, PIPELINE["stability-maps"].takes)
     checkpoint = Checkpoint(folder / "maps.parts", "key")
     return stability_maps.run(config, {}, progress or Silent(), checkpoint=checkpoint, jobs=jobs)
 
@@ -57,8 +57,8 @@ def test_cell_of_the_paper_walks():
 
 
 def test_ground_of_the_paper_is_a_cell_of_the_map():
-    contact = prepare_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.in_si()
-    assert vars(contact) == pytest.approx(vars(load().config.contact.in_si()))
+    contact = prepare_on_ground(PAPER_STIFFNESS, 0.1, 4, 1000)[1].contact.to_si()
+    assert vars(contact) == pytest.approx(vars(load().config.contact.to_si()))
 
 
 def test_small_fixed_step_is_accurate_and_its_error_falls_with_its_size():

@@ -84,7 +84,7 @@ def test_scaling_to_the_twin_and_back_restores_the_walker():
     again = scaled(scaled(PAPER, by), back)
     assert again.walker.leg_length_m == pytest.approx(PAPER.walker.leg_length_m)
     assert again.gravity_m_s2 == pytest.approx(PAPER.gravity_m_s2)
-    one, other = again.contact.in_si(), PAPER.contact.in_si()
+    one, other = again.contact.to_si(), PAPER.contact.to_si()
     assert vars(one) == pytest.approx(vars(other))
 
 

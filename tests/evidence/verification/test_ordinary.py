@@ -40,9 +40,9 @@ def test_reference_is_accurate_at_any_tolerance_of_the_case():
     ("off", "verdict"), [(1e-3, "fine"), (0.1, "wrong silently"), (100.0, "diverges"), (np.nan, "diverges")]
 )
 def test_verdict_depends_on_the_error(off, verdict):
-    assert ARRIVAL.judged("m", np.full(8, off), 1, 0.0).verdict == verdict
+    assert ARRIVAL.judge_end("m", np.full(8, off), 1, 0.0).verdict == verdict
 
 
 def test_unfinished_run_has_no_error():
-    choice = ARRIVAL.judged("m", None, MAX_ORDINARY_EVALUATIONS, 0.0)
+    choice = ARRIVAL.judge_end("m", None, MAX_ORDINARY_EVALUATIONS, 0.0)
     assert (choice.verdict, choice.error) == ("gives up", None)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.fit import linearise
@@ -25,7 +25,7 @@ STEPS, PARTICLES, ROUGHNESS_M, NOISE = 4, 1000, 2e-4, np.array([1e-3, 1e-3])
 @pytest.fixture(scope="module")
 def problem():
     config = load(Path("slope-3deg")).config
-    subject = find_model_gait("rigid", config, in_memory("fixedpoint", config).summary, print)
+    subject = find_model_gait("rigid", config, run_in_memory("fixedpoint", config).summary, print)
     question = Identify(fit={"slope_deg": None})
     rng = np.random.default_rng(5)
     planned = MeasuredWalk(np.ones(STEPS), np.ones(STEPS))

@@ -204,7 +204,7 @@ def gait_on_map(walker):
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_legs_disturbed_steps_are_those_of_plain_integration(kind):
     plain = draw_walker(kind, 8)
-    for gait in gait_on_map(model_of(plain)).by_leg():
+    for gait in gait_on_map(model_of(plain)).split_by_leg():
         model = model_of(plain) if gait.leg == 1 else model_of(plain).exchanged
         start = states_on_section(model, np.array(gait.z) / [1.0, *[gait.units.time] * 2])
         rises = (2e-3 * gait.units.length, -5e-4 * gait.units.length)
@@ -217,7 +217,7 @@ def test_each_legs_disturbed_steps_are_those_of_plain_integration(kind):
 @pytest.mark.parametrize("disturbance", ["floor-drop", "hip-push"])
 @pytest.mark.parametrize(("kind", "seed"), [("masses", 1), ("round", 1), ("kneed", 1), ("one knee", 2)])
 def test_each_legs_sensitivity_norm_equals_a_brute_force_sum(kind, seed, disturbance):
-    for gait in gait_on_map(model_of(draw_walker(kind, seed))).by_leg():
+    for gait in gait_on_map(model_of(draw_walker(kind, seed))).split_by_leg():
         unit = gait.unit_of(disturbance)
         walks = {k: walk_disturbed(gait, disturbance, k * 1e-5 * unit, 90) for k in (-2, -1, 1, 2)}
         seen = {k: indicators(walk) for k, walk in walks.items()}
@@ -230,8 +230,8 @@ def test_each_legs_sensitivity_norm_equals_a_brute_force_sum(kind, seed, disturb
 @pytest.mark.parametrize("kind", ["masses", "kneed"])
 def test_exchanged_labels_exchange_what_each_leg_withstands(kind):
     plain = draw_walker(kind, 3)
-    gaits = gait_on_map(model_of(plain)).by_leg()
-    exchanged = gait_on_map(model_of(replace(plain, legs=plain.legs[::-1]))).by_leg()
+    gaits = gait_on_map(model_of(plain)).split_by_leg()
+    exchanged = gait_on_map(model_of(replace(plain, legs=plain.legs[::-1]))).split_by_leg()
     assert [gait.leg for gait in gaits] == [gait.leg for gait in exchanged] == [1, 2]
     for one, other in zip(gaits, exchanged[::-1], strict=True):
         for disturbance in DISTURBANCES:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError
 from walkerlab.outcome import Outcome
 from walkerlab.physics.orbits.basin import ATOL, RTOL
@@ -40,7 +40,7 @@ class CutOff(Silent):
 
 
 def run(folder, *sets, progress=None, jobs=1, **gait):
-    config = only(load(None, sets or SMALL).config, PIPELINE["basin"].takes)
+    config = restrict(load(None, sets or SMALL).config, PIPELINE["basin"].takes)
     checkpoint = Checkpoint(folder / "basin.parts", "key")
     inputs = {"fixedpoint": Content({}, GAIT | gait)}
     with pytest.MonkeyPatch.context() as patch:
@@ -159,7 +159,7 @@ def test_walkers_with_more_coordinates_are_rejected(tmp_path):
     inputs = {"fixedpoint": Content({}, GAIT)}
     with pytest.raises(ConfigError, match="3 coordinates just after heel strike; this one has 4"):
         basin.run(
-            only(free, PIPELINE["basin"].takes), inputs, Silent(), checkpoint=Checkpoint(tmp_path / "parts", "key")
+            restrict(free, PIPELINE["basin"].takes), inputs, Silent(), checkpoint=Checkpoint(tmp_path / "parts", "key")
         )
 
 
@@ -208,8 +208,8 @@ def test_basin_of_nearly_equal_legs_is_that_of_equal_legs(whole, tmp_path):
 
 def test_starts_of_a_limping_walker_reach_the_gait_that_fixedpoint_finds(tmp_path):
     config = load(Path("prosthesis"), ()).config
-    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
-    asked = only(load(Path("prosthesis"), ("basin.cells=[8,8]", "basin.refine=1")).config, PIPELINE["basin"].takes)
+    gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    asked = restrict(load(Path("prosthesis"), ("basin.cells=[8,8]", "basin.refine=1")).config, PIPELINE["basin"].takes)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(basin, "SEARCHED_STARTS", 100)
         content = basin.run(

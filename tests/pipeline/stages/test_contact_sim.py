@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.outcome import Outcome
@@ -52,7 +52,7 @@ STUMBLE = "start=[-0.2042, 0.1694, 0, 0]"
 
 def run(*sets, inputs=(("fixedpoint", GAIT),)):
     config = load(None, sets).config
-    return contact_sim.run(only(config, PIPELINE["contact-sim"].takes), dict(inputs), Silent())
+    return contact_sim.run(restrict(config, PIPELINE["contact-sim"].takes), dict(inputs), Silent())
 
 
 @pytest.fixture(scope="module")
@@ -170,7 +170,7 @@ def test_ground_carries_the_walker_and_never_pulls(paper):
 
 
 def test_equal_names_mean_the_same_in_both_models(paper):
-    rigid = simulate.run(only(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
+    rigid = simulate.run(restrict(load().config, PIPELINE["simulate"].takes), {"fixedpoint": GAIT}, Silent())
     for group, expected in SHARED.items():
         ours, theirs = (walk[group].variables for walk in (paper, rigid))
         shared = ours.keys() & theirs
@@ -291,7 +291,7 @@ def test_tolerance_too_loose_for_friction_is_reported(atol, told):
     notes = []
     sets = ("contact.units=si", "contact.stiction_velocity=1e-7", "contact.friction_velocity=1e-6", "strides=1")
     config = load(None, (*sets, f"solver.contact.atol={atol}")).config
-    contact_sim.run(only(config, PIPELINE["contact-sim"].takes), {"fixedpoint": GAIT}, Listener())
+    contact_sim.run(restrict(config, PIPELINE["contact-sim"].takes), {"fixedpoint": GAIT}, Listener())
     assert any("stiction_velocity" in note and "lower solver.contact.atol" in note for note in notes) is told
 
 
@@ -334,7 +334,7 @@ def test_mid_step_start_continues_the_whole_walk():
 def simulate_from(state, time_s, slope_rad):
     """State of the rigid walk from a state, some time later in its first step."""
     config = load(None, [f"slope_rad={slope_rad}", f"start={{instant: mid-step, state: {state}}}"]).config
-    walk = simulate.run(only(config, PIPELINE["simulate"].takes), {}, Silent()).groups["trajectory"].variables
+    walk = simulate.run(restrict(config, PIPELINE["simulate"].takes), {}, Silent()).groups["trajectory"].variables
     place = int(np.searchsorted(walk["time"].values, time_s))
     samples = [walk[name].values[place - 1 : place + 1] for name in ("angle", "velocity")]
     share = (time_s - walk["time"].values[place - 1]) / np.diff(walk["time"].values[place - 1 : place + 1])[0]

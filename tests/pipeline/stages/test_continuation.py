@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.orbits import family_search
 from walkerlab.physics.orbits import two_parameters as plane_of_gaits
@@ -43,7 +43,7 @@ KEYS = ("over", "from", "to", "model", "periods", "points", "second.over", "seco
 
 
 def follow(*sets):
-    return continuation.run(only(config(*sets), PIPELINE["continuation"].takes), {}, Silent())
+    return continuation.run(restrict(config(*sets), PIPELINE["continuation"].takes), {}, Silent())
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_values_are_in_the_unit_of_the_requested_key(in_degrees):
 def test_spring_is_followed_from_zero_and_isolated_gaits_are_no_branch():
     sets = {"over": "walker.hip.spring_N_m_per_rad", "from": 0, "to": 40, "periods": 1}
     asked = load(Path("level"), [f"continuation.{key}={value}" for key, value in sets.items()]).config
-    summary = continuation.run(only(asked, PIPELINE["continuation"].takes), {}, Silent(), again=False).summary
+    summary = continuation.run(restrict(asked, PIPELINE["continuation"].takes), {}, Silent(), again=False).summary
     assert len(summary["branches"]) == 2
     for branch in summary["branches"]:
         assert (branch["from"], branch["to"]) == (0.0, 40.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.orbits.design import DesignProblem, Point, count_optima, search_from_starts
 from walkerlab.physics.orbits.fixed_point import find_gaits
@@ -31,9 +31,9 @@ FIXED_KEYS = {
 
 def run(name, *changes, checkpoint=None):
     config = load(Path(name), changes).config
-    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())
     return design.run(
-        only(config, PIPELINE["design"].takes),
+        restrict(config, PIPELINE["design"].takes),
         {"fixedpoint": gait},
         Silent(),
         checkpoint=checkpoint or Checkpoint(None, ""),
@@ -193,7 +193,7 @@ def test_settled_kneed_walk_costs_as_much_as_its_gait():
 
 def largest_at(slope_deg):
     config = load(Path("slope-3deg"), [f"slope_deg={slope_deg!r}"]).config
-    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
     subject = find_model_gait("rigid", config, gait, lambda _: None)
     return {name: largest_disturbance(*subject.quick_by_leg(), *LARGEST[name], 50) for name in LARGEST}
 
@@ -256,7 +256,7 @@ def test_largest_step_of_a_limping_walker_is_that_of_its_weaker_leg():
     found = run("prosthesis", "design.maximise=largest_step_down_m", over, "robustness.steps=3", "design.starts=1")
     best = f"walker.leg_2.leg_mass_kg={found['best']['walker.leg_2.leg_mass_kg']!r}"
     config = load(Path("prosthesis"), (best,)).config
-    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
     legs = find_model_gait("rigid", config, gait, print).quick_by_leg()
     assert len(legs) == 2
     sizes = [largest_disturbance(leg, *LARGEST["largest_step_down_m"], 3) for leg in legs]

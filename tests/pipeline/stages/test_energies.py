@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, fixedpoint, simulate
@@ -32,7 +32,7 @@ def walks(request):
     config = load(base, (*sets, "strides=2")).config
     inputs = {}
     for stage, module in MODULES.items():
-        inputs[stage] = module.run(only(config, PIPELINE[stage].takes), inputs, Silent())
+        inputs[stage] = module.run(restrict(config, PIPELINE[stage].takes), inputs, Silent())
     return {stage: inputs[stage] for stage in ("simulate", "contact-sim")}
 
 

@@ -11,7 +11,7 @@ from walkerlab.config.analyses import Design
 from walkerlab.config.fields import leaves, type_words
 from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
 from walkerlab.physics.orbits.families import ValueSpan
@@ -88,7 +88,7 @@ def keys(config):
 
 def question(config, key, model):
     """What `continuation` asks over a small span above a key's own value, or below where that is the largest."""
-    taken = only(config, PIPELINE["continuation"].takes)
+    taken = restrict(config, PIPELINE["continuation"].takes)
     taken.continuation = config.continuation.model_copy(update={"model": model})
     parameter = parameter_of(key, taken)
     value = parameter.value_in(taken)
@@ -121,7 +121,7 @@ def test_second_continuation_parameter_is_accepted_or_rejected(walker, config, k
         span = question(config, key, "rigid").span
         second = {"over": key, "from": span.least, "to": span.most}
         block = Config.model_validate({"continuation": {"model": "rigid", "second": second}}).continuation
-        taken = only(config, PIPELINE["continuation"].takes)
+        taken = restrict(config, PIPELINE["continuation"].takes)
         taken.continuation = block
         models, refused = followed(replace(first, config=taken))
         assert models == (RIGID,) or refused.startswith("continuation.second")
@@ -137,12 +137,12 @@ def fixedpoint(config):
 @pytest.fixture(scope="module")
 def subject(config, fixedpoint):
     """The rigid model's gait, to be disturbed."""
-    taken = only(config, PIPELINE["robustness"].takes)
+    taken = restrict(config, PIPELINE["robustness"].takes)
     return next(robustness.subjects(taken, {"fixedpoint": fixedpoint}, Silent()))
 
 
 def test_design_has_gait_and_gradient_for_every_parameter(walker, config, keys, fixedpoint, subject):
-    taken = only(config, PIPELINE["design"].takes)
+    taken = restrict(config, PIPELINE["design"].takes)
     for key in keys:
         parameter, asked = parameter_of(key, taken), Design(minimise="period_s", over={key: [0.0, 1.0]})
         own = np.array([parameter.value_in(taken)])

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.pipeline.plan.graph import PIPELINE
@@ -33,7 +33,7 @@ FIXED_KEYS = {
 
 def run(again=True, **changes):
     config = Config.model_validate(changes)
-    return fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent(), again)
+    return fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent(), again)
 
 
 @pytest.fixture(scope="module")

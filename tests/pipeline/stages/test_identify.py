@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import Keys
@@ -33,19 +33,19 @@ GOOD = "period_s,length_m\n" + "".join(f"0.7{k},0.37{k}\n" for k in range(8))
 
 
 def taken(*changes):
-    return only(load(Path("paper"), changes).config, PIPELINE["identify"].takes)
+    return restrict(load(Path("paper"), changes).config, PIPELINE["identify"].takes)
 
 
 @pytest.fixture(scope="module")
 def gait():
     config = load(Path("paper"), ()).config
-    return {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    return {"fixedpoint": fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
 
 
 @pytest.fixture(scope="module")
 def transient(gait):
     config = load(Path("paper"), (START, "strides=10")).config
-    return simulate.run(only(config, PIPELINE["simulate"].takes), gait, Silent())
+    return simulate.run(restrict(config, PIPELINE["simulate"].takes), gait, Silent())
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +168,7 @@ def test_changing_the_file_changes_the_result_key(tmp_path):
     keys = []
     for text in (GOOD, GOOD.replace("0.373", "0.372"), GOOD):
         path.write_text(text)
-        keys.append(Keys().of(config, "identify")["identify"])
+        keys.append(Keys().compute(config, "identify")["identify"])
     assert keys[0] == keys[2] != keys[1]
 
 

@@ -14,7 +14,7 @@ from walkerlab.pipeline.stages import fixedpoint, walk
 CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, accuracy.MethodRow, CaseResult, Known)
 LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
-    "gait": fixedpoint.NUMBERS | fixedpoint.OF_KNEES,
+    "gait": fixedpoint.NUMBERS | fixedpoint.KNEE_LABELS,
     "walk": walk.OVER_TIME | walk.OF_STEPS,
     "limit": tune_limit.FACTOR_LABELS | tune_limit.DISTANCE_LABELS | tune_limit.WALK_LABELS,
 }

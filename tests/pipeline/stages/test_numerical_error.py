@@ -4,7 +4,7 @@ import pytest
 from annotated_types import Ge
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import SolverSettings
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.hybrid import recorded_walk
@@ -25,7 +25,9 @@ OF_FEET = {"slip_m": "slips_m", "rolling_m": "rolling_m"}
 
 def walk(stage, *sets, **options):
     config = load(None, sets).config
-    return MODULES[stage].run(only(config, PIPELINE[stage].takes), {"fixedpoint": GAIT}, Silent(), **options).summary
+    return (
+        MODULES[stage].run(restrict(config, PIPELINE[stage].takes), {"fixedpoint": GAIT}, Silent(), **options).summary
+    )
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.progress import Silent
@@ -27,13 +27,13 @@ def configured(*changes):
 
 
 def taken(*changes):
-    return only(configured(*changes), PIPELINE["plan"].takes)
+    return restrict(configured(*changes), PIPELINE["plan"].takes)
 
 
 @pytest.fixture(scope="module")
 def content():
     config = configured()
-    gait = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    gait = {"fixedpoint": fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
     return plan.run(taken(FIT, *SHORT, "plan.errors={slope_deg: 0.02, walker.leg_length_m: 1e-9}"), gait, Silent())
 
 

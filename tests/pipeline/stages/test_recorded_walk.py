@@ -13,9 +13,9 @@ import pytest
 
 import walkerlab
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.paper.sections import recorded_tables, recorded_words
+from walkerlab.evidence.paper.sections import describe_recorded, recorded_tables
 from walkerlab.exchange.walk_in_steps import MOST_SAMPLES
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import MemoryResults
@@ -159,7 +159,7 @@ def test_comparison_shows_the_recorded_walk_in_a_third_column(tmp_path):
     characteristics, differences = recorded_tables(summary)
     assert characteristics.columns[-1].title == "mine"
     assert len(differences.groups[""]) == 4
-    assert "mine: the last step takes 0.7036 s" in recorded_words(summary)
+    assert "mine: the last step takes 0.7036 s" in describe_recorded(summary)
 
 
 def test_figures_label_the_recorded_walk_with_its_name(tmp_path):
@@ -313,7 +313,7 @@ def test_noise_that_blurs_heel_strikes_is_reported(tmp_path, noise):
     path = written(tmp_path, table(simulated("rigid"), noise=noise))
     config, notes = load(None, (f"recording.file={json.dumps(str(path))}",)).config, Notes()
     with contextlib.suppress(ConfigError):  # a walk may be hidden altogether
-        recorded_walk.run(only(config, PIPELINE["recorded-walk"].takes), {}, notes)
+        recorded_walk.run(restrict(config, PIPELINE["recorded-walk"].takes), {}, notes)
     if noise < 0.01:
         assert notes.lines == []
         return
@@ -345,7 +345,7 @@ def test_comparison_lists_unused_parts_of_a_recording(tmp_path):
         "steps": {"recorded": {"period_s": 0.7, "length_m": 0.37}},
         "doubts": read.summary["doubts"],
     }
-    assert "Not used: kinetic_J" in recorded_words(stored)
+    assert "Not used: kinetic_J" in describe_recorded(stored)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")

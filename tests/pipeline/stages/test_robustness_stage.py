@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.hybrid.rigid_measures import reactions
@@ -37,8 +37,8 @@ FEW = ("robustness.walks=20", "robustness.roughness_m=[0.002]", "robustness.to=[
 
 def run(name, *changes, jobs=1, checkpoint=None):
     config = load(Path(name), changes).config
-    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
-    asked = only(config, PIPELINE["robustness"].takes)
+    gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    asked = restrict(config, PIPELINE["robustness"].takes)
     return robustness.run(
         asked, {"fixedpoint": gait}, Silent(), checkpoint=checkpoint or Checkpoint(None, ""), jobs=jobs
     )
@@ -177,7 +177,7 @@ def test_parameter_without_valid_neighbours_is_reported_with_the_reason():
 
 
 def test_gradients_do_not_depend_on_the_number_of_processes(rigid):
-    asked = only(load(Path("slope-3deg"), ("robustness.model=rigid",)).config, PIPELINE["robustness"].takes)
+    asked = restrict(load(Path("slope-3deg"), ("robustness.model=rigid",)).config, PIPELINE["robustness"].takes)
     gait = fixedpoint.run(asked, {}, Silent())
     subject, numbers = next(robustness.subjects(asked, {"fixedpoint": gait}, Silent())), rigid.summary["gaits"][0]
     keys = ("slope_deg", "walker.hip_mass_kg")

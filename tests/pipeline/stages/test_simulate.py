@@ -11,7 +11,7 @@ import pytest
 
 from walkerlab.config.ground import Footholds
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.physics.hybrid import recorded_walk
@@ -45,8 +45,8 @@ def run(**changes):
     config = Config.model_validate(changes)
     inputs = {}
     if PIPELINE["simulate"].inputs(config):
-        inputs["fixedpoint"] = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())
-    return simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
+        inputs["fixedpoint"] = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())
+    return simulate.run(restrict(config, PIPELINE["simulate"].takes), inputs, Silent())
 
 
 @pytest.fixture(scope="module")
@@ -116,8 +116,8 @@ def test_stored_forces_and_energies_agree_with_the_summary(paper):
 
 def test_rolling_distance_is_the_travel_of_the_lowest_foot_point():
     config = load(Path("round-feet"), ["strides=2"]).config
-    inputs = {"fixedpoint": fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
-    walk = simulate.run(only(config, PIPELINE["simulate"].takes), inputs, Silent())
+    inputs = {"fixedpoint": fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent())}
+    walk = simulate.run(restrict(config, PIPELINE["simulate"].takes), inputs, Silent())
     trajectory = walk["trajectory"]
     for step, rolled in enumerate(walk["steps"]["rolling_m"]):
         along = trajectory["foot_along_m"][trajectory["step"] == step, 1 - step % 2]
@@ -210,8 +210,8 @@ def test_other_method_walks_the_same_steps(paper):
 
 
 def test_long_walk_needs_memory_only_for_its_steps():
-    inputs = {"fixedpoint": fixedpoint.run(only(Config(), PIPELINE["fixedpoint"].takes), {}, Silent())}
-    config = only(Config(strides=2000, outputs=()), PIPELINE["simulate"].takes)
+    inputs = {"fixedpoint": fixedpoint.run(restrict(Config(), PIPELINE["fixedpoint"].takes), {}, Silent())}
+    config = restrict(Config(strides=2000, outputs=()), PIPELINE["simulate"].takes)
     tracemalloc.start()
     try:
         result = simulate.run(config, inputs, Silent())
@@ -234,7 +234,7 @@ def test_mid_step_start_is_simulated_unchanged():
 @pytest.mark.parametrize("name", ["paper", "torso", "kneed-round-feet"])
 def test_walk_continues_equally_from_any_mid_step_state(name):
     config = load(Path(name), ["strides=2"]).config
-    gait = fixedpoint.run(only(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
+    gait = fixedpoint.run(restrict(config, PIPELINE["fixedpoint"].takes), {}, Silent()).summary
     scene = rigid_scene(config, Footholds(), ("states",))
     whole = scene.walk(tuple(gait["state"]), 3, EXACT_STEPS, sampled=True)
     first = np.flatnonzero(whole.samples.time_s < whole.touch_time_s[0] - 1e-9)[1::9]

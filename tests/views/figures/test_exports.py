@@ -15,7 +15,7 @@ from synthetic_walks import both_models
 
 from walkerlab.api import open_run
 from walkerlab.config.loader import load
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
 from walkerlab.config.writer import to_yaml
 from walkerlab.errors import ConfigError, StaleError
@@ -76,7 +76,7 @@ def test_exported_figure_equals_that_of_the_page(run, monkeypatch):
     results = {**everything(), **families()}
     for name, result in results.items():
         write(run.artifact(name), Content(result.groups, result.summary), result.identity, begin(load().config, {}))
-    drawn = plot.run(only(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
+    drawn = plot.run(restrict(Config(), PIPELINE["plot"].takes), results, Silent(), run.path).summary["figures"]
     assert {Path(entry["svg"]).stem for entry in drawn} == READERS_OF_RESULTS
     for name in READERS_OF_RESULTS:
         path = export_from(run, name, Target("svg", None), FIGURE_WIDTH, "", QUIET)

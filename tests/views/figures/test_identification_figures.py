@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from walkerlab.views.figures.identification import combination_in_words
+from walkerlab.views.figures.identification import describe_combination
 
 MASS = {"key": "walker.hip_mass_kg", "value": 10.0, "unit": "kg"}
 OFFSET = {"key": "angle_offset_rad", "value": 0.0, "unit": "rad"}
@@ -20,4 +20,4 @@ LENGTH = {"key": "walker.leg_length_m", "value": 0.4, "unit": "m"}
     ],
 )
 def test_parameters_that_change_together_are_listed_with_their_shares(rows, move, words):
-    assert combination_in_words(rows, np.array(move)) == words
+    assert describe_combination(rows, np.array(move)) == words

@@ -6,7 +6,7 @@ import pytest
 from synthetic_methods import measured_methods
 from synthetic_walks import both_models, rigid_alone
 
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.store import artifact
@@ -33,7 +33,7 @@ class Count:
 
 
 def draw(folder, results, left_out=(), progress=None, early=None):
-    return plot.run(only(Config(), PIPELINE["plot"].takes), results, progress or Count(), folder, left_out, early)
+    return plot.run(restrict(Config(), PIPELINE["plot"].takes), results, progress or Count(), folder, left_out, early)
 
 
 @pytest.fixture(scope="module")

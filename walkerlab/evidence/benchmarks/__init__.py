@@ -1,1 +1,1 @@
-"""Benchmarks of methods and engines: walks, references and ladders of tolerances."""
+"""Benchmarks of integration methods and of other engines."""

@@ -26,7 +26,7 @@ from walkerlab.pipeline.store.checkpoint import Checkpoint, Numbers
 from walkerlab.pipeline.store.content import Content, rows_group
 from walkerlab.scene.rigid import rigid_walker
 
-# sizes of runs, in right-hand sides
+# The sizes of runs below are counted in right-hand sides.
 RUN_BUDGET = 200_000  # limit of a compiled run, which ends hopeless runs
 # A library's right-hand sides take a hundred times as long, because its steps run in Python.
 LIBRARY_RUN_BUDGET = 20_000  # limit of a library's run
@@ -95,7 +95,7 @@ class MethodRow:
 
 
 def unit_name(*parts: object) -> str:
-    """Name a measurement in a checkpoint. One from another machine is not resumed, because run times are compared."""
+    """Name a measurement in a checkpoint. Names contain the machine, because run times are comparable only on one."""
     return "/".join(map(str, (platform.node(), *parts)))
 
 

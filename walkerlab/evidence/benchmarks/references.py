@@ -26,7 +26,8 @@ def walk_by_taylor(walker: RigidWalker, start: tuple[float, ...], steps: int) ->
     passing, striking = integrators(walker)
     state = np.array(start)
     for _ in range(steps):
-        # both feet are on the slope at the start too: look for the heel strike once the legs have passed each other
+        # Both feet are also on the slope at the start, so the search for the heel strike begins when the legs have
+        # passed.
         for integrator in (passing, striking) if state[0] < state[1] else (striking,):
             integrator.time, integrator.state[:] = 0.0, state
             integrator.reset_cooldowns()
@@ -67,7 +68,7 @@ def integrators(walker: RigidWalker) -> tuple[Any, Any]:
 
 
 REFERENCE_RUN_BUDGET = 20_000_000  # right-hand sides, enough for the million explicit steps that stiff ground takes
-# on stiff ground the error of an explicit step is all rounding: a tighter tolerance would only shrink the step
+# On stiff ground the error of an explicit step is only rounding, so a tighter tolerance would only shrink the step.
 TIGHTEST_CONTACT = {"dop853": 1e-12, "radau5": 1e-11}
 TIGHTEST_RIGID = {"dop853": 1e-14, "radau5": 1e-12}
 

@@ -39,7 +39,7 @@ class TrialRun:
 
 @dataclass(frozen=True)
 class RigidTrial:
-    """Walk of the rigid model. Its end state is the one just after the last impact."""
+    """Walk of the rigid model. Its end state is the state just after the last impact."""
 
     walker: RigidModel
     start: tuple[float, ...]
@@ -85,7 +85,7 @@ class RigidTrial:
 
 @dataclass(frozen=True)
 class ContactTrial:
-    """Walk on compliant ground. Its end state is the one at the last touch."""
+    """Walk on compliant ground. Its end state is the state at the last touch."""
 
     walker: ContactWalker
     ground: JudgedGround

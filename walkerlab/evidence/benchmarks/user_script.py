@@ -1,4 +1,4 @@
-"""Rigid walk as a user would script it with NumPy and SciPy, for comparison: matrices, a linear solve, an event."""
+"""Rigid walk as a user would program it with NumPy and SciPy, for comparison: matrices, a linear solve, an event."""
 
 from typing import Any
 

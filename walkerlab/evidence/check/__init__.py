@@ -1,1 +1,1 @@
-"""Checks of printed gaits: each printed value beside the right one, and an explanation where they differ."""
+"""Checks of printed gaits: compare each printed value with the right one, and explain differences."""

@@ -1,4 +1,4 @@
-"""Check of a printed gait: every printed value beside the right one, and why they differ."""
+"""Check of a printed gait: a comparison of every printed value with the right one, and explanations of differences."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from walkerlab.evidence.check.conventions import (
     Convention,
     coordinates_of,
     full_state,
+    put_feet_on_slope,
     start_from,
     stated,
-    with_feet_on_slope,
 )
-from walkerlab.evidence.check.explanations import Explanation, Question, explain, periodic_with, undecided
+from walkerlab.evidence.check.explanations import Explanation, Question, explain, find_periodic_changes, undecided
 from walkerlab.evidence.check.gaits import gait_near, plain_walker, scales, why_not_plain
 from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, PlainWalker
 from walkerlab.evidence.check.printed import (
@@ -46,7 +46,7 @@ SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L a
 SAME_GAIT: Final = 1e-6
 CHOSEN: Final = "chosen"
 PREFERENCE: Final = 0.5  # factor on the distance of the gait that `fixedpoint` chooses
-SMALL_VALUE: Final = 1e-3  # of a printed value, below which differences count absolutely
+SMALL_VALUE: Final = 1e-3  # smallest printed value whose differences are relative to it, not absolute
 OF_GAITS: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
     "energy_J", "energy_drift_J", "cost_of_transport", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m",
@@ -61,7 +61,7 @@ OF_WALKS: Final = {
     "step_periods_s": "period_s",
     "step_lengths_m": "step_length_m",
 }
-"""Values of `simulate` that may be printed, with those of the gait that they repeat."""
+"""Values of `simulate` that may be printed, with the equal values of `fixedpoint`."""
 RATES = "rate"
 ANGLES = "angle"
 
@@ -87,7 +87,7 @@ def refuse_unknown(config: CheckConfig) -> None:
 
 @dataclass(frozen=True)
 class Checked:
-    """A printed gait beside the right gaits of its walker."""
+    """A printed gait and the right gaits of its walker."""
 
     config: CheckConfig
     check: Check
@@ -124,12 +124,12 @@ class Checked:
                 printed = items_of({name: texts}, {})
                 unit = max(item.unit for item in printed)
                 numbers = [item.printed.value.real for item in printed]
-                found[name] = with_feet_on_slope(reading, self.walker, numbers, unit)
+                found[name] = put_feet_on_slope(reading, self.walker, numbers, unit)
         return found
 
     @property
     def convention(self) -> Convention:
-        """Convention of the printed state, or of a state as this package prints it."""
+        """Convention of the printed state or, if none is printed, this package's own."""
         default = stated(self.check.angles, self.check.instant, 2 * len(self.check.angles.order or (0, 0)), 3)
         return self.conventions.get("state") or self.conventions.get("state_before") or default
 
@@ -139,14 +139,14 @@ class Checked:
         return {"swing", "stance"}.issubset(self.convention.order)
 
     def printed_state(self, name: str, known: Floats) -> Floats | None:
-        """Return a printed state of all bodies. What is not printed is as in the state `known`."""
+        """Return a printed state of all bodies. Values that are not printed are those of the state `known`."""
         if name not in self.conventions:
             return None
         numbers = [item.printed.value.real for item in self.items if item.quantity == name]
         return self.conventions[name].read(self.walker, numbers, known)
 
     def rounding(self, name: str, known: Floats) -> Floats:
-        """Return how much the numbers of a state change if each printed one changes by a unit of its last digit."""
+        """Return the change of each number of a state if its printed value changes by a unit of the last digit."""
         convention = self.conventions[name]
         items = [item for item in self.items if item.quantity == name]
         numbers = np.array([item.printed.value.real for item in items])
@@ -191,7 +191,7 @@ class Checked:
         return other if moved and self.distance(other) < self.distance(nearest) else nearest
 
     def distance(self, walk: CheckedStep) -> float:
-        """Return how far a gait is from the printed values, each relative to its size."""
+        """Return the distance of a gait from the printed values, each relative to its size."""
         values = walk.values(self.items, self.convention)
         pairs = [(item.printed.value, values[item.name]) for item in self.items]
         return sum(
@@ -242,7 +242,7 @@ def check_gait(config: CheckConfig, explains: bool = True) -> dict[str, Any]:
     reason = why_not_plain(config)
     search = GaitSearch((), None, reason) if reason else find_gaits(rigid_walker(config), config.seed)
     if reason:
-        return answer_without(config.check, f"{reason}, so no second route vouches for the right values")
+        return answer_without(config.check, f"{reason}, so no second route confirms the right values")
     checked = Checked(config, config.check, search)
     rows = [as_row(item, right, verdict) for item, right, verdict in checked.judged()]
     if checked.right is None:
@@ -253,7 +253,7 @@ def check_gait(config: CheckConfig, explains: bool = True) -> dict[str, Any]:
     explanations, closest = explain(question) if differs and explains else ([], None)
     periodic = periodicity(checked, question)
     if periodic and differs and explains and not periodic["is_periodic"]:
-        periodic["periodic_with"] = periodic_with(question)
+        periodic["periodic_with"] = find_periodic_changes(question)
     return {
         "source": config.check.source.model_dump(),
         "finding": finding_of(rows, explanations),
@@ -272,7 +272,7 @@ def check_gait(config: CheckConfig, explains: bool = True) -> dict[str, Any]:
 
 
 def answer_without(check: Check, reason: str) -> dict[str, Any]:
-    """Return the answer where there is no right gait to compare with."""
+    """Return the answer if there is no right gait to compare with."""
     items = items_of({**check.printed, "state_before": check.state_before}, {})
     rows = [as_row(item, None, judge(item, None, reason)) for item in items]
     nothing: dict[str, Any] = {"periodic": None, "momenta": [], "explanations": [], "nearest_gait": None}
@@ -298,12 +298,12 @@ def as_row(item: Item, right: complex | None, verdict: Judgement) -> dict[str, A
     }
 
 
-MORE_DIGITS: Final = 2  # of the right value than are printed
+MORE_DIGITS: Final = 2  # digits of a right value beyond those of the printed one
 MOST_DECIMALS: Final = 12
 
 
 def as_printed(right: complex, item: Item) -> str:
-    """Format a right value with some more digits than are printed."""
+    """Format a right value with `MORE_DIGITS` more digits than the printed one."""
     decimals = min(max(round(-math.log10(item.printed.real.unit)) + MORE_DIGITS, 0), MOST_DECIMALS)
     text = f"{right.real:.{decimals}f}"
     if item.printed.imaginary is None and not right.imag:
@@ -324,7 +324,7 @@ def finding_of(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explana
 
 
 def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
-    """Return how far the printed state is from periodic, or None if no state is printed or it does not step."""
+    """Measure how far the printed state is from periodic, or return None if none is printed or it does not walk."""
     walker = checked.walker
     right = question.right
     state = question.state if checked.has_both_legs else None
@@ -337,7 +337,7 @@ def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
     unit = scales(walker, len(start))
     known = full_state(right.start, walker.kneed)
     residual = np.abs(step.after - start)
-    # what rounding of the printed state alone leaves, of a state just after a strike
+    # change of the state just after a strike that is due to the rounding of the printed state alone
     rounding = coordinates_of(walker, checked.rounding("state", known))
     left = np.abs(right.derivative - np.eye(len(start))) @ rounding + EXACT_ERROR * unit
     largest = float((residual / unit).max())
@@ -359,7 +359,7 @@ def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
 
 
 def momenta(checked: Checked) -> list[dict[str, Any]]:
-    """Return the balances of angular momentum over the heel strike before the printed state."""
+    """Return the balances of angular momentum over the heel strike that precedes the printed state."""
     if checked.right is None or checked.convention.instant != "after-strike" or not checked.has_both_legs:
         return []
     walker = checked.walker

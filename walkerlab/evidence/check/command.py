@@ -62,7 +62,7 @@ OFFER = Offer(check, ("config", "sets", "as_json", "quiet", "verbose"))
 
 
 def configs_in(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield the configs themselves, and those in folders.
+    """Yield the given configs, and the configs in given folders.
 
     Raises ConfigError for a folder without any.
     """
@@ -95,7 +95,7 @@ def answer_to(path: Path, settings: Sequence[str], request: Request) -> dict[str
     try:
         return {"file": str(path), "name": loaded.config.name, **check_gait(loaded.config)}
     except ConfigError as error:
-        raise loaded.placed(error) from None
+        raise loaded.add_position(error) from None
 
 
 def print_answer(answer: dict[str, Any], first: bool) -> None:

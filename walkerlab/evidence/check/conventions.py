@@ -1,4 +1,4 @@
-"""Conventions of printed states: which angles, from where, in which order, at which instant and in which units."""
+"""Conventions of printed states: their angles, the origin of angles, the order, the instant and the units."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ BODIES: Final = {"swing": SWING, "stance": STANCE, "shank": SHANK}
 DEFAULT_ORDERS: Final = {2: ("stance",), 4: ("swing", "stance"), 6: ("swing", "stance", "shank")}
 GRAVITIES: Final = (1.0, 9.8, 9.81, 10.0)
 SCALED: Final = "sqrt(L/g)"
-FEET_DIGITS = 5.0  # units of the last digit by which both feet may miss the slope
+FEET_DIGITS = 5.0  # largest distance of the feet from the slope, in units of the last digit
 
 
 @dataclass(frozen=True)
 class Convention:
-    """Everything that a reader must know to read a printed state and printed times."""
+    """Conventions that determine the meaning of a printed state and of printed times."""
 
     origin: str  # vertical or slope-normal
     second: str  # absolute, relative or stance-minus-swing
@@ -71,7 +71,7 @@ class Convention:
         return list((pairs.T if self.layout == "interleaved" else pairs).ravel().tolist())
 
     def read(self, walker: PlainWalker, numbers: Sequence[float], known: Floats) -> Floats:
-        """Return the state that printed numbers describe. Bodies that are not printed are as in the state `known`."""
+        """Return the state that printed numbers describe. Bodies that are not printed move as in the state `known`."""
         n = len(known) // 2
         count = len(self.order)
         table = np.reshape(numbers, (count, 2)).T if self.layout == "interleaved" else np.reshape(numbers, (2, count))
@@ -148,10 +148,8 @@ def stated(angles: PrintedAngles, instant: Instant, count: int, bodies: int, nam
     return Convention(angles.origin, angles.second, angles.unit, angles.positive, order, angles.layout, instant)
 
 
-def with_feet_on_slope(
-    convention: Convention, walker: PlainWalker, numbers: Sequence[float], unit: float
-) -> Convention:
-    """Return the convention, with the sign of a relative angle with which both feet are on the slope.
+def put_feet_on_slope(convention: Convention, walker: PlainWalker, numbers: Sequence[float], unit: float) -> Convention:
+    """Return the convention with the sign of the relative angle chosen such that both feet are on the slope.
 
     unit  unit of the angles' last digit
     """

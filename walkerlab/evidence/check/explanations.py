@@ -1,7 +1,7 @@
-"""Search for what reproduces all printed values: other conventions, a known mistake, or a misprint.
+"""Search for a cause that reproduces all printed values: other conventions, a known mistake, or a misprint.
 
-Each candidate is a walker. One step from the printed state shows about where its gait is; only the best candidates are
-solved, and only a gait that has every printed digit is an explanation.
+Each candidate is a walker. A step from the printed state gives a first guess of its gait. Gaits are solved only for the
+best candidates, and only a gait with every printed digit is an explanation.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from walkerlab.config.numbers import short_number
 from walkerlab.config.reads import RigidConfig
 from walkerlab.evidence.check.conventions import Convention, alternatives, start_from
 from walkerlab.evidence.check.gaits import gait_near
-from walkerlab.evidence.check.misprints import misprints_of, parameters, transposed, walker_with
+from walkerlab.evidence.check.misprints import misprints_of, parameters, transposed, vary_walker
 from walkerlab.evidence.check.mistakes import MistakeFamily, families_of, mistakes_of
 from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
 from walkerlab.evidence.check.printed import Item
@@ -28,15 +28,17 @@ from walkerlab.evidence.check.walks import CheckedStep
 from walkerlab.labels import join_words
 
 REFINED: Final = 5  # candidates that are solved
-FARTHEST_GUESS = 0.3  # rad; a first guess farther from the printed state has no meaning
-SAME_WALK = 1e-7  # relative change of a first guess that is no change
-FITTING_ROUNDS, LEAST_GAIN = 4, 3.0  # of the size of a mistake, and how much closer it must bring the printed values
+FARTHEST_GUESS = 0.3  # rad; first guesses farther from the printed state are not used
+SAME_WALK = 1e-7  # largest relative difference between first guesses that count as the same
+# rounds that fit a mistake's size; smallest factor by which it must reduce the distance from the printed values
+FITTING_ROUNDS, LEAST_GAIN = 4, 3.0
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
 SIZE_SHARE = 0.03  # relative error of a fitted size within which a round one is tried
-LIMITS: Final = {"s": (2e-5, 0.2), "rad": (1e-5, 0.3)}  # of sizes; smaller ones are within a program's own errors
-FEW = 3  # numbers that can be explained while others are not
-MUCH_CLOSER = 5.0  # how much closer a cause must come to be worth telling
-MAX_CHANGES = 3  # of conventions, in one explanation
+# Ranges of sizes by their unit. Smaller sizes cannot be told from the usual errors of programs.
+LIMITS: Final = {"s": (2e-5, 0.2), "rad": (1e-5, 0.3)}
+MIN_EXPLAINED = 3  # fewest numbers that an explanation must reproduce if it does not reproduce all
+MUCH_CLOSER = 5.0  # smallest factor by which a reported cause reduces the largest difference
+MAX_CHANGES = 3  # most conventions that one explanation changes
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Question:
-    """Printed numbers that the plain model can compute, and the right gait beside them."""
+    """Printed numbers that the plain model can compute, and the right gait."""
 
     config: RigidConfig
     items: Sequence[Item]
@@ -71,19 +73,19 @@ class Question:
     def reproduced(
         self, walk: CheckedStep, convention: Convention | None = None, items: Sequence[Item] | None = None
     ) -> list[Item]:
-        """Return the printed numbers of which a gait has every digit."""
+        """Return the printed numbers that agree with a gait in every digit."""
         items = self.items if items is None else items
         values = walk.values(items, convention or self.convention)
         return [item for item in items if item.fits(values[item.name])]
 
     def fits(self, walk: CheckedStep, convention: Convention | None = None) -> bool:
-        """Whether a gait has every printed digit. What needs no derivative is compared first."""
+        """Whether a gait agrees with the printed numbers in every digit. Numbers that need no derivative come first."""
         return all(
             len(self.reproduced(walk, convention, items)) == len(items) for items in (self.quick_items, self.items)
         )
 
     def explained_by(self, attempt: Attempt) -> Explanation | None:
-        """Return what the gait of an attempt explains, or None if it explains too little.
+        """Return the explanation by the gait of an attempt, or None if it explains too little.
 
         The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
         right.
@@ -94,11 +96,11 @@ class Question:
         others = [item for item in self.items if item not in reproduced]
         kind = attempt.candidate.kind
         what = attempt.candidate.what
-        return self.explanation(kind, what, reproduced) if not others or len(reproduced) >= FEW else None
+        return self.explanation(kind, what, reproduced) if not others or len(reproduced) >= MIN_EXPLAINED else None
 
     @cached_property
     def right_items(self) -> list[Item]:
-        """Printed numbers of which the right gait has every digit."""
+        """Printed numbers that agree with the right gait in every digit."""
         return self.reproduced(self.right)
 
     def miss(self, walk: CheckedStep) -> float:
@@ -166,8 +168,8 @@ def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | Non
         return [], None
     if found := [*conventions(question), *misprinted_values(question)]:
         return found, None
-    attempts = [*solved(question, candidates(question)), *fitted(question)]
-    found = list(at_the_start(question))
+    attempts = [*solve_best(question, candidates(question)), *fit_families(question)]
+    found = list(strike_at_start(question))
     families: set[str] = set()
     for attempt in attempts:
         explanation = None if attempt.candidate.family in families else question.explained_by(attempt)
@@ -195,32 +197,32 @@ def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] |
 
 
 def candidates(question: Question) -> Iterator[Candidate]:
-    """Yield walkers with mistakes or misprints that have no size to fit."""
+    """Yield walkers with mistakes or misprints whose size is known."""
     for what, walker in mistakes_of(question.walker):
         yield Candidate("mistake", what, walker)
     for key, value, how, walker in misprints_of(question.config):
         yield Candidate("misprint", f"{key} is {short_number(value)} ({how})", walker)
 
 
-def solved(question: Question, walkers: Iterable[Candidate]) -> Iterator[Attempt]:
+def solve_best(question: Question, walkers: Iterable[Candidate]) -> Iterator[Attempt]:
     """Yield the gaits of the most promising candidates."""
     right = question.guess(question.walker)
     guesses = []
     for place, candidate in enumerate(walkers):
         guess = question.guess(candidate.walker)
-        if guess is not None and (right is None or not same(guess, right)):
+        if guess is not None and (right is None or not is_same_walk(guess, right)):
             guesses.append((question.miss(guess), place, candidate, guess))
     for _, _, candidate, guess in heapq.nsmallest(REFINED, guesses):
         yield from question.attempt(candidate, guess)
 
 
-def same(walk: CheckedStep, other: CheckedStep) -> bool:
+def is_same_walk(walk: CheckedStep, other: CheckedStep) -> bool:
     return bool(np.abs(walk.start - other.start).max() < SAME_WALK * np.abs(other.start).max())
 
 
-def fitted(question: Question) -> Iterator[Attempt]:
+def fit_families(question: Question) -> Iterator[Attempt]:
     """Yield the gaits of walkers with mistakes that have a size, which is fitted to the printed values."""
-    if len(question.items) < FEW:
+    if len(question.items) < MIN_EXPLAINED:
         return
     for family in families_of(question.walker):
         size = fitted_size(question, family)
@@ -235,12 +237,12 @@ def fitted(question: Question) -> Iterator[Attempt]:
 def fitted_size(question: Question, family: MistakeFamily) -> float | None:
     """Return the size of a mistake that brings its gait closest to the printed values, or None if none does."""
     low, high = LIMITS[family.unit]
-    without = misses(question, question.guess(family.of_size(0.0), EXACT))
+    without = signed_misses(question, question.guess(family.of_size(0.0), EXACT))
     size = family.first
     best = 0.0
     left = without
     for _ in range(FITTING_ROUNDS):
-        there = misses(question, question.guess(family.of_size(size), EXACT))
+        there = signed_misses(question, question.guess(family.of_size(size), EXACT))
         if without is None or there is None:
             return None
         slope = (there - without) / size
@@ -256,7 +258,7 @@ def fitted_size(question: Question, family: MistakeFamily) -> float | None:
     return best
 
 
-def misses(question: Question, walk: CheckedStep | None) -> Floats | None:
+def signed_misses(question: Question, walk: CheckedStep | None) -> Floats | None:
     """Return the signed distances of a walk from the printed values in units of their last digits."""
     if walk is None:
         return None
@@ -279,8 +281,8 @@ def sizes_to_try(size: float) -> Iterator[float]:
     yield size
 
 
-def at_the_start(question: Question) -> Iterator[Explanation]:
-    """Yield that a script meets the event at the start, if the multipliers have a -1 that the gait has not."""
+def strike_at_start(question: Question) -> Iterator[Explanation]:
+    """Yield the explanation that a script meets the event at the start, if only the printed multipliers contain -1."""
     listed = [item for item in question.items if item.quantity == "multipliers"]
     minus_one = [item for item in listed if item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
@@ -291,7 +293,7 @@ def at_the_start(question: Question) -> Iterator[Explanation]:
 
 
 def conventions(question: Question) -> list[Explanation]:
-    """Return other conventions under which the right gait has every printed digit, those with the fewest changes."""
+    """Return the conventions with the fewest changes under which the right gait has every printed digit."""
     found: list[tuple[int, str]] = []
     measures = {item.quantity for item in question.items}
     for what, walk in scenes(question):
@@ -327,7 +329,7 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
 
 
 def misprinted_values(question: Question) -> Iterator[Explanation]:
-    """Yield that one printed value lost its sign or has two digits transposed, if all but multipliers are right."""
+    """Yield explanations by one value with a lost sign or transposed digits, if all but multipliers are right."""
     items = [item for item in question.items if item.quantity != "multipliers"]
     values = question.right.values(items, question.convention)
     wrong = [item for item in items if not item.fits(values[item.name])]
@@ -344,8 +346,8 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
         yield question.explanation("misprint", f"two digits of the printed {name} are transposed", reproduced)
 
 
-def periodic_with(question: Question) -> list[dict[str, float | str]]:
-    """Return the parameters, and values, of which a change of one alone makes the printed state periodic."""
+def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
+    """Return parameters with new values, each of which alone makes the printed state periodic."""
     if question.state is None:
         return []
     states = replace(question, items=[item for item in question.items if item.quantity == "state"])
@@ -358,14 +360,12 @@ def periodic_with(question: Question) -> list[dict[str, float | str]]:
 
 
 def one_change(question: Question, key: str, value: float) -> float | None:
-    """Return the value of a parameter for which the printed state is periodic to its digits, or None if
-    none is near.
-    """
-    without = misses(question, question.guess(question.walker))
+    """Return the value of a parameter for which the printed state is periodic to its digits, or None."""
+    without = signed_misses(question, question.guess(question.walker))
     near = value * (1.0 + 1e-4)
     for _ in range(FITTING_ROUNDS):
-        changed = walker_with(question.config, key, near)
-        there = None if changed is None else misses(question, question.guess(changed))
+        changed = vary_walker(question.config, key, near)
+        there = None if changed is None else signed_misses(question, question.guess(changed))
         if without is None or there is None or near == value:
             return None
         slope = (there - without) / (near - value)
@@ -379,7 +379,7 @@ def one_change(question: Question, key: str, value: float) -> float | None:
 
 
 def undecided(explanations: Sequence[Explanation]) -> str:
-    """Say what would decide between several explanations, or return '' if there is at most one."""
+    """Return a sentence on how to decide between several explanations, or '' if there is at most one."""
     if len(explanations) < 2:
         return ""
     if {each.kind for each in explanations} == {"convention"}:

@@ -19,11 +19,12 @@ from walkerlab.evidence.check.plain_walker import (
     PlainWalker,
 )
 
-DIFFERENCE = 1e-6  # rad, and rad/s times sqrt(L/g)
+# Near the optimum of central differences of steps with errors of `EXACT`: rad, and rad/s times sqrt(L/g).
+DIFFERENCE = 1e-6
 MAX_MOVES = 16
 SMALLEST_MOVE = 1e-13
-ROUNDED = 1e-11  # residual that rounding may leave
-SLOW = 0.1  # ratio of two errors above which the derivative is computed anew
+MAX_RESIDUAL = 1e-11  # residual of a gait, which rounding may leave
+SLOW_RATIO = 0.1  # ratio of successive errors above which the derivative is computed again
 
 
 def why_not_plain(config: RigidConfig) -> str:
@@ -100,7 +101,7 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
 def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, PlainStep] | None:
     """Return start and step of the gait near a start, by Newton's method, or None if there is none.
 
-    A  derivative of a similar walker's step map, to begin with
+    A  derivative of a similar walker's step map, used at first
     """
     unit = scales(walker, len(start))
     identity = np.eye(len(start))
@@ -113,13 +114,13 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tu
         if step is not None and size < SMALLEST_MOVE:
             break
         if step is not None and size < last:
-            slow = size > SLOW * last
+            slow = size > SLOW_RATIO * last
             last = size
             old = x
             error = step.after - x
         elif last == math.inf:
             return None
-        elif last < ROUNDED:
+        elif last < MAX_RESIDUAL:
             step = walker.step(old)
             return None if step is None else (old, step)
         else:

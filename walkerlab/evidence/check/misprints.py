@@ -20,7 +20,7 @@ UNIT = re.compile(r"_(m|kg|kg_m2|rad|m_s2)$")
 
 
 class Misprint(NamedTuple):
-    """A parameter with another value than stated."""
+    """A parameter with a value other than the stated one."""
 
     key: str
     value: float
@@ -52,38 +52,38 @@ def numbers_in(prefix: str, block: Block) -> Iterator[tuple[str, float]]:
             yield f"{prefix}.{name}", value
 
 
-def with_value(config: RigidConfig, key: str, value: float) -> Changed:
-    """Return the config with another value of one parameter. It is not validated."""
+def replace_value(config: RigidConfig, key: str, value: float) -> Changed:
+    """Return the config with a new value of one parameter, without validation."""
     scene = Changed(config.walker, config.gravity_m_s2, config.slope_rad, config.push_off, config.equations)
     first, _, rest = key.partition(".")
-    changes: dict[str, Any] = {first: with_inner(config.walker, rest, value) if rest else value}
+    changes: dict[str, Any] = {first: replace_inner(config.walker, rest, value) if rest else value}
     return scene._replace(**changes)
 
 
-def with_inner(block: Block, key: str, value: float) -> Block:
+def replace_inner(block: Block, key: str, value: float) -> Block:
     first, _, rest = key.partition(".")
-    return block.model_copy(update={first: with_inner(getattr(block, first), rest, value) if rest else value})
+    return block.model_copy(update={first: replace_inner(getattr(block, first), rest, value) if rest else value})
 
 
 def misprints_of(config: RigidConfig) -> Iterator[Misprint]:
-    """Yield walkers of which one parameter is misprinted."""
+    """Yield walkers that differ from the stated one by a possible misprint of one parameter."""
     values = parameters(config)
     for key, value in values.items():
-        for other, how in misprinted(key, value, values):
-            changed = walker_with(config, key, other)
+        for other, how in possible_originals(key, value, values):
+            changed = vary_walker(config, key, other)
             if changed is not None:
                 yield Misprint(key, other, how, changed)
 
 
-def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | None:
-    """Return the plain walker with another value of one parameter, or None if it cannot be built."""
-    walker = plain_walker(with_value(config, key, value))
+def vary_walker(config: RigidConfig, key: str, value: float) -> PlainWalker | None:
+    """Return the plain walker with a new value of one parameter, or None if it cannot be built."""
+    walker = plain_walker(replace_value(config, key, value))
     turns = all(part.inertia + part.mass * abs(part.centre) ** 2 > 0.0 for part in walker.parts)
     return walker if turns and walker.leg_length > walker.radius >= 0.0 else None
 
 
-def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
-    """Return the values for which a value may be a misprint, and how it came about."""
+def possible_originals(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
+    """Return the values of which the given value may be a misprint, each with the kind of misprint."""
     same_unit = {name: other for name, other in values.items() if unit_of(name) == unit_of(key)}
     found = {other: f"the value of {name}" for name, other in same_unit.items()}
     found |= dict.fromkeys(transposed(value), "two digits are transposed")
@@ -101,7 +101,7 @@ def unit_of(key: str) -> str:
 
 
 def transposed(value: float) -> Iterator[float]:
-    """Yield the values that two neighbouring digits exchanged make of a number."""
+    """Yield the values that result from exchanging two neighbouring digits of a number."""
     text = short_number(value)
     for place in range(len(text) - 1):
         first = text[place]

@@ -1,4 +1,4 @@
-"""Mistakes seen in published gaits and programs, each as a change of the plain walker."""
+"""Mistakes found in published gaits and programs, expressed as changes of the plain walker."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Mistake(NamedTuple):
 class MistakeFamily(NamedTuple):
     """A mistake of some size, such as a time step."""
 
-    what: str  # as for `Mistake`, with a place {} for the size
+    what: str  # as for `Mistake`, with {} in place of the size
     unit: str
-    first: float  # a size to begin with
+    first: float  # first size to try
     of_size: Callable[[float], PlainWalker]
 
 

@@ -29,7 +29,7 @@ Event = Callable[[Floats], float]
 SWING = 0
 STANCE = 1
 SHANK = 2
-EXACT, QUICK = 1e-12, 1e-7  # relative tolerances of gaits and of first looks
+EXACT, QUICK = 1e-12, 1e-7  # relative tolerances of gaits and of first guesses
 LONGEST_SWING = 12.0  # sqrt(L/g)
 FALLEN = 1.5  # rad, angle of the stance leg
 MAX_EULER_STEPS = 400_000
@@ -41,7 +41,7 @@ BENT = "bent"
 
 
 class LegPart(NamedTuple):
-    """A rigid part of a leg, seen from its upper hinge, with the part upright."""
+    """A rigid part of a leg. Positions are relative to its upper hinge, with the part upright."""
 
     mass: float  # kg
     centre: complex  # m, centre of mass
@@ -50,7 +50,7 @@ class LegPart(NamedTuple):
 
 @dataclass(frozen=True)
 class PlainWalker:
-    """A walker on its slope, with the mistakes that its equations contain. SI units."""
+    """A walker on its slope, and the mistakes in its equations. SI units."""
 
     parts: tuple[LegPart, ...]  # of one leg: the whole leg, or thigh and shank
     knee: complex  # m, from hip to knee; 0 for straight legs
@@ -59,7 +59,7 @@ class PlainWalker:
     radius: float
     gravity: float
     slope: float
-    torso: LegPart | None = None  # seen from the hip
+    torso: LegPart | None = None  # with positions relative to the hip
     hip: tuple[float, float, float] = (0.0, 0.0, 0.0)  # spring, damper and torque between the legs
     push_off: float = 0.0  # N s
     free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
@@ -68,7 +68,7 @@ class PlainWalker:
     keeps_trailing_rate: bool = False
     extra_inertia: tuple[float, float] = (0.0, 0.0)  # weights of trailing and leading rate in an extra term I * rate
     strike_foot: complex | None = None  # m, from hip to the point on which the leading leg turns in the strike
-    turned_on_it: bool = False  # whether the trailing leg turned on the same point of its own before
+    turned_on_it: bool = False  # whether the trailing leg turns about the same point of its own foot before the strike
     strike_inertia: float = 1.0  # factor on the inertia of legs in the strike
     window: float = 0.0  # rad, by which a touch is accepted early
     euler_step: float = 0.0  # s, step of Euler's method; 0 for exact integration
@@ -118,7 +118,7 @@ class PlainWalker:
         return np.array([swing[0], sum(leg), *swing[1:], *([] if self.torso is None else [self.torso.inertia])])
 
     def levers(self, phase: str, foot: complex) -> Complex:
-        """Return the levers (masses, bodies): position of each mass as a sum over bodies of lever times exp(i psi)."""
+        """Return the levers (masses, bodies). A mass is at the sum over bodies of lever times exp(i psi)."""
         n = len(self.parts)
         levers = np.zeros((len(self.masses), len(self.reduction(phase))), complex)
         levers[:, STANCE] = -foot
@@ -132,7 +132,7 @@ class PlainWalker:
 
     @cached_property
     def phases(self) -> dict[str, Phase]:
-        """Sums over the point masses, from which the equations of motion are made, by phase."""
+        """Sums over the point masses, by phase, from which the equations of motion are formed."""
         return {phase: self.sums(phase) for phase in (STRAIGHT, BENT)}
 
     def sums(self, phase: str) -> Phase:
@@ -146,7 +146,7 @@ class PlainWalker:
         return Phase(self.reduction(phase), levers, constant.tolist(), moments.tolist(), first.tolist(), signs)
 
     def motions(self, angles: Floats, levers: Complex, radius: float) -> Complex:
-        """Return the velocities (masses, bodies) of all masses per unit rate of each body. The foot rolls."""
+        """Return the velocities (masses, bodies) of all masses per unit rate of each body, with the foot rolling."""
         D: Complex = 1j * levers * np.exp(1j * angles)
         D[:, STANCE] -= radius
         return D
@@ -206,7 +206,7 @@ class PlainWalker:
         return float(state[SWING] + state[STANCE] + 2.0 * self.lean - self.window)
 
     def knee_bend(self, state: Floats) -> float:
-        """Return the angle (rad) by which the shank is behind its thigh. It falls to 0 as the knee locks."""
+        """Return the angle (rad) of the shank behind its thigh. It falls to 0 as the knee locks."""
         return float(state[SWING] - state[SHANK])
 
     def energy(self, phase: str, state: Floats) -> float:
@@ -226,7 +226,7 @@ class PlainWalker:
         return (*names, "the trailing shank about its knee") if self.kneed and self.free_at_strike else names
 
     def strike_balances(self, before: Floats) -> tuple[Floats, Floats]:
-        """Return matrix and right-hand side of the balances that give the rates just after a heel strike.
+        """Return matrix and right-hand side of the balances that determine the rates just after a heel strike.
 
         before  state just before it, swing leg straight
         """
@@ -294,7 +294,7 @@ class PlainWalker:
     def land(self, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
         """Return the parts of the swing from a state of all bodies to the heel strike, or None if there is none."""
         pieces: tuple[Piece, ...] = ()
-        # a straight leg whose foot is behind has just been released
+        # A straight leg whose foot is behind the stance foot has just been released.
         if self.kneed and (self.knee_bend(state) != 0.0 or self.swing_foot(state).real < 0.0):
             locked = self.swing(BENT, state, self.knee_bend, lambda _: True, tolerance)
             if locked is None:
@@ -309,7 +309,7 @@ class PlainWalker:
     def swing(
         self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], tolerance: float
     ) -> Piece | None:
-        """Integrate until `event` falls to zero in a state that counts, or None if it does not."""
+        """Integrate until `event` falls to zero in a state for which `counts` is true. None if that never happens."""
         latest = LONGEST_SWING * self.pendulum_time
         if self.euler_step:
             return self.euler(phase, start, event, counts, latest)
@@ -335,7 +335,7 @@ class PlainWalker:
                     landing = solver(old_time, old, time)
                     while landing.status == "running":
                         landing.step()
-                    # the interpolant has fewer digits than the integration
+                    # The interpolant is less accurate than the integration.
                     state = landing.y
                     slope = event(landing.y + TINY * self.rates(phase, landing.y))
                     time -= event(state) * TINY / (slope - event(state))
@@ -347,7 +347,7 @@ class PlainWalker:
     def euler(
         self, phase: str, start: Floats, event: Event, counts: Callable[[Floats], bool], latest: float
     ) -> Piece | None:
-        """Integrate as `swing` does, by Euler's method with a fixed step."""
+        """Integrate like `swing`, but by Euler's method with a fixed step."""
         step = self.euler_step
         state = start
         before = event(start)

@@ -1,4 +1,4 @@
-"""Printed values beside right ones: how many digits agree, and the verdict."""
+"""Comparison of printed values with right ones: the number of digits that agree, and the verdict."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ DIFFERENT = "different"
 NOT_COMPARABLE = "not-comparable"
 EXPLAINED = "explained"
 UNEXPLAINED = "different, unexplained"
-FEWEST_DIGITS = 3  # that must agree if not all do; also at least half of them
+# At least this many digits must agree, and at least half of them, where the last ones may differ.
+FEWEST_DIGITS = 3
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
 """Numerical error of right values (relative to 1 or to the value) by quantity; of all others `EXACT_ERROR`."""
 EXACT_ERROR = 2e-12
@@ -47,7 +48,7 @@ class Item:
         return self.printed.real.unit
 
     def agreement(self, right: complex) -> int:
-        """Return how many of the printed digits agree with the right value, rounded or cut off."""
+        """Count the printed digits that agree with the right value, rounded or truncated."""
         error = self.own_error(right)
         if self.printed.bounds is not None:
             low, high = self.printed.bounds
@@ -75,7 +76,7 @@ class Item:
 
 
 def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
-    """Return how many digits of a printed number agree with the right one, within the error of the right one."""
+    """Count the digits of a printed number that agree with the right one, given the error of the right one."""
     difference = abs(right - printed.value)
     longer = abs(right) - abs(printed.value)
     same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
@@ -97,12 +98,12 @@ class Judgement(NamedTuple):
 
 
 def judge(item: Item, right: complex | None, reason: str = "") -> Judgement:
-    """Compare a printed value with the right one. `reason` says why there is none."""
+    """Compare a printed value with the right one. If there is none, `reason` explains why."""
     if right is None:
         return Judgement(NOT_COMPARABLE, 0, reason)
     agreeing = item.agreement(right)
     total = item.digits
-    units = short(item.miss(right))
+    units = format_units(item.miss(right))
     if item.printed.bounds is not None:
         if agreeing == total:
             return Judgement(REPRODUCED, agreeing, "within what is printed")
@@ -114,7 +115,7 @@ def judge(item: Item, right: complex | None, reason: str = "") -> Judgement:
     return Judgement(REPRODUCED if enough else DIFFERENT, agreeing, off)
 
 
-def short(number: float) -> str:
+def format_units(number: float) -> str:
     return f"{number:.2g}" if number < 99.5 or number >= 1e6 else f"{number:.0f}"
 
 
@@ -134,7 +135,7 @@ def items_of(printed: Mapping[str, Any], names: Mapping[str, Sequence[str]]) -> 
 
 
 def match_multipliers(items: Sequence[Item], right: Sequence[complex]) -> dict[str, complex | None]:
-    """Return the right multiplier nearest to each printed one. Each serves once."""
+    """Return the right multiplier nearest to each printed one, using each right multiplier once."""
     left = list(right)
     matches = dict[str, complex | None]()
     for item in items:

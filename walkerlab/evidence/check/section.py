@@ -15,7 +15,7 @@ Row = Mapping[str, Any]
 TONES: Mapping[str, Tone] = {REPRODUCED: "good", DIFFERENT: "bad", NOT_COMPARABLE: "plain"}
 MANY_UNITS = 1e5
 COLUMNS = (
-    Column("value", lambda row: in_plain(row["name"])),
+    Column("value", lambda row: spell_name(row["name"])),
     Column("printed", "printed", numeric=True),
     Column("right", "right_text", numeric=True),
     Column("digits that agree", lambda row: f"{row['digits']} of {row['of_digits']}" if row["right_text"] else ""),
@@ -23,7 +23,7 @@ COLUMNS = (
 )
 
 
-def in_plain(name: str) -> str:
+def spell_name(name: str) -> str:
     """Spell the name of a printed number, such as 'stance rate' or 'period_s'."""
     quantity, _, part = name.partition(".")
     if quantity == "state":
@@ -34,7 +34,7 @@ def in_plain(name: str) -> str:
 
 
 def answer(summary: Row) -> list[str | Table]:
-    """Return the verdict, the table of values, and what else the printed numbers tell."""
+    """Return the verdict, the table of values, and remarks on the printed numbers."""
     return [headline(summary), table("", COLUMNS, summary["values"]), *remarks(summary)]
 
 
@@ -42,10 +42,10 @@ def answer(summary: Row) -> list[str | Table]:
 def section(_results: Any, summary: Row) -> Section | None:
     """Build the section of the page."""
     evidence = Column("evidence", "evidence", wide=True)
-    caption = "Printed values beside the right ones"
+    caption = "Printed and right values"
     rows = table(caption, (*COLUMNS, evidence), summary["values"], note=source_of(summary["source"]))
     blocks: tuple[PageBlock, ...] = (rows, *(Paragraph(text) for text in remarks(summary)))
-    return Section.of("check", "The printed gait", blocks, headline(summary))
+    return Section.create("check", "The printed gait", blocks, headline(summary))
 
 
 def source_of(source: Row) -> str:
@@ -54,7 +54,7 @@ def source_of(source: Row) -> str:
 
 
 def headline(summary: Row) -> str:
-    """State in a sentence whether the printed gait is right and, if known, why not."""
+    """Return a sentence that states whether the printed gait is right and, if known, why not."""
     rows: Sequence[Row] = summary["values"]
     wrong = [row for row in rows if row["verdict"] == DIFFERENT]
     explanations = summary["explanations"]
@@ -82,11 +82,11 @@ def headline(summary: Row) -> str:
 
 
 def follow(explanation: Row, rows: Sequence[Row]) -> str:
-    """Say which printed values an explanation reproduces."""
+    """Describe the printed values that an explanation reproduces."""
     names = explanation["reproduces"]
     if len(names) == len(rows):
         return f"all {count(len(names), 'printed value')} follow to the last digit"
-    others = join_words([in_plain(row["name"]) for row in rows if row["name"] not in names])
+    others = join_words([spell_name(row["name"]) for row in rows if row["name"] not in names])
     return f"{len(names)} of {count(len(rows), 'printed value')} follow to the last digit (not {others})"
 
 
@@ -119,7 +119,7 @@ def remarks(summary: Row) -> Iterator[str]:
 
 
 def state_remarks(summary: Row) -> Iterator[str]:
-    """Yield sentences about a printed state: is it periodic, and does its heel strike conserve angular momentum?"""
+    """Yield sentences on whether a printed state is periodic and its heel strike conserves angular momentum."""
     periodic = summary["periodic"]
     if periodic and periodic["is_periodic"]:
         yield "The printed state is periodic within its digits."

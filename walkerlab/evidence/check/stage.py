@@ -1,4 +1,4 @@
-"""Stage `check`: a printed gait beside the right one."""
+"""Stage `check`: compare a printed gait with the right one."""
 
 from collections.abc import Mapping
 

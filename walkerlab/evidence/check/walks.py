@@ -1,4 +1,4 @@
-"""Gaits with the values that may be printed of them, of the right walker and of walkers with mistakes."""
+"""Gaits of the right walker and of walkers with mistakes, with all values that may be printed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from walkerlab.evidence.check.printed import Item, match_multipliers
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Power of rates in which a quantity scales with the unit of time."""
 ADD_UP = ("period_s", "step_length_m")
-"""Quantities of a stride that are sums of those of its steps."""
+"""Quantities whose value for a stride is the sum over its steps."""
 PLAIN = (
     "state", "state_before", "multipliers", "spectral_radius", "period_s", "step_length_m", "speed_m_s", "froude",
     "knee_strike_s",
@@ -49,7 +49,7 @@ class CheckedStep:
         return tuple(values[:-1])
 
     def quantity(self, name: str) -> Any:
-        """Return a value of the compiled model, or else of the plain one, or None if there is none."""
+        """Return a value of the compiled model or, failing that, of the plain model. None if neither has it."""
         if name in self.measured:
             return self.measured[name]
         if name == "multipliers":
@@ -91,7 +91,7 @@ class CheckedStep:
         return state_at(self.walker, self.start, self.step, instant, vertical)
 
     def written(self, items: Sequence[Item], convention: Convention) -> dict[str, list[float]]:
-        """Return the numbers of the states that are printed, by quantity. Empty lists where there is no such state."""
+        """Return the numbers of the printed states by quantity, with an empty list for a state that does not exist."""
         written = {}
         instants = {"state": convention.instant, "state_before": BEFORE}
         for name in instants.keys() & {item.quantity for item in items}:

@@ -82,7 +82,7 @@ def adams_start(walker: RigidModel, state: State) -> AdamsStart:
 def adams_walk(
     walker: RigidModel, walk: Callable[[State], ContactWalkResult], contact: ContactWalker, terrain: str
 ) -> AdamsWalk:
-    """Walk the contact model from Table 2's ADAMS start: the printed stance angle and velocities on the walker's slope.
+    """Walk the contact model from the ADAMS start of Table 2: its stance angle and velocities, on the walker's slope.
 
     walk     function that walks the contact model from a rigid start state, with samples
     terrain  terrain of the contact model, as named in the config

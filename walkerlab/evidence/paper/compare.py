@@ -86,7 +86,7 @@ def run(config: CompareConfig, inputs: Mapping[str, Content], progress: Progress
         groups, summary = compare_with_paper(config, inputs, motion, progress)
     else:
         groups = {}
-        summary = models_compared(config, inputs)
+        summary = summarise_models(config, inputs)
     progress.advance()
     recorded_groups, recorded = compare_recorded(inputs)
     for symbol, row in summary.get("table3", {}).items() if recorded else ():
@@ -120,7 +120,7 @@ def compare_with_paper(
     }
 
 
-def models_compared(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
+def summarise_models(config: CompareConfig, inputs: Mapping[str, Content]) -> dict[str, Any]:
     """Summarise the walks of both models and, for kneed walkers, the walks with each knee release."""
     gait, rigid, contact = (inputs[name].summary for name in ("fixedpoint", "simulate", "contact-sim"))
     releases = compare_releases(config, as_state(gait["state"]), float(contact["pitch_m"]))
@@ -182,7 +182,7 @@ def measure_contact_model(config: CompareConfig, walk: Content) -> ContactMeasur
         law=require_contact(config),
         foot_radius=config.walker.foot_radius_m,
         summary=summary,
-        # leg 0 swings first, as in the rigid model's state
+        # Leg 0 swings first, as in the rigid model's state.
         start=None if angle is None else as_state([*angle[0], *walk["trajectory"]["velocity"][0]]),
         table_3=characteristics_of(walk),
         step_length=float(lengths[stride - STEPS_PER_STRIDE : stride].mean()) if stride else None,

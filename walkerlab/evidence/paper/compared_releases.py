@@ -1,6 +1,6 @@
-"""Contact walks from one gait that differ only in the moment at which the trailing knee is released.
+"""Contact walks from the same gait that differ only in the moment of the trailing knee's release.
 
-Each is compared with the corresponding rigid model, in which a knee released during compression is rigid in the impact,
+Each is compared with the corresponding rigid model, where a knee released during compression is rigid in the impact,
 and a knee released at first touch is free.
 """
 

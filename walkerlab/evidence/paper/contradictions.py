@@ -55,7 +55,7 @@ def percent_left_open(row: StartRow) -> Interval:
 
 
 def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
-    """Yield unequal steps of a period-one gait, and cycles that are not the sum of their steps."""
+    """Yield the unequal steps of a period-one gait, and the cycles that differ from the sum of their steps."""
     left, right = T_LEFT.matlab, T_RIGHT.matlab
     if are_disjoint(left.rounding, right.rounding):
         equal = "x_p is a fixed point of one step (eq. 10 and 11), so its steps are equal"

@@ -18,7 +18,7 @@ CONTACT_MODEL_KEYS: Final = ("foot_radius_m",)
 SI_KEYS: Final = ("stiffness", "damping", *BOUNDS_SI)
 """Keys of the contact block whose values depend on the block's units."""
 UNITLESS_KEYS: Final = tuple(name for name in Contact.model_fields if name not in (*SI_KEYS, "units", "stance"))
-"""Remaining keys of the contact block, except `stance`, since the paper pins the first stance foot, too (section 4)."""
+"""Remaining keys of the contact block. `stance` is left out, because the paper also pins the first stance foot."""
 
 
 def departures(config: CompareConfig, start_moved: bool) -> Departures:
@@ -45,7 +45,7 @@ def departures(config: CompareConfig, start_moved: bool) -> Departures:
             rigid.append(describe("slope_rad", config.slope_rad, slope))
         if contact is not None:
             of_contact += describe_differences(walker, paper, CONTACT_MODEL_KEYS)
-            of_contact += describe_differences(contact.in_si(), Contact().in_si(), SI_KEYS, "contact.{} (SI)")
+            of_contact += describe_differences(contact.to_si(), Contact().to_si(), SI_KEYS, "contact.{} (SI)")
             of_contact += describe_differences(contact, Contact(), UNITLESS_KEYS, "contact.{}")
     if start_moved:
         of_contact.append("the start is not the rigid model's fixed point")

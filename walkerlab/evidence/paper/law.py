@@ -1,4 +1,4 @@
-"""The study's contribution to scenes (see scene/studies.py): its walker, and Appendix A's sign error as a torque.
+"""The parts of scenes that the study defines (see scene/studies.py): its walker, and Appendix A's sign error.
 
 Results with the equations as printed depend on this file, so the rest of the study is in other files.
 """

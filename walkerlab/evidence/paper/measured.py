@@ -16,7 +16,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 
 TIGHT = Tolerances("dop853", 1e-12, 1e-14, ENDLESS)
-"""Tolerances at which errors are far below any printed digit."""
+"""Tolerances at which errors are far smaller than any printed digit."""
 EQUATION_SETS: tuple[Equations, ...] = ("as-printed", "corrected")
 PAPER_CYCLES = 5  # gait cycles walked in the paper
 ENERGY_STEPS = 5  # steps over which the paper averages the energy

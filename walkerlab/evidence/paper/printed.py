@@ -199,7 +199,7 @@ def readings_of_fig_4b() -> tuple[RestingFoot, RestingFoot, RestingFoot]:
     """
     _, leg, hip, gravity = (entry.value for entry in TABLE_1)
     mass = hip + 2.0 * leg
-    adams = Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).in_si()
+    adams = Contact(stiffness=STIFFNESS.value, damping=DAMPING.value).to_si()
     weight = mass * gravity
     return (
         resting_foot(weight, mass, adams.stiffness, adams.exponent, adams.damping),

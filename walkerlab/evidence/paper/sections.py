@@ -1,4 +1,4 @@
-"""Report sections on the paper: its values next to ours, its tables and its errata."""
+"""Report sections on the paper: its values compared with ours, its tables and its errata."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,7 +48,7 @@ def numbers(results: Results) -> Section | None:
     )
     departs = words("paper.departs", results.departures) if results.departures else ""
     blocks = (Paragraph(departs, "fair"), Statements(statements, "lines"), numbers_table(rows))
-    return Section.of("paper-numbers", "The paper’s numbers", blocks, finding(rows), PAPER_PAGE)
+    return Section.create("paper-numbers", "The paper’s numbers", blocks, finding(rows), PAPER_PAGE)
 
 
 def numbers_table(rows: Sequence[Row]) -> Table:
@@ -88,7 +88,7 @@ def compared(results: Results, key: str) -> Sequence[Row]:
 def tables(results: Results) -> Section | None:
     summary = results.summary("compare")
     tables_shown = (table_of(key, summary.get(key) or {}) for key in words.terms("paper.tables"))
-    return Section.of("tables", "The paper’s tables", tables_shown, page=PAPER_PAGE)
+    return Section.create("tables", "The paper’s tables", tables_shown, page=PAPER_PAGE)
 
 
 def table_of(key: str, rows: Any) -> Table:
@@ -132,7 +132,7 @@ def errors(results: Results) -> Section | None:
     rows = compared(results, "errata")
     block = table("What is printed, and what is right", ERRATUM_COLUMNS, rows, wordy=True)
     total = f"{count(len(rows), 'error')} and gaps of the paper, with evidence."
-    return Section.of("errata", "Errata of the paper", (block,), total, PAPER_PAGE)
+    return Section.create("errata", "Errata of the paper", (block,), total, PAPER_PAGE)
 
 
 def paper_section(results: Results) -> Section | None:
@@ -140,10 +140,10 @@ def paper_section(results: Results) -> Section | None:
     rows = results.claims
     if not rows:
         return None
-    return Section("printed", "What the paper prints", tuple(fates(results, rows)), finding(rows))
+    return Section("printed", "What the paper prints", tuple(list_verdicts(results, rows)), finding(rows))
 
 
-def fates(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
+def list_verdicts(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
     """Yield the paper's values by verdict and location, and its gravest errors."""
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
@@ -185,11 +185,11 @@ def recorded(results: Results) -> Section | None:
     if stored is None:
         return None
     return Section(
-        "recorded", f"The recorded walk {stored['name']}", tuple(recorded_tables(stored)), recorded_words(stored)
+        "recorded", f"The recorded walk {stored['name']}", tuple(recorded_tables(stored)), describe_recorded(stored)
     )
 
 
-def recorded_words(stored: Row) -> str:
+def describe_recorded(stored: Row) -> str:
     period, length = (stored["steps"]["recorded"][key] for key in ("period_s", "length_m"))
     last = f"{stored['name']}: the last step takes {number(period, 5)} s and is {number(length, 5)} m long."
     return " ".join([last, *stored["doubts"]])
@@ -229,7 +229,7 @@ def answer(summary: Row) -> list[str | Table]:
         f"numerical error of the {model} walk: {describe_error(error)}." for model, error in errors.items()
     ]
     if "recorded" in summary:
-        error_lines += ["", recorded_words(summary["recorded"]), *recorded_tables(summary["recorded"])]
+        error_lines += ["", describe_recorded(summary["recorded"]), *recorded_tables(summary["recorded"])]
     if "verdicts" in summary:
         return [finding(summary["paper_numbers"]), numbers_table(summary["paper_numbers"]), *error_lines]
     return [words("models.answer", summary["outcomes"]), last_steps(summary, errors), *error_lines]

@@ -1,4 +1,4 @@
-"""Stage `tune`: repeat the paper's parameter adjustment for any walker, and report its need, size and causes."""
+"""Stage `tune`: repeat the paper's adjustment for any walker, and report whether it is needed, its size and causes."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -209,7 +209,7 @@ def summary(tune: TuneRun) -> dict[str, Any]:
         "table2": table_2(tune),
         "gait": gait_summary(tune),
         "adjustment": adjustment_summary(tune),
-        **({} if paper is None else {"paper_start": papers_start(paper)}),
+        **({} if paper is None else {"paper_start": summarise_adams_start(paper)}),
         "procedure": {**tune.printed, "adjusted": tune.printed.get("adjusted")},
         "map": {
             "cells": int(tune.contact_map.outcome.size),
@@ -223,7 +223,7 @@ def summary(tune: TuneRun) -> dict[str, Any]:
     }
 
 
-def papers_start(paper: AdamsWalk) -> dict[str, Any]:
+def summarise_adams_start(paper: AdamsWalk) -> dict[str, Any]:
     """Summarise the walks of both models from the paper's start."""
     return {
         "outcome": paper.walk.outcome.label,

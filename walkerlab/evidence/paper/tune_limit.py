@@ -108,7 +108,7 @@ def limit_findings(
         scene.ground.frame.pendulum_time / (SAMPLING_FACTOR * SAMPLES_PER_PENDULUM_TIME),
         1 if compass else COARSE_STRIDE,
     )
-    # only the compass has point feet in one model and round feet in the other
+    # Only the compass has point feet in one model and round feet in the other.
     compared = (ALL_SERIES, ALL_POINT_SERIES) if isinstance(config.walker, CompassWalker) else (ALL_SERIES,)
     gaits = COMPASS_SERIES if compass else GAIT_SERIES
     progress.start("tune: rigid limit", len(compared) + len(gaits))

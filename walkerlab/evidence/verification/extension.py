@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def cases_config(config: SceneConfig) -> type:
-    """Return what `stability` takes: of a study's walker, whose cases vary the paper's config, less than a scene."""
+    """Return the type of config that `stability` takes. A study's walker needs less than a scene."""
     return reads.CompassCasesConfig if is_studied(config) else reads.SceneCasesConfig
 
 

@@ -39,7 +39,7 @@ SAMPLE_COUNT = 4000
 BODY_HEIGHT, BODY_ANGLE, ALONG_RATE, HEIGHT_RATE, ANGLE_RATE = 1, 2, 4, 5, 6  # indices of the first body in the state
 EARTH_GRAVITY: Final = 9.81
 CENTRE: Final = (0.0, 0.0)
-PAPER_LAW: Final = Impact.from_contact(Contact().in_si())
+PAPER_LAW: Final = Impact.from_contact(Contact().to_si())
 PAPER_FRICTION: Final = Coulomb(0.9, 0.7, 0.1, 1.0)
 
 
@@ -283,7 +283,7 @@ PROBLEMS: Final = (
 
 
 def run(_config: object, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Solve every problem. Wrong answers are stored like right ones, and the stage `stability` reports them."""
+    """Solve every problem. Wrong answers are stored like right ones, because the stage `stability` reports them."""
     rows = []
     for problem in track(progress, "known problems", len(PROBLEMS), PROBLEMS):
         result = problem()

@@ -123,7 +123,9 @@ class SwingMasses:
         return Moving(mass, centre + place, rolling + velocity, inertia, rate, hip, contact)
 
     def share_of(self, leg: int) -> Floats:
-        """Return the share (bodies,) of each body that belongs to a leg. Coupled bodies belong to it in part."""
+        """Return the fraction (bodies,) of each body that belongs to a leg, which for coupled bodies is between 0 and
+        1.
+        """
         names = [body.name for body in self.assembly.bodies]
         of_leg = self.assembly.legs[leg]
         share = np.array([1.0 if name in of_leg else 0.0 for name in names])
@@ -147,7 +149,7 @@ class SwingMasses:
 
 
 class RigidMasses:
-    """Heel strikes of a walk computed from its point masses: those of both legs, which swing in turn."""
+    """Heel strikes of a walk, computed from the point masses of both legs, which swing alternately."""
 
     def __init__(self, assembly: Assembly, slope: float) -> None:
         exchanged = replace(assembly, legs=assembly.legs[::-1], feet=assembly.feet[::-1])
@@ -155,7 +157,7 @@ class RigidMasses:
         self.turns = (own, own if have_equal_legs(assembly) else SwingMasses(exchanged, slope))
 
     def poses(self, states: Floats, first: int = 0) -> list[Moving]:
-        """Return the masses in each of the states (strikes, 2 n). In the first of them leg `first` (0 or 1) swings."""
+        """Return the masses in each of the states (strikes, 2 n). In the first state leg `first` (0 or 1) swings."""
         return [self.turns[(first + k) % 2].pose(state) for k, state in enumerate(states)]
 
     def momentum_change(self, before: Sequence[Moving], after: Sequence[Moving], push_off: float = 0.0) -> float:
@@ -220,7 +222,8 @@ def momentum_finding(config: WalksConfig, scene: ContactScene, start: State, cas
         }
         why = " and ".join(reason for reason, share in shares.items() if share > 0.5 * MAX_UNKNOWN)
         return NotMeasured(MEASURE, why)
-    # step errors add up without growing, because the balance holds along the computed path: no factor MAGNIFIED
+    # Step errors add up without growing, because the balance holds along the computed path, so MAGNIFIED does not
+    # apply.
     limit = allowed_difference(case, config.solver.contact.rtol, balance.steps) / MAGNIFIED + unknown
     return Measure(MEASURE, finite(balance.residual), limit)
 

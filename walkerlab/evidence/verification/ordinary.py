@@ -1,7 +1,7 @@
 """Ordinary methods on the same cases: SciPy at its default tolerances, and a game engine's method with fixed steps.
 
-A contact scene is one differential equation without events, as a user unaware of switching points and pad edges would
-write it. It is integrated up to the end of our own walk, which is recomputed at a tight tolerance for the comparison.
+A contact scene is one differential equation without events, like that of a user unaware of switching points and pad
+edges. It is integrated up to the end of our own walk, which is recomputed at a tight tolerance for the comparison.
 A rigid scene is run by a user's script with an event function.
 """
 
@@ -97,7 +97,7 @@ class Arrival:
     state: Floats
     units: Floats  # unit of each component of the state
 
-    def judged(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
+    def judge_end(self, method: str, y: Floats | None, count: int, wall_s: float) -> Choice:
         """Judge a method by its end state y (None if it was not reached) and the `count` of right-hand sides."""
         if y is None:
             return Choice(self.case, method, "gives up", None, count, wall_s)
@@ -138,7 +138,7 @@ def scipy_script(arrival: Arrival, compass: RigidWalker, walk: RigidWalkResult, 
     count = MAX_ORDINARY_EVALUATIONS
     with suppress_warnings():
         y, count = walk_as_a_script(compass, walk.start, walk.steps, *SCIPY_DEFAULT, MAX_ORDINARY_EVALUATIONS, method)
-    return arrival.judged(f"SciPy {method}", y, count, time.perf_counter() - began)
+    return arrival.judge_end(f"SciPy {method}", y, count, time.perf_counter() - began)
 
 
 def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
@@ -155,7 +155,7 @@ def scipy_walk(arrival: Arrival, ready: ContactStart, method: str) -> Choice:
         solution = solve_ivp(right_hand_side, (0.0, arrival.time_s), start, method=method)
         if solution.success:
             y = solution.y[:, -1]
-    return arrival.judged(f"SciPy {method}", y, int(counts[RHS]), time.perf_counter() - began)
+    return arrival.judge_end(f"SciPy {method}", y, int(counts[RHS]), time.perf_counter() - began)
 
 
 def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINARY_EVALUATIONS) -> Choice:
@@ -166,4 +166,4 @@ def euler(arrival: Arrival, ready: ContactStart, h: float, cap: int = MAX_ORDINA
     steps = int(semi_implicit_euler(system, y, np.empty_like(y), arrival.time_s, h, cap))
     wall_s = time.perf_counter() - began
     late = steps == cap and steps * h < arrival.time_s * (1.0 - 1e-9) and bool(np.all(np.abs(y) < DIVERGED))
-    return arrival.judged(f"semi-implicit Euler, {h:g} s", None if late else y, steps, wall_s)
+    return arrival.judge_end(f"semi-implicit Euler, {h:g} s", None if late else y, steps, wall_s)

@@ -56,7 +56,7 @@ def scaled(config: Config, by: Units) -> Config:
         n = len(config.start) // 2
         changes["start"] = replace_state(config.start, (*state[:n], *(rate / by.time for rate in state[n:])))
     if config.contact is not None:
-        si = config.contact.in_si()
+        si = config.contact.to_si()
         pitch = config.contact.pad_pitch
         ground = {
             "units": "si",

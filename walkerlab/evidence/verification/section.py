@@ -50,7 +50,7 @@ def section(results: Results, summary: Row) -> Section | None:
         Paragraph(words("stability.maps", planes) if planes else words("stability.how_to_map")),
         *(Gallery((picture,)) for picture in results.pictures if picture.name.startswith("stability")),
     )
-    return Section.of("stability", "Stiff and extreme cases", blocks, finding(summary), CASES)
+    return Section.create("stability", "Stiff and extreme cases", blocks, finding(summary), CASES)
 
 
 def finding(summary: Row) -> str:

@@ -1,4 +1,4 @@
-"""Stage `stability`: extreme cases and known problems, judged by measures that the walk itself does not use."""
+"""Stage `stability`: extreme cases and known problems, judged by measures independent of the walk's computation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def verification_omissions(config: CompassCasesConfig | SceneCasesConfig) -> tup
     return (
         omission(
             "the named extreme cases",
-            "they are cases of the paper's compass; this walker has cases of its own",
+            "they are cases of the paper's compass; this walker has its own cases",
             "about a hundred cases",
         ),
         omission("ordinary methods on the extreme cases", "they are tested on the paper's compass", "8 runs per case"),

@@ -30,7 +30,7 @@ from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes
 from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content, Group, Variable
 
-PAPER_STIFFNESS: Final = Contact().in_si().stiffness
+PAPER_STIFFNESS: Final = Contact().to_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)
 STICTION_RANGE: Final = (1e-7, 10.0)  # m/s
 ERROR_MISSING: Final = -1.0  # stands for a missing error in checkpoints, which hold only finite numbers

@@ -1,4 +1,4 @@
-"""Starts of cases: a walker in its initial state, its walk in either model, and quantities that must be conserved."""
+"""Starts of cases: a walker in its initial state, its walk in either model, and checks of conservation laws."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -66,7 +66,7 @@ class CaseStart:
     energy: float  # J, m g L plus kinetic and stored energy at the start; the scale of residuals
 
     def repeated_case(self, case: Case) -> Case:
-        """Return the case for a repeated walk: with all its steps, because outcomes are compared, too."""
+        """Return the case for a repeated walk, with all its steps, because outcomes are also compared."""
         return case
 
 

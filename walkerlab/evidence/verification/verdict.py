@@ -8,7 +8,7 @@ from walkerlab.config.analyses import Case
 from walkerlab.labels import Label
 
 BUDGET_USED: Final = "right-hand sides over budget"
-"""Name of the measure of cost. It says nothing about correctness, so it never counts as the worst measure."""
+"""Name of the measure of cost. It is unrelated to correctness, so it never counts as the worst measure."""
 
 MAGNIFIED: Final = 10.0  # factor by which a walk may magnify the errors of its steps
 
@@ -60,7 +60,7 @@ class CaseResult:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Descriptions of all faults, or return () if the case passed."""
+        """Descriptions of all faults, or () if the case passed."""
         failed = [] if self.outcome in self.expected else [f"ended as {self.outcome}, not {' or '.join(self.expected)}"]
         return (*failed, *self.remarks, *(str(finding) for finding in self.findings if not finding.ok))
 

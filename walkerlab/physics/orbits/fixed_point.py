@@ -39,7 +39,7 @@ from walkerlab.physics.orbits.rigid_map import (
 )
 from walkerlab.physics.orbits.similarity import HIPS, Units, unit_walker
 from walkerlab.physics.orbits.small_slope import SmallSlopeSeed, seeds
-from walkerlab.physics.orbits.step_map import Cycle, Stepper, gait_near, in_order
+from walkerlab.physics.orbits.step_map import Cycle, Stepper, gait_near, sort_multipliers
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, State
 
@@ -173,7 +173,7 @@ def measure_gait(walker: RigidModel, units: Units, gait: Cycle) -> RigidGait | N
         period=math.fsum(period for period, _ in sizes) / count,
         step_length=math.fsum(length for _, length in sizes) / count,
         multipliers=tuple(multipliers.tolist()) if count == 1 else (),
-        stride_multipliers=tuple(in_order(multipliers ** (STRIDE // count)).tolist()),
+        stride_multipliers=tuple(sort_multipliers(multipliers ** (STRIDE // count)).tolist()),
         steps=tuple(sizes * (STRIDE // count)),
         residual=max(abs(end - begin) for end, begin in zip(step.final_state, start, strict=True)),
         energy=step.mean_energy * units.energy,

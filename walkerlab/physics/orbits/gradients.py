@@ -86,7 +86,7 @@ def sensitivity_norms(gait: GaitOnMap) -> tuple[float, float] | None:
 
     If the legs differ, it is the root mean square over the drops under each foot.
     """
-    responses = [response(each, "floor-drop") for each in gait.by_leg()]
+    responses = [response(each, "floor-drop") for each in gait.split_by_leg()]
     norms = [float(result[0][0]) for result in responses if result is not None]
     if len(norms) < len(responses):
         return None

@@ -70,7 +70,7 @@ class GaitOnMap(NamedTuple):
         """Take the steps of a stride from another start and at another value of the parameter."""
         return walk_steps(self.step_map, z, p, self.step_map.stride, derived, self.swing)
 
-    def by_leg(self) -> list[GaitOnMap]:
+    def split_by_leg(self) -> list[GaitOnMap]:
         """Return the gait from the start of each step of its stride, in the order of `leg`: once for equal legs."""
         if self.step_map.stride == 1:
             return [self]

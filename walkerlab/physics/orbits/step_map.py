@@ -323,10 +323,10 @@ def gait_near(step_map: Stepper, z: Floats, p: float, effort: Effort, n: int = 1
 
 def multipliers_of(DP: Floats) -> NDArray[np.complex128]:
     """Return the eigenvalues, largest first. Of a complex pair, the one with positive imaginary part first."""
-    return in_order(np.linalg.eigvals(DP).astype(np.complex128))
+    return sort_multipliers(np.linalg.eigvals(DP).astype(np.complex128))
 
 
-def in_order(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def sort_multipliers(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Sort multipliers as `multipliers_of` returns them."""
     order: Sequence[int] = sorted(range(values.size), key=lambda i: (-abs(values[i]), -values[i].imag))
     return np.asarray(values[list(order)])

@@ -1,1 +1,1 @@
-"""Decide: which config and folder are asked for, which stages they need, and which results are up to date."""
+"""First layer of the pipeline: find the requested config and folder, the stages needed, and the results to reuse."""

@@ -11,7 +11,7 @@ from walkerlab.errors import StaleError
 from walkerlab.labels import join_words
 from walkerlab.pipeline.plan.graph import PIPELINE, Graph
 from walkerlab.pipeline.plan.results import FolderResults, Results, Step
-from walkerlab.pipeline.plan.stage import Stage, without_block
+from walkerlab.pipeline.plan.stage import Stage, message_without_block
 from walkerlab.pipeline.store.artifact import Identity, Stored
 from walkerlab.pipeline.store.content import Content
 from walkerlab.pipeline.store.runs import SWEEP, RunFolder, config_of, read_all
@@ -121,7 +121,7 @@ class Planner:
 
 def omission_of(stage: str, why: str) -> LeftOut:
     """Describe a stage that is left out, with the reason and what that saves."""
-    return LeftOut(stage, why, "loading and compiling contact code" if why == without_block("contact") else "")
+    return LeftOut(stage, why, "loading and compiling contact code" if why == message_without_block("contact") else "")
 
 
 def survey(config: Config, folder: RunFolder, graph: Graph = PIPELINE) -> tuple[Step, ...]:

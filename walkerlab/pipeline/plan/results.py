@@ -34,7 +34,7 @@ class Keys:
         self._sources = Sources()
         self._digests: dict[tuple[str, ...], str] = {}
 
-    def of(self, config: Config, target: str) -> dict[str, str]:
+    def compute(self, config: Config, target: str) -> dict[str, str]:
         """Return the keys of a stage and of all its inputs, by stage. Raises as `Graph.needed_in_memory` does."""
         keys: dict[str, str] = {}
         for stage in self.graph.needed_in_memory(target, config):
@@ -65,8 +65,8 @@ class Keys:
 def added_code(stage: Stage, own: Mapping[str, Any]) -> set[str]:
     """Return the code of extensions, as "module:name", that a stage's result depends on.
 
-    They are the laws named by words in its part of the config and what else it depends on, `own`, and for drawings
-    everything that is drawn.
+    This is the code of the laws named in its part of the config and in `own`, its other dependencies. For drawings it
+    is the code of everything drawn.
     """
     text = json.dumps(own)
     used = {code for key in WORDS for word, code in declared(key).items() if json.dumps(word) in text}

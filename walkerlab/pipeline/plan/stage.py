@@ -25,7 +25,7 @@ DRAWINGS = ("plot", "report")
 FOR_LEGS_THAT_DIFFER = (
     *WALKED, "compare", "continuation", "robustness", "design", "basin", "accuracy", "stability", "engines", *DRAWINGS,
 )  # fmt: skip
-"""Stages that know legs that differ; every other stage refuses them."""
+"""Stages that support legs that differ; all others refuse them."""
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[
     "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
@@ -33,7 +33,7 @@ OptionKind = Literal[
 """How an option's value is read; docs/adding.md has a table."""
 
 
-def without_block(name: str) -> str:
+def message_without_block(name: str) -> str:
     """Return the message that the config lacks a block."""
     return f"the config has no {name} block"
 
@@ -92,7 +92,7 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return the options that say what a recorded file does not, as keys of a block. Each needs some flags."""
+    """Return the options for what a recorded file does not state, as keys of a block. Each needs some flags."""
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
         Option("--units", "units", "KIND=UNIT,...", "Units that the file lacks.", "units"),
@@ -152,7 +152,7 @@ class Stage:
     def why_unsuited(self, config: Config) -> str | None:
         """Return the reason why the stage cannot run under a config, or None if it can."""
         missing = (block for block in self.requires if getattr(config, block) is None)
-        return next(map(without_block, missing), None) or self.why_no_such_legs(config)
+        return next(map(message_without_block, missing), None) or self.why_no_such_legs(config)
 
     def why_no_such_legs(self, config: Config) -> str | None:
         """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
@@ -167,7 +167,7 @@ class Stage:
         """Raise ConfigError if this stage, which `target` needs, cannot run under a config."""
         if "recording" in self.requires and config.recording is None:
             raise ConfigError(
-                f"{target} needs a recorded walk, and {without_block('recording')}.",
+                f"{target} needs a recorded walk, and {message_without_block('recording')}.",
                 "Name its file: walkerlab compare --with FILE.",
             )
         if self.why_no_such_legs(config) is not None:
@@ -189,7 +189,7 @@ class Stage:
         """Raise ConfigError if the `refuse` function of an on-demand stage's module rejects the config."""
         refuse = getattr(importlib.import_module(self.module), "refuse", None) if self.on_demand else None
         if refuse is not None:
-            refuse(reads.only(config, self.takes_under(config)))
+            refuse(reads.restrict(config, self.takes_under(config)))
 
     @property
     def draws(self) -> bool:

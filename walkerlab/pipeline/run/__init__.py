@@ -1,1 +1,1 @@
-"""Carry out: run stages, here or in workers, and resume long work."""
+"""Second layer of the pipeline: run stages, in this process or in workers, and resume long work."""

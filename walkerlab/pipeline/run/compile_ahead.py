@@ -19,7 +19,7 @@ from walkerlab.pipeline.run.workers import map_in_order
 
 HALF_ANGLE = 0.2  # rad, from the slope's normal to each leg at the start of a walk
 COMPILING_BUDGET = 200  # right-hand sides, enough for the first step of each method
-# one method for each form of the kernels: our two, and one of another library, which calls parts of them from Python
+# One method for each form of the kernels: our two, and one of another library, which calls parts of them from Python.
 COMPILED_METHODS = ("radau5", "dop853", "scipy-radau")
 
 
@@ -62,7 +62,7 @@ def compile_contact(method: str, config: Config) -> None:
 
 
 def compile_plain_systems(config: Config) -> None:
-    """Compile what solvers without our events call, with which `stability` compares the contact walk."""
+    """Compile the functions that solvers without our events call. `stability` compares the contact walk with these."""
     from walkerlab.physics.ground.on_pads import OnPads
     from walkerlab.physics.ground.walker import place_on_ground
     from walkerlab.physics.solvers.scipy_methods import right_hand_side

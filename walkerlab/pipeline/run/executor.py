@@ -11,7 +11,7 @@ from inspect import signature
 from queue import SimpleQueue
 from typing import Any
 
-from walkerlab.config.reads import only
+from walkerlab.config.reads import restrict
 from walkerlab.config.schema import Config
 from walkerlab.errors import NoAnswer
 from walkerlab.physics import kernel_cache
@@ -31,7 +31,7 @@ Task = Callable[[StageReporter], Content]
 
 def task_of(stage: Stage, config: Config, inputs: Mapping[str, Content], **offered: Any) -> Task:
     """Build the task of a stage under a config, for this or another process. The arguments are as in `call_stage`."""
-    return partial(call_stage, stage.module, only(config, stage.takes_under(config)), inputs, offered)
+    return partial(call_stage, stage.module, restrict(config, stage.takes_under(config)), inputs, offered)
 
 
 def call_stage(
@@ -231,8 +231,8 @@ class EarlyDrawings:
         self.drawn: dict[str, Content] = {}
 
     def draw(self, drawings: Sequence[Stage], unsettled: set[str], why: str) -> None:
-        """Draw what the results so far suffice for. `why` is the reason why those of the `unsettled` stages are
-        missing.
+        """Make the drawings for which the results so far suffice. `why` explains the missing results of `unsettled`
+        stages.
 
         Only the last drawing, the page, is drawn again after each stage: it also shows what the others have drawn.
         """

@@ -97,7 +97,7 @@ class Spread:
         Raises NoAnswer if workers keep dying before they compute anything; re-raises bugs immediately.
         """
         while self.left or self._again or self._running:
-            # one batch more than there are workers, so that no worker waits
+            # One batch more than there are workers is queued, so that no worker waits.
             most = 1 if self.unit_s is None else executor.size + 1
             while len(self._running) < most and (self._again or self.left):
                 batch, failures = self._again.popleft() if self._again else (self._next_batch(executor.size), 0)
@@ -131,7 +131,7 @@ class Spread:
     def _arrived(self, batch: Batch, results: Sequence[Timed]) -> None:
         self._alive = True
         walls = [wall_s for _, wall_s in results]
-        # the first units also load compiled code, so the last one is the better estimate
+        # The first units also load compiled code, so the last one gives a better estimate.
         latest = max(1e-6, walls[-1] if self.unit_s is None else sum(walls) / len(walls))
         self.unit_s = latest if self.unit_s is None else 0.5 * (self.unit_s + latest)
         self.keep(batch, results)

@@ -160,7 +160,7 @@ class Worker:
             stdout=output,
             stderr=output,
             cwd=folder,
-            # all processes share one cache of compiled code
+            # All processes share one cache of compiled code.
             env={**os.environ, "WALKERLAB_CACHE": str(cache_root()), **(environment or {})},
         )
         theirs.close()
@@ -176,7 +176,7 @@ class Worker:
         work = pickle.dumps(call)
         with contextlib.suppress(OSError):  # a dead worker is noticed because its answer is missing
             self._line.send_bytes(work)
-        while isinstance(message := self._received(timeout_s), Told):
+        while isinstance(message := self._receive(timeout_s), Told):
             if hear is not None:
                 hear(message.value)
         if message.error is not None:
@@ -184,7 +184,7 @@ class Worker:
         value: R = message.value
         return value
 
-    def _received(self, timeout_s: float | None) -> Told | Answer:
+    def _receive(self, timeout_s: float | None) -> Told | Answer:
         try:
             if not self._line.poll(timeout_s):
                 raise WorkerTimeoutError

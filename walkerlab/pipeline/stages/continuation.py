@@ -35,9 +35,9 @@ from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
 """Seeds, and a function that returns a config's step map over the parameter."""
 SHORTEST_REACH = 1e-9  # fraction of the span; a branch that covers less counts as a single gait
-LOOKED_AT = 5  # number of values in the span, ends included, at which the search looks for gaits
+START_VALUES = 5  # number of values in the span, ends included, at which the search looks for gaits
 TIGHTEST = Effort(1e-13)  # accuracy of Newton's method when the numerical error is measured
-OF_A_GAIT = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
+GAIT_QUANTITIES = ("step_period_s", "step_length_m")  # quantities of a gait whose numerical error is measured
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class FamilyQuestion:
     def start_values(self) -> list[float]:
         """Return the values at which the search looks for gaits, the config's own value first."""
         own = self.parameter.value_in(self.config)
-        spread = np.linspace(self.span.least, self.span.most, LOOKED_AT)
+        spread = np.linspace(self.span.least, self.span.most, START_VALUES)
         return [*([own] if own in self.span else []), *(float(value) for value in spread)]
 
     @property
@@ -311,7 +311,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
     """Solve for evenly spread gaits at tighter tolerances, and return the largest changes, or None if no
     gait exists.
     """
-    # the gaits are solved for, not only walked again, so that the residual of Newton's method counts as well
+    # Gaits are solved again, not only simulated, so that the change includes the residual of Newton's method.
     step_map = family.step_map
     every = [(branch, point) for branch in family.branches for point in branch.points]
     if step_map is None or not every:
@@ -328,7 +328,7 @@ def sample_again(family: Family) -> dict[str, Any] | None:
         if isinstance(gait, Cycle)
     ]
     counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
-    largest = dict(zip(OF_A_GAIT, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
+    largest = dict(zip(GAIT_QUANTITIES, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
     return {**counts, **largest, **({} if by == DEFAULT_TIGHTENING else {"by": by})}
 
 

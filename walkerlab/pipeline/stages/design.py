@@ -206,7 +206,8 @@ class Gaits:
         subject = ModelUnderTest(self.model, config, self.z, self.length)
         standpoint = subject.gait_on_map()
         match = self.gait_near(standpoint, self.z)
-        # the parameters may be too far from those of the last gait for Newton's method, so search from scratch
+        # The parameters may be too far from those of the last gait for Newton's method, so the search starts from
+        # scratch.
         if self.model == "rigid" and (match is None or match[1]["spectral_radius"] >= 1.0):
             walker = rigid_walker(config)
             gait = find_gaits(walker, config.seed).gait

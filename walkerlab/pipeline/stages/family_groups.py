@@ -23,7 +23,7 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.stages.numerical_error import evenly_spread
 from walkerlab.pipeline.stages.rigid_groups import trajectory_group
-from walkerlab.pipeline.stages.walk import only_at
+from walkerlab.pipeline.stages.walk import select_samples
 from walkerlab.pipeline.store.content import Group, Variable, columns, labelled, real_and_imaginary
 from walkerlab.scene.parameter import Parameter
 from walkerlab.scene.rigid import rigid_scene
@@ -198,5 +198,5 @@ def motion(point: Cycle, period: int, config: ContactConfig, parameter: Paramete
         return
     changes = np.flatnonzero(np.diff(walk.samples.step))
     selected = np.unique(np.concatenate((np.arange(0, walk.samples.time_s.size, SAMPLE_STRIDE), changes, changes + 1)))
-    samples_group = trajectory_group(scene, walk, only_at(walk.samples, selected))
+    samples_group = trajectory_group(scene, walk, select_samples(walk.samples, selected))
     yield replace(samples_group, attrs={"value": point.value, "slope_rad": changed.slope_rad, "steps": period})

@@ -36,7 +36,7 @@ NUMBERS = {
     "max_scuff_depth": Label("m", "largest depth of the swing foot below the slope", name="max_scuff_depth_m"),
 }
 """Labels of the fields of `RigidGait` that are stored and printed."""
-OF_KNEES = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
+KNEE_LABELS = {"knee_strike": Label("s", "time of the knee strike after the heel strike", name="knee_strike_s")}
 STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 
 
@@ -114,7 +114,7 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
 
 def numbers_of(gait: RigidGait) -> dict[str, Label]:
     """Return the labels of a gait's quantities, including the knees' if it has any."""
-    return NUMBERS if gait.knee_strike is None else NUMBERS | OF_KNEES
+    return NUMBERS if gait.knee_strike is None else NUMBERS | KNEE_LABELS
 
 
 def gait_summary(gait: RigidGait) -> dict[str, Any]:

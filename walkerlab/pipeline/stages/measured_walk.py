@@ -94,7 +94,7 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
 
 
 def doubts_about(block: Identify, config: RigidConfig) -> tuple[str, ...]:
-    """Return sentences about what is odd in the block's angles, and what was done about it."""
+    """Return sentences about oddities in the block's angles, and about their corrections."""
     walk, _ = read_angles(block, config.slope_rad)
     try:
         return (*walk.doubts, *divide_into_steps(walk, rigid_walker(config), block.data).doubts)
@@ -165,7 +165,7 @@ def divide_angles(
         raise ConfigError(f"{source} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
     angles = walk.both_legs("angle")
     assert angles is not None, "a walk in steps has angles"
-    # use only measured samples: the samples of `steps` at heel strikes are interpolated
+    # Only measured samples are used, because those of `steps` at heel strikes are interpolated.
     own = angles[:, ::-1] if steps.swapped else angles
     touches = np.append(0.0, steps.touch_time_s)
     measured = split_into_steps(walk.time_s - steps.origin_s, own, touches, touch_sum_rad)

@@ -63,7 +63,7 @@ def change(first: Summary, again: Summary, by: str = DEFAULT_TIGHTENING) -> dict
             changes[name] = float(np.nanmax(apart))
             of_steps[name] = [None if math.isnan(error) else float(f"{error:.2g}") for error in apart.tolist()]
     changes["end_time_s"] = abs(first["end_time_s"] - again["end_time_s"])
-    # a passive walk's cost of transport is always the sine of the slope, so its change says nothing about the error
+    # A passive walk's cost of transport is always the sine of the slope, so its change does not measure the error.
     if any(work for giver, work in first.get("work_per_step_J", {}).items() if giver != "gravity"):
         changes["cost_of_transport"] = abs(first["cost_of_transport"] - again["cost_of_transport"])
     changes |= {"of_steps": of_steps} if of_steps else {}
@@ -71,9 +71,7 @@ def change(first: Summary, again: Summary, by: str = DEFAULT_TIGHTENING) -> dict
 
 
 def steps_later(first: Summary, again: Summary) -> int | None:
-    """Return how many steps later a repeated walk takes the steps that both repeat in the end, or None if
-    they do not.
-    """
+    """Return the delay (steps) until a repeated walk repeats its steps like the first, or None if either never does."""
     period = first.get("repeats_after") or 0
     if not period or again.get("repeats_after") != period:
         return None

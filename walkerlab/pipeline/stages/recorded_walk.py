@@ -1,4 +1,4 @@
-"""Stage `recorded-walk`: a walk recorded elsewhere, stored like a computed one."""
+"""Stage `recorded-walk`: read a walk recorded elsewhere, and store it like a computed walk."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     progress.start("recorded-walk", 1)
     walk = read_walk(block, config.slope_rad)
     if block.camera_tilt_deg == "free":
-        walk = with_found_tilt(walk, rigid_walker(config))
+        walk = correct_tilt(walk, rigid_walker(config))
     doubts = list(doubts_about(walk))
-    # before the division into steps, which noise may make fail
+    # Doubts are reported before the division into steps, which may fail because of noise.
     for doubt in doubts:
         progress.note(doubt)
     steps = divide_into_steps(walk, rigid_walker(config), block.file)
@@ -62,7 +62,7 @@ def run(config: RecordedWalkConfig, _inputs: Mapping[str, Content], progress: Pr
     return content_of(block, config, walk, steps, [*doubts, *steps.doubts])
 
 
-def with_found_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
+def correct_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
     """Return the walk without the camera's tilt, for which the legs' rates jump at the heel strikes."""
     tilt = find_tilt(walk, model)
     upright = {name: walk.quantities[name] - tilt for name in ("angle 1", "angle 2")}
@@ -71,7 +71,7 @@ def with_found_tilt(walk: RecordedWalk, model: RigidModel) -> RecordedWalk:
 
 
 def doubts_about(walk: RecordedWalk) -> Iterator[str]:
-    """Yield a sentence for each reason to doubt the steps: odd angles, noise, columns or samples that are not used."""
+    """Yield a sentence for each reason to doubt the steps: odd angles, noise, and unused columns or samples."""
     yield from walk.doubts
     angles = np.stack([walk.quantities[f"angle {leg}"] for leg in (1, 2)], axis=1)
     noise = noise_of(angles)
@@ -139,7 +139,7 @@ def content_of(
         "stance_leg": 2 - swing,
         "angle": steps.angle_rad,
         "velocity": steps.velocity_rad_s,
-        **recorded_besides(walk, steps),
+        **resample_others(walk, steps),
     }
     speed = float(along[-1] / steps.touch_time_s[-1])
     summary = {
@@ -164,7 +164,7 @@ def content_of(
     )
 
 
-def recorded_besides(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:
+def resample_others(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:
     """Interpolate the other recorded quantities, (samples,) or (samples, 2), at the times of the samples."""
     time = walk.time_s - steps.origin_s
     besides = {}

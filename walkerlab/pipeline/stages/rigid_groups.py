@@ -18,7 +18,7 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
     if walk.steps:
         set_down = np.append(walk.start[STANCE], walk.after[:-1, STANCE])
         turned = set_down - walk.before[:, STANCE]
-        rolling = compute_in_turns(scene.walker, np.arange(walk.steps), rolled, turned)
+        rolling = compute_in_turns(scene.walker, np.arange(walk.steps), rolled_distance, turned)
         columns = steps_of(walk, rolling_m=rolling, state_before=walk.before, state_after=walk.after)
         names = Variable(np.array(scene.names), (COORDINATE,), "", "coordinate of the state")
         stored["steps"] = Group({**columns, COORDINATE: names})
@@ -27,7 +27,7 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
     return stored
 
 
-def rolled(walker: RigidModel, turned: Any) -> Any:
+def rolled_distance(walker: RigidModel, turned: Any) -> Any:
     """Return distances (m) rolled by the stance foot as its leg turns back by angles (rad)."""
     return walker.radius * turned
 

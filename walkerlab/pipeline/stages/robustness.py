@@ -54,7 +54,7 @@ UNITS: Final = {"floor-drop": "m", "hip-push": "N s"}
 INDICATOR_UNITS: Final = dict(zip(INDICATORS, ("s", "m", "m/s"), strict=True))
 MODEL: Final = {"model": Label("", "model that walks")}
 LEG: Final = {"leg": Label("1", "leg that swings in the disturbed step; absent if both legs are equal")}
-NONE_BESIDE: Final = Gradient(None, None, "neighbouring walks end early, or the config rejects their parameters")
+NO_NEIGHBOURS: Final = Gradient(None, None, "neighbouring walks end early, or the config rejects their parameters")
 LABELS: Final[dict[str, dict[str, Label]]] = {
     "gait_sensitivity_norm": {
         "disturbance": Label("", "disturbance of the first step"),
@@ -118,7 +118,7 @@ def run(
     steps = {}
     for subject in subjects(config, inputs, progress):
         gait = subject.gait_on_map()
-        # the rigid model's gradients and largest disturbances take less time than the start of a process
+        # The rigid model's gradients and largest disturbances take less time than the start of a process.
         jobs_but_for_walks = jobs if subject.model == CONTACT else 1
         numbers = gait_quantities(gait)
         assert numbers is not None, "a gait has quantities"
@@ -127,13 +127,13 @@ def run(
         if numbers["spectral_radius"] >= 1.0:
             unstable.append(subject.model)
             continue
-        gaits = gait.by_leg()
+        gaits = gait.split_by_leg()
         answer["gait_sensitivity_norm"] += [row for each in gaits for row in norms(row_of(subject, each), each)]
         rough_walks = [*rough_ground_units(subject, config)]
         label = f"robustness: {subject.model} model"
         units = [*single(subject, config, len(gaits)), *rough_walks]
         processes = jobs if rough_walks else jobs_but_for_walks
-        # the computation of the gait's quantities has compiled all kernels
+        # The computation of the gait's quantities has already compiled all kernels.
         done, _ = complete(units, checkpoint, label, progress, processes, compiled=True)
         target = {"steps": config.robustness.steps}
         for each in gaits:
@@ -232,7 +232,7 @@ def single_of(subject: ModelUnderTest, leg: int, disturbance: Any, sign: float, 
     reactions.
     """
     size = largest_disturbance(subject.quick_by_leg()[leg], disturbance, sign, steps)
-    gait = subject.gait_on_map().by_leg()[leg]
+    gait = subject.gait_on_map().split_by_leg()[leg]
     if disturbance == "hip-push" and isinstance(gait.step_map, RigidMap):
         return [size, *gait.step_map.ground_after_push(gait.z, gait.p, sign * size, steps, gait.swing)]
     return [size]
@@ -311,7 +311,7 @@ def sensitivities(
     for key, gradients in track(progress, label, len(keys), zip(keys, results, strict=True)):
         parameter = parameter_of(key, subject.config)
         value = parameter.value_in(subject.config)
-        for name, gradient in (gradients or dict.fromkeys(numbers, NONE_BESIDE)).items():
+        for name, gradient in (gradients or dict.fromkeys(numbers, NO_NEIGHBOURS)).items():
             if name in numbers:
                 share = None if gradient.value is None else relative_gradient(gradient.value, value, numbers[name])
                 details: dict[str, Any] = {} if gradient.value is None else {"error": float(gradient.error or 0.0)}

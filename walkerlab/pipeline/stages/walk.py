@@ -39,7 +39,7 @@ MAX_REPEATED = 32
 FEWEST_SETTLED = 8
 """Fewest last steps in which a walk that has just settled may repeat."""
 REPEATED = 1e-5
-SETTLED = 1e-2
+REPEATED_AFTER_SETTLING = 1e-2
 """Largest difference between steps that repeat, relative to the first step, and relative to the spread of the steps."""
 ON_GAIT = 1e-6
 OFF_GAIT = 1e-2
@@ -170,10 +170,10 @@ def thin_samples(samples: Any, ends: NDArray[np.float64], progress: Progress) ->
         f"{FIRST_STEPS} and the last {LAST_STEPS} steps, fewer of those between; both sides of every heel strike are "
         "among them"
     )
-    return only_at(samples, stored)
+    return select_samples(samples, stored)
 
 
-def only_at(samples: Any, mask: NDArray[Any]) -> Any:
+def select_samples(samples: Any, mask: NDArray[Any]) -> Any:
     return type(samples)(*(each[mask] for each in samples))
 
 
@@ -231,7 +231,7 @@ def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str,
     return {"speed_m_s": speed, "froude": speed / math.sqrt(config.gravity_m_s2 * config.walker.leg_length_m)}
 
 
-def driven_by(walk: WalkRecord) -> dict[str, Any]:
+def drive_measures(walk: WalkRecord) -> dict[str, Any]:
     """Return the work of each drive per step and the cost of transport, or nothing for a walk that covers
     no distance.
     """
@@ -276,8 +276,8 @@ def steps_to_repeat(steps: Floats) -> int:
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
         apart = np.abs(steps[period:] - steps[:-period]).max()
-        # a walk that settles slowly, from side to side, almost repeats after two steps
-        if apart < REPEATED and (period == 1 or apart < SETTLED * spread):
+        # A walk that settles slowly, from side to side, almost repeats after two steps.
+        if apart < REPEATED and (period == 1 or apart < REPEATED_AFTER_SETTLING * spread):
             return period
     return 0
 
@@ -298,7 +298,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         **knee_strikes,
         **last_stride(walk),
         **settling(walk),
-        **driven_by(walk),
+        **drive_measures(walk),
         "end_time_s": walk.end_time_s,
         "rhs_evaluations": walk.work.rhs_evaluations,
         "accepted_steps": walk.work.accepted,
@@ -307,9 +307,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
 
 
 def last_stride(walk: WalkRecord) -> dict[str, Any]:
-    """Return both steps of a walk's last stride and how they differ, or an empty mapping for a walk without
-    a stride.
-    """
+    """Return both steps of a walk's last stride and their differences, or an empty mapping without a stride."""
     if walk.steps < STRIDE:
         return {}
     count = walk.steps - walk.steps % STRIDE  # leg 1 swings in the first step of a stride
@@ -337,7 +335,7 @@ def mean_step(walk: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def last_step(walk: Mapping[str, Any]) -> dict[str, Any]:
-    """Return period (s), length (m) and knee strike time (s) of a walk's last step, or None for what did not happen."""
+    """Return period (s), length (m) and knee strike time (s) of a walk's last step, each None if it does not exist."""
     periods = walk["step_periods_s"]
     lengths = walk["step_lengths_m"]
     strikes = walk.get("knee_strike_times_s")

@@ -1,1 +1,1 @@
-"""Keep: results as files with contents, keys, provenance and locks, in run folders."""
+"""Third layer of the pipeline: results as files in run folders, with contents, keys, provenance and locks."""

@@ -169,7 +169,7 @@ def write_in_turn(
                 yield name, variable
 
     with replacing(path) as temporary:
-        # check for space first: the HDF5 library cannot close a file that it cannot write
+        # Free space is checked first, because the HDF5 library cannot close a file that it cannot write.
         refuse_full_disk(temporary, content.size)
         hdf5.write_in_turn(
             temporary,
@@ -202,7 +202,7 @@ def read(path: Path) -> Stored:
     except OSError as error:
         raise Damaged(f"it cannot be read: {error.strerror or error}") from error
     except Exception as error:
-        # any error that a library raises on untrusted bytes means that the file is damaged
+        # Any error that a library raises on untrusted bytes means that the file is damaged.
         raise Damaged(f"it is not an artifact: {error or type(error).__name__}") from error
 
 
@@ -282,7 +282,7 @@ def index_files(folder: Path, files: Iterable[Path]) -> Group:
     return Group(
         {
             "file": Variable(np.array(names, dtype=object), ("file",), "", "path in the run folder"),
-            # figures that plot run times differ between runs, so the content's digest excludes the digests of files
+            # Figures that plot run times differ between runs, so the content's digest excludes the digests of files.
             "sha256": Variable(np.array(digests, dtype=object), ("file",), "", "sha256 of the file", timing=True),
         }
     )

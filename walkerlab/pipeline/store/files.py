@@ -115,7 +115,7 @@ def replacing(path: Path) -> Iterator[Path]:
                 os.fsync(file.fileno())
             temporary.replace(path)
         finally:
-            # the temporary file remains after a failure, or if it was a hard link to `path` itself
+            # The temporary file remains after a failure, or if it was a hard link to `path` itself.
             with contextlib.suppress(OSError):
                 temporary.unlink()
         if hasattr(os, "O_DIRECTORY"):  # other systems cannot flush a folder's entries
@@ -157,7 +157,7 @@ def read_bounded(path: Path, limit: int) -> bytes:
             raise ValueError("not a regular file")
         if status.st_size > limit:
             raise ValueError(f"{status.st_size} bytes, more than the {limit} that an artifact may have")
-        # `read` allocates memory for the size that it is given, so pass the actual size
+        # `read` allocates memory for the requested size, so it gets the actual size and not the limit.
         return file.read(status.st_size)
 
 

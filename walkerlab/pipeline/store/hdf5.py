@@ -107,7 +107,7 @@ def write_variable(target: Any, name: str, variable: Variable) -> Any:
     """Write one array with its labels."""
     kind = variable.values.dtype.kind
     values = encoded(variable.values) if kind == "O" else variable.values
-    # booleans are stored as bytes and marked as xarray marks them, since netCDF has no boolean type
+    # Booleans are stored as bytes with the mark that xarray uses, because netCDF has no boolean type.
     dtype = {"O": values.dtype, "f": "<f8", "i": "<i8", "b": "i1"}[kind]
     dataset = target.create_dataset(name, data=values, dtype=dtype, track_order=True)
     marks = {mark: 1 for mark in ("timing", "missing") if getattr(variable, mark)}
@@ -242,7 +242,7 @@ def read_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     if h5py.check_string_dtype(dataset.dtype).length is None:
         return read_variable_strings(dataset, budget)
     texts = np.asarray(dataset[()])
-    # equal strings share one object, since a short string takes far more memory than in the file
+    # Equal strings share one object, because a short string takes far more memory than in the file.
     decoded = {text: text.decode() for text in set(texts.ravel().tolist())}
     values = np.empty(texts.shape, dtype=object)
     values.ravel()[:] = [decoded[text] for text in texts.ravel().tolist()]
@@ -254,7 +254,7 @@ def read_variable_strings(dataset: Any, budget: Budget) -> NDArray[Any]:
     if dataset.ndim == 0:
         return np.array(dataset[()].decode(), dtype=object)
     values = np.empty(dataset.shape, dtype=object)
-    # read in slices of the last dimension, which holds all points of a sweep over one parameter
+    # Strings are read in slices of the last dimension, which holds all points of a sweep over one parameter.
     for row in np.ndindex(dataset.shape[:-1]):
         for start in range(0, dataset.shape[-1], STRINGS_AT_ONCE):
             part = (*row, slice(start, start + STRINGS_AT_ONCE))

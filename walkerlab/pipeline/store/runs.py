@@ -229,7 +229,7 @@ def find_run(text: str, runs_dir: Path) -> RunFolder | None:
     path = Path(text)
     is_name = path.name == text and text != ".."
     places = (runs_dir / path, path) if is_name else (path,)
-    # the system refuses a path that is too long
+    # The system refuses a path that is too long.
     with contextlib.suppress(OSError):
         return next((RunFolder.open_folder(place) for place in places if place.is_dir()), None)
     return None

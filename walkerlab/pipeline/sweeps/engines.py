@@ -337,7 +337,7 @@ def engine_named(text: str) -> tuple[SweepEngine, str]:
     name, _, address = text.partition("=")
     if name not in ENGINES:
         raise ConfigError(f"--engine {text}: unknown engine; choose from {', '.join(ENGINES)}.")
-    # multiprocessing's own test for a process that it started; such a process first runs the calling script
+    # This is multiprocessing's own test for a process that it started. Such a process first runs the calling script.
     if text == "dask" and getattr(current_process(), "_inheriting", False):
         raise ConfigError(
             "--engine dask: the processes that Dask starts run the calling script, which would sweep again.", GUARD

@@ -124,7 +124,7 @@ def build_sweep(
         text = f"{min(repeated)}: given twice" if repeated else "no parameter is given"
         raise problem_error(None, f"sweep: {text}", "--over KEY=VALUES, each key once", advice=EXAMPLE)
     if sample:
-        return SweptStage(stage, sampled(axes, sample, seed), "list")
+        return SweptStage(stage, draw_samples(axes, sample, seed), "list")
     for parameter in axes:
         if not parameter.values:
             raise parameter_error(parameter.source, f"{parameter.key}: the number of values is missing", VALUE_FORMS)
@@ -197,10 +197,10 @@ def axis(key: str, values: Any, source: str) -> Axis:
         raise parameter_error(source, f"{key}: {values} is not a range of values", VALUE_FORMS)
     if logarithmic and min(low, high) <= 0.0:
         raise parameter_error(source, f"{key}: {values}", "both ends above 0 for a logarithmic range")
-    return Axis(key, as_the_key_has_it(key, evenly_spaced(low, high, count, logarithmic)), source, (low, high))
+    return Axis(key, convert_for_key(key, evenly_spaced(low, high, count, logarithmic)), source, (low, high))
 
 
-def as_the_key_has_it(key: str, values: Sequence[float]) -> tuple[Value, ...]:
+def convert_for_key(key: str, values: Sequence[float]) -> tuple[Value, ...]:
     """Convert whole numbers to int if the key takes integers. The schema rejects other numbers."""
     field = key_fields().get(key)
     if field is None or field.annotation is not int:
@@ -216,7 +216,7 @@ def evenly_spaced(low: float, high: float, count: int, logarithmic: bool) -> tup
     return tuple(float(value) for value in space(low, high, count))
 
 
-def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
+def draw_samples(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
     """Draw points from the intervals or lists of all parameters.
 
     sample  SAMPLER:N
@@ -239,7 +239,8 @@ def sampled(axes: Sequence[Axis], sample: str, seed: int) -> tuple[Axis, ...]:
         from scipy.stats import qmc
 
         if name == "sobol":
-            # Sobol sequences are balanced at powers of two, so draw one in full and keep its first `count` points
+            # Sobol sequences are balanced at powers of two, so a full one is drawn and its first `count` points are
+            # kept.
             unit = qmc.Sobol(dimensions, seed=generator).random_base2(math.ceil(math.log2(count)))[:count]
         else:
             unit = qmc.LatinHypercube(dimensions, seed=generator).random(count)
@@ -251,7 +252,7 @@ def values_at(axis: Axis, column: Any) -> Iterator[Value]:
     """Map numbers from 0 to 1 to values of one parameter."""
     for share in column.tolist():
         if axis.ends is not None:
-            yield from as_the_key_has_it(axis.key, [axis.ends[0] + share * (axis.ends[1] - axis.ends[0])])
+            yield from convert_for_key(axis.key, [axis.ends[0] + share * (axis.ends[1] - axis.ends[0])])
         else:
             yield axis.values[min(int(share * len(axis.values)), len(axis.values) - 1)]
 
@@ -260,7 +261,7 @@ def described(config: Config, key: str) -> tuple[str, str]:
     """Return the unit of a key under a config (units may depend on it), and the meaning of the key."""
     *above, last = key.split(".")
     block = value_at(config, above)
-    # the config may have a block of another type than the schema's default, with other keys
+    # A config's block may be of another type than the schema's default, with other keys.
     field = key_fields().get(key) or getattr(type(block), "model_fields", {}).get(last)
     if field is None:
         return "1", key

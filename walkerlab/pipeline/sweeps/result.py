@@ -153,7 +153,7 @@ class Merge:
         attrs = {"coordinates": " ".join(question.names)} if question.layout == "list" else {}
         scales = {name: column for name, column in parameters.items() if column.dims == (name,)}
         size = sum(stored_bytes(column.values) for column in self.columns.values())
-        # a quantity that is also a parameter is stored as its coordinate
+        # A quantity that is also a parameter is stored as the coordinate of that parameter.
         names = sorted({*parameters, *self.columns})
         variables = ((name, parameters[name] if name in parameters else self.variable(name)) for name in names)
         return InTurn(summary, attrs, scales, variables, size)

@@ -1,4 +1,4 @@
-"""Exports for use elsewhere: figures, tables and trajectories as files, and walks as GIF or MP4."""
+"""Exports for use in other programs: figures, tables and trajectories as files, and walks as GIF or MP4."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def export_from(
         stem, kinds, make = hyphenate(what), tuple(writers), lambda kind: writers[kind](item)
     else:
         stem, kinds, make = what, FIGURE_KINDS, lambda kind: figure(folder, item, kind, (width, dpi), console)
-    path, kind = target.of(what, f"{folder.name}-{stem}", kinds)
+    path, kind = target.choose_file(what, f"{folder.name}-{stem}", kinds)
     return write_file(path, make(kind), console)
 
 
@@ -114,7 +114,7 @@ def draw_walker(config: Path, target: Target, console: Console) -> Path:
     for warning in loaded.warnings:
         console.warn(warning)
     target = replace(target, inputs=tuple(files_read(find_config(config))))
-    path, kind = target.of("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
+    path, kind = target.choose_file("a walker", f"{loaded.run_name}-walker", DRAWING_KINDS)
     return write_file(path, draw_measures(loaded.config.walker, as_text(path.stem), kind), console)
 
 
@@ -317,7 +317,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
 
     Raises ConfigError for an unknown format, StaleError if no walk can be drawn, StorageError if writing fails.
     """
-    path, kind = target.of("an animation", f"{folder.name}-{film.model}", FILM_KINDS)
+    path, kind = target.choose_file("an animation", f"{folder.name}-{film.model}", FILM_KINDS)
     ffmpeg = shutil.which("ffmpeg")
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")

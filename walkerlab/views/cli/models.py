@@ -40,7 +40,7 @@ def write_model(
     # MuJoCo's viewer opens files that end in .xml.
     named_mjcf = target.output is not None and target.output.suffix == ".mjcf"
     to = "xml" if target.to == "mjcf" and not named_mjcf else target.to
-    path, ending = replace(target, to=to).of("a model", folder.name, list(ENDINGS))
+    path, ending = replace(target, to=to).choose_file("a model", folder.name, list(ENDINGS))
     kind = ENDINGS[ending]
     adams_law = law_named(law or "contact")
     if law is not None and kind == "mjcf":

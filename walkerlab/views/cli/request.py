@@ -206,7 +206,7 @@ FULL_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 def exit_on_failure(request: Request) -> Iterator[None]:
     """Turn expected failures into a message on stderr and an exit code. With `--json`, also print a JSON object."""
     raise_on(signal.SIGTERM, KeyboardInterrupt)
-    # background jobs of a script ignore SIGINT, and must go on doing so
+    # Background jobs of a script ignore SIGINT, and must continue to ignore it.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         raise_on(signal.SIGINT, KeyboardInterrupt)
 
@@ -357,7 +357,7 @@ def own_parameter(name: str, option: "Option") -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
-class KeysAreNoOptions(TyperCommand):
+class SuggestingCommand(TyperCommand):
     """A command that suggests `--set KEY=VALUE` if a user types a config key as an option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -409,4 +409,4 @@ def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
     options = sorted((entry for entry in fields(asks) if entry.name in shared), key=fields(Request).__contains__)
     by_name = [entry.replace(kind=inspect.Parameter.KEYWORD_ONLY) for entry in (*own, *map(as_parameter, options))]
     run.__signature__ = inspect.Signature([*starmap(own_parameter, names.items()), *by_name])  # type: ignore[attr-defined]
-    app.command(typed, cls=KeysAreNoOptions, help=purpose or inspect.getdoc(function))(run)
+    app.command(typed, cls=SuggestingCommand, help=purpose or inspect.getdoc(function))(run)

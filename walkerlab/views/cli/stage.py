@@ -23,7 +23,7 @@ def run_stage(request: Request, stage: Stage) -> None:
     try:
         report_on(request, stage)
     except ConfigError as error:
-        raise request.loaded.placed(error) from None
+        raise request.loaded.add_position(error) from None
 
 
 def report_on(request: Request, stage: Stage) -> None:
@@ -48,7 +48,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
     """Describe the result: what was computed, where it is stored, and what to do next."""
     if report.artifact is None:
         return [f"{report.stage}: no result", *omission_lines(request, report)]
-    # if there is no answer, its reason and advice are printed only once, as the error
+    # Without an answer, the reason and the advice are printed only once, as the error.
     separate = ("no_answer",) if report.no_answer is None else ("no_answer", "advice", "reason")
     own = {key: value for key, value in report.summary.items() if key not in separate}
     if "html" in own:
@@ -63,7 +63,7 @@ def report_lines(request: Request, report: StageReport) -> list[str]:
         answers = answer(report.stage, own | ({"figures": drawn} if drawn else {}))
         if request.verbose:
             answers += further_tables(report.stage, own)
-        # an artifact without an answer is stored too, but is not worth pointing to
+        # An artifact without an answer is also stored, but its path would not help the user.
         lines = [*answers, *([""] if answers else []), *([f"stored in {report.artifact}"] if own else [])]
     if report.stage in DRAWN_AT_ONCE:
         # Imported here: most stages draw nothing.

@@ -104,7 +104,7 @@ def state_of(step: Step) -> str:
     return "missing" if step.found is None else "stale"
 
 
-def why(step: Step) -> str:
+def explain_state(step: Step) -> str:
     """Explain the state of a result, or return '' if it needs no explanation."""
     return "" if step.reason in (NOT_THERE, UP_TO_DATE) else step.reason.removeprefix(f"{state_of(step)}: ")
 
@@ -113,7 +113,7 @@ def explain_states(steps: Sequence[Step]) -> Iterator[str]:
     """Explain each stage's state. A repeated reason refers to the first stage that has it."""
     first: dict[str, str] = {}
     for step in steps:
-        reason = short_reason(why(step)) if step.action == "leave out" else why(step)
+        reason = short_reason(explain_state(step)) if step.action == "leave out" else explain_state(step)
         yield f"as {first[reason]}" if reason in first else reason
         if reason:
             first.setdefault(reason, step.stage.name)

@@ -20,7 +20,7 @@ class Target:
     output: Path | None  # file; None derives its name from the run
     inputs: tuple[Path, ...] = ()  # files that the command reads, which must not be overwritten
 
-    def of(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
+    def choose_file(self, what: str, stem: str, kinds: Sequence[str]) -> tuple[Path, str]:
         """Return file and format (default: first of `kinds`).
 
         Raises ConfigError for an unknown format or a protected file.

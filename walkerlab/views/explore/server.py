@@ -103,7 +103,7 @@ class Job:
         """
         command = [sys.executable, "-P", "-c", JOB_PROGRAM, *words]
         lines = []
-        # stdout goes to a file, since a pipe would fill while only stderr is read
+        # The output goes to a file, because a pipe would fill up while only stderr is read.
         with tempfile.TemporaryFile("w+") as output:
             with subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=output, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -158,7 +158,17 @@ def render_page(base: ExploredConfig) -> tuple[str, str]:
         configs=choices(base),
         anchor="walk",
         # An empty player, which the script fills.
-        block=Player("The walk.", SEEN, "The walker", (), 0.0, 1.0, (0.0, 0.0), 1.0, (0, 0, 1, 1)),
+        block=Player(
+            title="The walk.",
+            caption=SEEN,
+            alt="The walker",
+            walkers=(),
+            slope_rad=0.0,
+            leg_m=1.0,
+            foot_radii_m=(0.0, 0.0),
+            closeup_m=1.0,
+            view=(0, 0, 1, 1),
+        ),
         # Markup only for the package's own files; all other texts are escaped.
         style=Markup(report.source("style.css") + (TEMPLATES / "explore.css").read_text(encoding="utf-8")),
         script=Markup(script),
@@ -204,7 +214,7 @@ class Desk:
             self.worker.process.send_signal(GIVE_WAY)
         with self._turn:
             deaths = 0
-            # repeat the call if the signal for an earlier request arrived late, or if the worker died while idle
+            # The call is repeated if the signal for an earlier request arrived late, or if the worker died while idle.
             while number == self._newest:
                 try:
                     answer = self.worker.do(call)
@@ -237,7 +247,7 @@ class Server(ThreadingHTTPServer):
         self.token = secrets.token_urlsafe(16)
         self.job = Job()
         self.cookie = f"walkerlab-explore-{self.server_port}"
-        # curves plotted in the background must not delay the answer to a moved slider
+        # Curves plotted in the background must not delay the answer to a moved slider, so they have their own worker.
         self.desk = Desk()
         self.background = Desk(drops=True)
         self._thread: threading.Thread | None = None

@@ -288,7 +288,7 @@ def follow_gaits(question: ExploredConfig) -> Answered:
         return question.refusal(error)
     except SupersededError:
         return SUPERSEDED
-    # skip attractors, which have step periods but are no branches
+    # Attractors are skipped: they have step periods but are not branches.
     branches = [(path, group) for path, group in answer.groups.items() if "step_length" in group.variables]
     curves = [{"model": path.partition("/")[0], **curve(group)} for path, group in branches if walkable(group)]
     return 200, {"over": config.continuation.over, "curves": curves}

@@ -126,7 +126,7 @@ def settle(figure: Figure) -> None:
     assert engine is not None, "a figure is laid out once"
     engine.execute(figure)
     break_lines(figure)
-    # wrapped labels and axes of equal scale change the layout, so compute it again
+    # Wrapped labels and axes of equal scale change the layout, so it is computed again.
     engine.execute(figure)
     figure.set_layout_engine(None)
 

@@ -114,7 +114,7 @@ def curve_of(group: Group, name: str) -> Curve:
     places = group["mark_after"].astype(int)[order] + 1
     value = np.insert(value, places, group["mark_value"][order])
     quantity = np.insert(quantity, places, group[f"mark_{name}"][order], axis=0)
-    # a bifurcation counts as stable, so that stable stretches reach up to it
+    # A bifurcation counts as stable, so that stable stretches reach up to it.
     known = np.insert(stable, places, True)
     on_mark = np.insert(np.zeros(stable.size, bool), places, True)
     between = known[:-1] & known[1:] & ~(on_mark[:-1] & on_mark[1:])
@@ -146,7 +146,7 @@ def draw_branch(axes: Axes, branch: DrawnBranch, name: str) -> set[str]:
 
 def stretch_of(curve: Curve, begin: int, end: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the parameter values and quantities to plot between two points of a branch, given by index."""
-    # near the flip at which a branch begins, the steps' values separate as the square root of the distance from it
+    # Near the flip at which a branch begins, the values of the steps separate as the square root of the distance.
     value = curve.value[begin : end + 1]
     quantity = curve.quantity[begin : end + 1]
     if begin or (0, "flip") not in curve.marks:
@@ -285,7 +285,7 @@ def interpolate(along: NDArray[Any]) -> NDArray[np.float64]:
 
 def multipliers_of(branch: DrawnBranch) -> NDArray[np.complex128]:
     """Return densely sampled multipliers along a branch (points, multipliers), largest first."""
-    # interpolate the coefficients of their polynomial: the multipliers themselves have kinks where two of them meet
+    # The coefficients of their polynomial are interpolated, because the multipliers have kinks where two of them meet.
     known = branch.group["multiplier_real"] + 1j * branch.group["multiplier_imag"]
     found = np.array([np.roots(row) for row in interpolate(np.array([np.poly(row).real for row in known]))])
     return np.take_along_axis(found, np.argsort(-np.abs(found), axis=1), axis=1)

@@ -84,7 +84,7 @@ def draw_forces(results: Results) -> Drawn:
 
 def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
     """Return the energy (J) lost in each step by cause (label, colour). The rest is attributed to the knees."""
-    # take the last sample before each touchdown: an impact then counts entirely towards the step that it starts
+    # The last sample before each touchdown is taken, so that an impact counts entirely towards the step that it starts.
     rows = np.concatenate(([0], np.maximum(np.searchsorted(walk.time, walk.strikes) - 1, 0)))
     by_cause = {cause: np.diff(walk[name][rows]) for name, cause in LOSS_STYLES.items()}
     given = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)

@@ -112,7 +112,7 @@ def draw_trade_off(results: Results) -> Drawn:
     figure, axes = panels(3.9)
     axes.fill(*outline, color=BLUE, alpha=0.15, linewidth=0.0)
     axes.plot(*outline, color=BLUE, linewidth=0.8)
-    worst, next_worst = (combination_in_words(rows, semi_axis * move) for move in moves)
+    worst, next_worst = (describe_combination(rows, semi_axis * move) for move in moves)
     key = []
     for move, name, style in zip(reach, (worst, next_worst), ("-", "--"), strict=True):
         axes.plot(*np.array([centre - move, centre + move]).T, color=BLACK, linewidth=1.2, linestyle=style)
@@ -129,7 +129,7 @@ def semi_axis_of_region(freedom: float) -> float:
     return math.sqrt(freedom * math.expm1(-2.0 / freedom * math.log(0.05)))
 
 
-def combination_in_words(rows: Sequence[Mapping[str, Any]], move: Floats) -> str:
+def describe_combination(rows: Sequence[Mapping[str, Any]], move: Floats) -> str:
     """Describe how the leading parameters change together, as in 'slope + 25 %, foot radius − 19 %'."""
     sizes = [move / (abs(row["value"]) or 1.0) for row, move in zip(rows, move.tolist(), strict=True)]
     largest = max(sizes, key=abs)

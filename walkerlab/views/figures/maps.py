@@ -134,7 +134,7 @@ def draw_basins(results: Results) -> Drawn:
     cells = results[BASIN]["basin"]
     plane = [str(name) for name in summary["plane"][:2]]
     xlim, ylim = (sides_of(cells[name]) for name in plane)
-    # show the middle plane of a grid over three coordinates
+    # Of a grid over three coordinates, the middle plane is shown.
     middle = tuple(size // 2 for size in cells["outcome"].shape[2:])
     outcome, attractor, to_settle = (cells[name][..., *middle] for name in ("outcome", "attractor", "steps_to_settle"))
 
@@ -143,9 +143,9 @@ def draw_basins(results: Results) -> Drawn:
         return axes.imshow(values.T, extent=extent, origin="lower", aspect="auto", interpolation="nearest", **how)
 
     figure, (left, right) = panels(3.9, 1, 2, sharex=True, sharey=True)
-    key = draw_kinds(partial(draw, left), fates(outcome, attractor, summary))
+    key = draw_kinds(partial(draw, left), kinds_of_cells(outcome, attractor, summary))
     left.set_title("(a) outcome")
-    # a logarithmic scale has no zero, so walks that are settled from the start get the colour of one step
+    # A logarithmic scale has no zero, so walks that are settled from the start get the colour of one step.
     settled = np.ma.masked_where(attractor == NO_ATTRACTOR, to_settle.clip(min=1))
     right.set_title("(b) steps to the attractor")
     if settled.count():
@@ -174,7 +174,7 @@ def sides_of(middles: NDArray[np.float64]) -> tuple[float, float]:
     return float(middles[0]) - half, float(middles[-1]) + half
 
 
-def fates(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, Any]) -> list[Kind]:
+def kinds_of_cells(outcome: NDArray[Any], attractor: NDArray[Any], summary: Mapping[str, Any]) -> list[Kind]:
     """Return the kinds of cells that occur: attractors, walks that do not settle, and failures."""
     attractors = summary["attractors"]
     kinds: list[Kind] = [
@@ -201,7 +201,7 @@ MAPS: Final = "stability-maps"
 STIFFNESS_AXIS = "stiffness"
 VELOCITY = "stiction_velocity"
 STEP_SIZE = "step_size"
-_LAW: Final = Contact().in_si()
+_LAW: Final = Contact().to_si()
 PAPER: Final = (_LAW.stiffness, _LAW.stiction_velocity)
 SHARP, ROUGH = (1e-10, 1.0), (1e-6, 1.0)  # error ranges of the colour scales: stiction map, step map
 VERDICT_COLOURS: Final = {

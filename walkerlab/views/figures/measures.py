@@ -26,7 +26,7 @@ SMALL_ARC = 0.02
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
-BEHIND = -0.3
+SECOND_LEG_ANGLE = -0.3
 BENT_ANGLE = -0.75
 """Angles (rad) at which the second leg is drawn: of the whole leg or, with knees, its thigh; and of the shank."""
 LEFT_OF_LEG = 0.62
@@ -176,7 +176,7 @@ class View:
 def frame_leg(leg: UprightLeg) -> View:
     length = leg.joints[0][1]
     labels, lanes = arrange_labels(leg)
-    # text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length
+    # Text has a fixed size, so it takes a fixed fraction of the width, whatever the walker's length.
     behind = letters([words for words, *_ in labels])
     ahead = [letters([dimension.label for dimension in lane]) for lane in lanes]
     width = (LEFT_OF_LEG + FIRST_LANE) * length / (1.0 - LETTER * (behind + sum(ahead)))
@@ -202,7 +202,7 @@ def draw_panel(axes: Axes, leg: UprightLeg, other: UprightLeg, view: View) -> No
     axes.text(0.28 * length, y, "walking direction", va="center", fontsize=SMALL)
     # the other leg, behind and off the ground, with its knee bent if it has one
     second = [leg.joints[0]]
-    angles = (BEHIND, BENT_ANGLE)[: len(other.joints)]
+    angles = (SECOND_LEG_ANGLE, BENT_ANGLE)[: len(other.joints)]
     for angle, above, below in zip(angles, other.joints, other.line[1:], strict=True):
         second.append(rotate(angle, above, below, second[-1]))
     draw_leg(axes, second, rotate(angles[-1], other.joints[-1], other.centre, second[-2]), other.radius, FAINT_GREY)

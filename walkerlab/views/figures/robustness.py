@@ -166,7 +166,7 @@ def draw_shares(axes: Axes, steps: Group) -> None:
     """Plot the fraction of walks still going over the number of steps, for each model and roughness."""
     for model, last, of_model in zip(steps["model"], steps["cut_off_at"], steps["steps"], strict=True):
         for walks, dash in zip(of_model, cycle(DASHES), strict=False):
-            # a walk that was cut off has not failed
+            # A walk that was cut off has not failed, so it counts as still walking.
             ended = np.sort(walks[walks < last])
             going = 1.0 - np.arange(ended.size + 1) / walks.size
             at = np.concatenate(([1.0], ended, [min(walks.max(), last)]))

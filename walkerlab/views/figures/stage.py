@@ -45,11 +45,11 @@ def run(
             for path in paths_of(figure.name).values():  # drawn by an earlier run from results that no longer exist
                 with storing(folder / path):
                     (folder / path).unlink(missing_ok=True)
-            # figures of stages that run only on request are not reported as missing
+            # Figures of stages that run only on request are not reported as missing, because nobody asked for them.
             if not any(PIPELINE[name].on_demand and name not in inputs for name in figure.stages):
                 missing.append({"what": figure.called, "why": why})
     files = [folder / str(entry[kind]) for entry in drawn for kind in ("svg", "png")]
-    # some captions quote run times, which differ from run to run
+    # Some captions quote run times, which differ from run to run, so the texts count as timings.
     summary = {"figures": drawn, "left_out": missing}
     return Content({artifact.FILES_GROUP: artifact.index_files(folder, files)}, summary, timed=("figures",))
 

@@ -52,9 +52,9 @@ ARC_MIDDLE = np.zeros(1)
 SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
-UNDER = 0.36
+ROOM_BELOW = 0.36
 SIDE_INCHES = 0.7
-ABOVE = 1.05
+ROOM_ABOVE = 1.05
 """Room (in) for landing times below the lowest foot, for axis labels at the side, and for the legend."""
 SHAPE = 0.68
 """Maximum height of the axes relative to their width."""
@@ -192,8 +192,8 @@ def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
     figure = blank(0.0)
     across = figure.get_figwidth() - SIDE_INCHES
     lowest = sticks.project(seen)[..., 1].min()
-    bottom = min(bottom, lowest - UNDER * (right - left) / across)
-    figure.set_figheight(ABOVE + across * (top - bottom) / (right - left))
+    bottom = min(bottom, lowest - ROOM_BELOW * (right - left) / across)
+    figure.set_figheight(ROOM_ABOVE + across * (top - bottom) / (right - left))
     axes = figure.add_subplot()
     axes.set(xlim=(left, right), ylim=(bottom, top), **AXES)
     draw_postures(axes, sticks, between, FAINT_WIDTH)
@@ -338,7 +338,7 @@ RELIEF_UNDER = 0.075
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:
     """Return frame times (s) of an animation, by default of four steps or, for a fall, the last four and the fall."""
-    # the last frame of a fall is shown for a second
+    # The last frame of a fall is shown for a second, so that the fall can be seen.
     begin = 0
     shown = STEPS_SHOWN if steps is None else steps
     if steps is None and sticks.ending:
@@ -373,7 +373,7 @@ def moving_lines(sticks: Sticks, at: Array) -> list[Array]:
         lines += [sticks.sole(leg) for leg in range(2)]
     if sticks.head is not None:
         lines.append(np.stack((sticks.hip, sticks.head), axis=1))
-    # interpolate linearly; both sides of a heel strike are samples, so no interval spans one
+    # Linear interpolation is exact enough, because both sides of a heel strike are samples and no interval spans one.
     flat = [line.reshape(line.shape[0], -1) for line in lines]
     places = [np.stack([np.interp(at, sticks.time, column) for column in line.T], axis=1) for line in flat]
     return [sticks.project(place.reshape(at.size, -1, 2)) for place in places]

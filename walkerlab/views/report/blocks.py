@@ -217,7 +217,7 @@ class Section:
     page: str = MAIN  # file of the page
 
     @classmethod
-    def of(
+    def create(
         cls, anchor: str, title: str, blocks: Iterable[PageBlock | None], finding: str = "", page: str = MAIN
     ) -> Section | None:
         """Create a section of the blocks that are not empty, or return None if all are empty."""

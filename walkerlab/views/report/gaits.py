@@ -160,7 +160,7 @@ def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
         gait_table(gaits, names, note=words("gait.equations") if len(gaits) > 1 else "") if gaits else None,
         every_gait(every, names) if any(len(gait) > 1 for gait in every.values()) else None,
     )
-    return Section.of("gait", "The gait", blocks, words("gait.finding", summary))
+    return Section.create("gait", "The gait", blocks, words("gait.finding", summary))
 
 
 def every_gait(sets: Mapping[str, Sequence[Mapping[str, Any]]], names: Sequence[str]) -> Table:

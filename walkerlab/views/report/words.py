@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.walkers import second_leg_in_words
+from walkerlab.config.walkers import describe_second_leg
 from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE, join_words
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 from walkerlab.physics.energy_channels import CHANNELS
@@ -97,7 +97,7 @@ def join_row(text: str) -> str:
 TEMPLATE_FUNCTIONS = (
     *(numbers.number, numbers.fixed, numbers.quantity, numbers.length, numbers.format_integer, numbers.span),
     *(numbers.count, join_words, numbers.power_of_ten, join_row, typeset, ends, walks, describe_error, len),
-    *(describe_limp, legs_differ, second_leg_in_words),
+    *(describe_limp, legs_differ, describe_second_leg),
 )
 """Functions available to the templates."""
 TEMPLATE_CONSTANTS = {"CHANNELS": CHANNELS, "ERRORS": ERROR_TEXTS, "DEFAULT_CHECK": DEFAULT_CHECK}

@@ -20,7 +20,7 @@ class Integrator:
     order: int  # nominal order of convergence
     most_steps: int  # step budget of a run
     adapts: bool = False  # whether the step size follows a tolerance
-    for_contact_only: bool = False  # whether it differs from another integrator only on the engine's own contact
+    for_contact_only: bool = False  # whether it matters only on the engine's own contact, and equals another without
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Experiments in other engines, each compared with our own solution: same law, own law, and a swing without contact.
+"""Experiments in other engines, compared with our own solution: same law, own law, and a swing without contact.
 
 Under the same law, an engine integrates our contact forces; under its own law, it computes contact by its own model.
 """
@@ -80,8 +80,8 @@ def make_truth(scene: EngineScene) -> Truth | None:
     reference, second = (simulate(scene, *method, COMPARED_TOUCHES + 1, until) for method in REFERENCES)
     end = sampled_end(reference)
     second_end = sampled_end(second)
-    assert end is not None, "the walk goes on beyond that time"
-    assert second_end is not None, "the other method's walk goes on, too"
+    assert end is not None, "the walk continues beyond that time"
+    assert second_end is not None, "the other method's walk also continues"
     return Truth(until, end, reference.touch_time_s[:COMPARED_TOUCHES], float(np.max(np.abs(end - second_end))), walk)
 
 
@@ -187,7 +187,9 @@ class EngineOnScene:
     def walk(
         self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
-        """Walk under our law or, if `own` is not None, on the engine's own contact, for at most `most` engine steps."""
+        """Simulate a walk of at most `most` engine steps: on the engine's contact `own` or, if it is None, under our
+        law.
+        """
         law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.scale_start(start)
         task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
@@ -228,7 +230,8 @@ class EngineOnScene:
     def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
         """Yield walks on the engine's own contact: from the gait, coarse to fine, then from other starts."""
         # other starts are simulated at the second finest step
-        # adaptive walks from the gait share one step budget; the next walk is assumed to take as many steps as the last
+        # Adaptive walks from the gait share one step budget. The next walk is assumed to take as many steps as the
+        # last.
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
         most = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps

@@ -94,7 +94,7 @@ class ExudynRun(adapter.Simulation):
         stepping.numberOfSteps = max(1, math.ceil(stepping.endTime / h - 1e-9))
         stepping.verboseMode = 0
         stepping.adaptiveStep = name not in EXPLICIT_METHODS  # explicit methods keep their step
-        # detect contact at the end of a step, without iterating, as any explicit method does
+        # Contact is detected at the end of a step without iterations, as in any explicit method.
         stepping.discontinuous.ignoreMaxIterations = True
         stepping.discontinuous.iterationTolerance = NO_ITERATION
         settings.solution.file.write = False

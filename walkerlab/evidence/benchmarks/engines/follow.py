@@ -1,4 +1,4 @@
-"""Walking rules applied to an engine's walk from outside: touches, lifts, pads, knees and outcome.
+"""Walking rules applied to an engine's walk after each step: touches, lifts, pads, knees and outcome.
 
 An engine yields states only at the ends of its steps. Within a step a foot's height is the cubic through its heights
 and velocities at both ends, so a touch is located to fourth order in the step.

@@ -117,7 +117,7 @@ class EngineWalk:
             for foot in range(2):
                 engine.carry(foot, bool(rules.walk_state.has_ground[foot]))
 
-        def on_step(time_s: float, q: Floats, v: Floats) -> bool:
+        def monitor(time_s: float, q: Floats, v: Floats) -> bool:
             self.seen_s = offset_s + time_s
             changed = rules.follow(self.seen_s, q, v)
             if rules.turn is not None and rules.watches:
@@ -132,7 +132,7 @@ class EngineWalk:
 
         hand_over_ground()
         start_s = time.process_time()
-        engine.run(task.most - self.steps, span, on_step)
+        engine.run(task.most - self.steps, span, monitor)
         self.wall_s += time.process_time() - start_s
 
 
@@ -178,11 +178,11 @@ def record_motion(engine: Simulation, steps: int, until_s: float) -> EngineMotio
     """Simulate, recording the state at the end of each step."""
     records: list[tuple[float, Floats, Floats]] = []
 
-    def on_step(time_s: float, q: Floats, v: Floats) -> bool:
+    def monitor(time_s: float, q: Floats, v: Floats) -> bool:
         records.append((time_s, q.copy(), v.copy()))
         return True
 
-    engine.run(steps, until_s, on_step)
+    engine.run(steps, until_s, monitor)
     return EngineMotion(*(np.array(column) for column in zip(*records, strict=True)))
 
 

@@ -43,7 +43,7 @@ def section(_results: Results, summary: Row) -> Section | None:
         swings(summary["swings"]),
         table("What the engines cannot express", LIMIT_COLUMNS, limits, wordy=True),
     )
-    return Section.of("engines", "In other engines", blocks)
+    return Section.create("engines", "In other engines", blocks)
 
 
 def engine_and_integrator(row: Row) -> str:

@@ -42,7 +42,7 @@ def section(results: Results, summary: Row) -> Section | None:
     fastest: dict[str, list[str]] = {}
     for scene, best in summary["best"].items():
         fastest.setdefault(join_words(dict.fromkeys(best.values())), []).append(scene)
-    return Section.of("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
+    return Section.create("accuracy", "Error against run time", blocks, words("accuracy.fastest", fastest), COSTS)
 
 
 def costs(summary: Row) -> Table:

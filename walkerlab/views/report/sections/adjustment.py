@@ -24,7 +24,7 @@ def section(results: Results, summary: Summary) -> Section | None:
         margins_table(summary),
         walks_table(results, summary) if changed else None,
     )
-    return Section.of("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
+    return Section.create("adjustment", "The parameter adjustment", blocks, words("adjustment.needed", summary))
 
 
 ORDER_COLUMNS = (Column("parameter"), Column("observed orders, towards the limit", wide=True))
@@ -45,7 +45,9 @@ def limit(results: Results) -> Section | None:
         *(table(caption, columns, rungs, note=note) for caption, rungs in settings.items()),
         table("Convergence of the period when one parameter changes", ORDER_COLUMNS, rows),
     )
-    return Section.of("limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS)
+    return Section.create(
+        "limit", "Towards the rigid limit", blocks, words("adjustment.reached", reaches, pushes), COSTS
+    )
 
 
 def starts_table(results: Results, summary: Summary) -> Table:

@@ -24,7 +24,7 @@ def provenance_section(results: Results) -> Section | None:
         Code("Command lines", "\n".join(dict.fromkeys(result.provenance.command_line for result in stored))),
     )
     finding = words("closing.provenance", [result.provenance for result in stored])
-    return Section.of("provenance", "Provenance", blocks, finding)
+    return Section.create("provenance", "Provenance", blocks, finding)
 
 
 def to_the_second(time_utc: str) -> str:
@@ -74,7 +74,7 @@ def link_pages(results: Results, pages: Mapping[str, Sequence[Section]]) -> Sect
         items.append((file, TITLES[file], " ".join(filter(None, findings))))
     waiting = (Paragraph(words("closing.pending", entry.what), "waiting") for entry in results.pending)
     title = "Further pages" if items else "Not computed yet"
-    return Section.of("further", title, (Cards(tuple(items)) if items else None, *waiting))
+    return Section.create("further", title, (Cards(tuple(items)) if items else None, *waiting))
 
 
 def glossary(results: Results) -> Section:
@@ -89,7 +89,7 @@ def omissions_section(results: Results) -> Section | None:
     missing = table("Omitted results, with reasons and savings", columns, rows, wordy=True)
     nothing = Paragraph("" if rows else "Every result of the pipeline is available.")
     finding = f"{count(len(rows), 'item')}, each with its reason." if rows else "None."
-    return Section.of("left-out", "Omitted results", (missing, nothing), finding)
+    return Section.create("left-out", "Omitted results", (missing, nothing), finding)
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:

@@ -22,7 +22,7 @@ from walkerlab.views.report.words import words
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *rest = findings(summary) or [words("families.followed", summary["branches"])]
     blocks = (Paragraph(" ".join(rest)), gait_diagram(results), bifurcations(summary))
-    return Section.of("families", f"Families of gaits over {parameter(summary)}", blocks, first)
+    return Section.create("families", f"Families of gaits over {parameter(summary)}", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
@@ -157,7 +157,7 @@ ATTRACTOR_COLUMNS = (
 @stage_section("basin")
 def basin(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     sentences = (words("basin.shares", summary), *words.parts("basin.grounds", summary))
-    return Section.of("basin", "Basins of attraction", (*map(Paragraph, sentences), attractors(summary)))
+    return Section.create("basin", "Basins of attraction", (*map(Paragraph, sentences), attractors(summary)))
 
 
 def attractors(summary: Mapping[str, Any]) -> Table:

@@ -48,7 +48,7 @@ FIXED_COLUMNS = (
 def section(results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *rest = findings(summary)
     blocks: tuple[PageBlock | None, ...] = (Paragraph(" ".join(rest)), *tables(summary), motion.overlay(results))
-    return Section.of("identification", "Identified walker", blocks, first)
+    return Section.create("identification", "Identified walker", blocks, first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:
@@ -239,7 +239,7 @@ def capitalised(sentence: str) -> str:
 @stage_section("plan", "measurements")
 def plan_section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *rest = plan_findings(summary)
-    return Section.of("plan", "Measurements to make", (Paragraph(" ".join(rest)), *plan_tables(summary)), first)
+    return Section.create("plan", "Measurements to make", (Paragraph(" ".join(rest)), *plan_tables(summary)), first)
 
 
 def plan_findings(summary: Mapping[str, Any]) -> list[str]:

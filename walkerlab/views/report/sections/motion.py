@@ -21,7 +21,7 @@ STILL_VIEW_OF_RIGID = 4e-3
 
 
 def section(results: Results) -> Section | None:
-    return Section.of("motion", "The walk", (player(results),))
+    return Section.create("motion", "The walk", (player(results),))
 
 
 def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:

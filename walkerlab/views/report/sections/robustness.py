@@ -90,7 +90,7 @@ def is_worse(row: Mapping[str, Any]) -> bool:
 @stage_section("robustness", "gaits")
 def section(_results: Results, summary: Mapping[str, Any]) -> Section | None:
     first, *rest = findings(summary) or [""]
-    return Section.of("robustness", "Robustness of the gait", (Paragraph(" ".join(rest)), *tables(summary)), first)
+    return Section.create("robustness", "Robustness of the gait", (Paragraph(" ".join(rest)), *tables(summary)), first)
 
 
 def findings(summary: Mapping[str, Any]) -> list[str]:

@@ -48,7 +48,7 @@ def models_section(results: Results) -> Section | None:
         table("Largest differences of the legs’ motions", DIFFERENCE_COLUMNS, rows, note=note),
         table("Effect of the release instant", RELEASE_COLUMNS, walks, note=words("models.releases")),
     )
-    return Section.of("models", "The models compared", blocks, words("models.finding", angle))
+    return Section.create("models", "The models compared", blocks, words("models.finding", angle))
 
 
 def departure(results: Results) -> str:
@@ -75,7 +75,9 @@ def section(results: Results) -> Section | None:
         Statements(tuple(statements), "cards") if statements else None,
         Paragraph(departure(results)),
     )
-    return Section.of("verdict", "Verdict", blocks if any(blocks) else (Paragraph("There are no results to judge."),))
+    return Section.create(
+        "verdict", "Verdict", blocks if any(blocks) else (Paragraph("There are no results to judge."),)
+    )
 
 
 def failures(results: Results) -> list[str]:

@@ -28,7 +28,7 @@ QUANTITY_COLUMNS = (Column("quantity"), Column("value", numeric=True), Column("m
 @stage_section(CONTACT_STAGE)
 def contact(results: Results, summary: Mapping[str, Any]) -> Section | None:
     ground = results.config.contact
-    text = "" if ground is None else words("walks.ground", ground, ground.in_si(), summary)
+    text = "" if ground is None else words("walks.ground", ground, ground.to_si(), summary)
     quantities = table("The contact model's walk", QUANTITY_COLUMNS, contact_rows(summary), wordy=True)
     residual = joules(summary["energy_balance_residual_J"])
     finding = words("walks.finding", summary, 2 * results.config.strides, residual)
@@ -91,7 +91,7 @@ def assumptions(results: Results) -> Section | None:
     where = " (sections 3.1 and 3.2)" if results.claims else ""
     caption = f"Assumptions of the rigid model{where}, checked on its walk"
     checks = table(caption, ASSUMPTION_COLUMNS, judged, wordy=True)
-    return Section.of("assumptions", "Assumptions, checked", (checks,), words("walks.assumptions", judged))
+    return Section.create("assumptions", "Assumptions, checked", (checks,), words("walks.assumptions", judged))
 
 
 def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[str, Cell]:
@@ -139,7 +139,7 @@ def steps(results: Results) -> Section | None:
     listed = table("Periods and lengths of the steps", columns, rows, note=note)
     blocks = (listed, Paragraph(words("error.of_models", errors) if errors else ""))
     periods = {models[stage]: values for (stage, key), values in series.items() if key == "step_periods_s"}
-    return Section.of("steps", "Step by step", blocks, words("walks.periods", periods))
+    return Section.create("steps", "Step by step", blocks, words("walks.periods", periods))
 
 
 def format_step(place: int, key: str, summary: Mapping[str, Any]) -> str:
