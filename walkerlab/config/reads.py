@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from walkerlab.config.plan import Plan
     from walkerlab.config.recording import RecordedFile
     from walkerlab.config.robustness import Robustness
+    from walkerlab.config.second_leg import SecondPushOff
     from walkerlab.config.stability import Case
     from walkerlab.config.walkers import Walker
 
@@ -59,6 +60,8 @@ def only(config: Any, takes: type | None) -> Any:
 class PushOffAtOnce(Protocol):
     @property
     def impulse_N_s(self) -> float: ...
+    @property
+    def leg_2(self) -> SecondPushOff | None: ...
 
 
 class RigidConfig(Protocol):

@@ -153,7 +153,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
         up = form.hip_y[: angles.shape[1]]
         line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
         u = np.clip((samples.time_s[:, None] - touches) / form.push_off_duration, 0.0, 1.0)
-        bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_off / form.push_off_duration
+        bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_offs[pushing] / form.push_off_duration
         push = (bell / np.hypot(*line.T))[:, None] * line
         rates += np.column_stack([push, cross(foot, push)])
     return rates

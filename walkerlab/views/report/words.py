@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from walkerlab.config.walkers import second_leg_in_words
+from walkerlab.config.second_leg import second_leg_in_words
 from walkerlab.labels import join_words
 from walkerlab.physics.energy_channels import CHANNELS
 from walkerlab.views.prose import Prose, parts
