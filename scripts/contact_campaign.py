@@ -7,6 +7,7 @@
     python scripts/contact_campaign.py --walker driven  # spring, damper, torque, push-offs
     python scripts/contact_campaign.py --walker uneven  # footholds of drawn heights; every other is driven
     python scripts/contact_campaign.py --walker passing  # slow starts on uneven planes: feet pass again, in the ground
+    python scripts/contact_campaign.py --walker unequal  # legs that differ, all of them uneven and driven
     python scripts/contact_campaign.py --walker explicit  # feet that bounce, walked by dop853
 
 Each walk is drawn from a seed of its own: checkerboard, after-mid-swing or plane; a free or a pinned first
@@ -46,9 +47,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "physics" / "hyb
 
 import plain_walk
 
+from walkerlab.config.drives import push_offs
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
-from walkerlab.config.walkers import Kneed
+from walkerlab.config.walkers import Kneed, second_of
 from walkerlab.outcome import Outcome
 from walkerlab.physics.hybrid.contact_loop import EVENT_TIME
 from walkerlab.physics.hybrid.contact_result import RESIDUAL_FACTOR, ContactWalkResult
@@ -259,6 +261,32 @@ def passing(seed: int) -> Drawn:
     return replace(one, sets=(*one.sets, *sets), start=(*angles.tolist(), *slower.tolist()))
 
 
+def unequal(seed: int) -> Drawn:
+    """The uneven ones, all driven, with a second leg of its own dimensions, masses and push-off."""
+    one, die = replace(driven(seed), heights_m=uneven(seed).heights_m), random.Random(seed)
+    walker = load(Path(one.base), one.sets).config.walker
+    near = {"leg_length_m": 3e-3, "length_m": 3e-3, "foot_radius_m": 0.2}  # shares of a value, others by 0.1
+
+    def beside(block: Any, *names: str) -> str:
+        shares = ((name, die.uniform(-1.0, 1.0) * near.get(name, 0.1)) for name in names)
+        return ", ".join(f"{name}: {getattr(block, name) * (1.0 + share):.6f}" for name, share in shares)
+
+    if isinstance(walker, Kneed):
+        thigh = beside(walker.thigh, "length_m", "mass_kg", "mass_below_hip_m")
+        shank = beside(walker.shank, "length_m", "mass_kg", "mass_below_knee_m")
+        leg = f"thigh: {{{thigh}}}, shank: {{{shank}}}, {beside(walker, 'foot_radius_m')}"
+    else:
+        leg = beside(walker, "leg_length_m", "foot_to_mass_m", "leg_mass_kg", "leg_inertia_kg_m2", "foot_radius_m")
+    weight = 1.0 if one.base == "paper" else 0.08
+    sets = (f"walker.leg_2={{{leg}}}", f"push_off.leg_2.impulse_N_s={weight * die.uniform(0.1, 2.0):.4f}")
+    changed = load(Path(one.base), (*one.sets, *sets)).config
+    swing, stance, *others = one.start
+    behind = changed.walker.swing_angle(stance + changed.slope_rad)
+    swing = swing if behind is None else behind - changed.slope_rad
+    shank_angle = [swing] if isinstance(walker, Kneed) else []
+    return replace(one, sets=(*one.sets, *sets), start=(swing, stance, *shank_angle, *others[len(shank_angle) :]))
+
+
 def explicit(seed: int) -> Drawn:
     """The lightly damped ones by dop853, whose long steps of high order the energy balance has to follow."""
     one = light(seed)
@@ -267,7 +295,7 @@ def explicit(seed: int) -> Drawn:
 
 WALKERS = {
     "both": both, "compass": compass, "kneed": kneed, "light": light, "driven": driven, "uneven": uneven,
-    "passing": passing, "explicit": explicit,
+    "passing": passing, "unequal": unequal, "explicit": explicit,
 }  # fmt: skip
 
 
@@ -277,12 +305,13 @@ def plain_scene(config: Config, pitch_m: float, heights_m: tuple[float, ...]) ->
     assert contact is not None, "drawn with one"
     si = contact.to_si()
     smooth = contact.friction == "none"
+    legs = plain_walk.replace_second_leg(plain_legs(walker), plain_legs(second_of(walker)))
     return plain_walk.Plain(
-        *plain_legs(walker), walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness,
+        *legs, walker.leg_length_m, config.gravity_m_s2, config.slope_rad, si.stiffness,
         si.exponent, si.damping, si.full_damping_penetration, 0.0 if smooth else si.static_friction,
         0.0 if smooth else si.dynamic_friction, si.stiction_velocity, si.friction_velocity,
         TERRAINS[contact.terrain], pitch_m, at_touch(walker), np.array(tuple(dict(walker.hip).values())),
-        config.push_off.impulse_N_s, config.push_off.duration_s, np.array(heights_m),
+        np.array(push_offs(config.push_off)), config.push_off.duration_s, np.array(heights_m),
     )  # fmt: skip
 
 

@@ -156,13 +156,14 @@ def linear_solve(balance, n):
 
 @dataclass(frozen=True)
 class Walker:
-    """Two legs on a hip mass; leg 0 swings first. Dampers act at the knees."""
+    """Two legs on a hip mass; leg 0 swings first. Dampers act at the knees, push-offs (N s) along trailing legs."""
 
     legs: tuple[Leg, Leg]
     hip_mass: float
     slope: float
     gravity: float = 9.81
     knee_damping: tuple[float, float] = (0.0, 0.0)
+    push_offs: tuple[float, float] = (0.0, 0.0)
 
     def swing(self, k, free_shank=False):
         damping = self.knee_damping[k]
@@ -178,7 +179,7 @@ class Walker:
             bent_s, q, w = self.straighten(k, np.array([*q, q[0]]), np.array([*w, w[0]]))
         system = self.swing(k)
         run = integrate(system, np.append(q, w), lambda t, y: system.foot_height(t, y) - rise, -1.0)
-        (landing,) = (place for place, y in enumerate(run.y_events[0]) if system.foot_ahead(y) > 0.0)
+        landing = next(place for place, y in enumerate(run.y_events[0]) if system.foot_ahead(y) > 0.0)
         y = run.y_events[0][landing]
         length = system.foot_ahead(y) + system.standing.radius * (start - y[1])
         return bent_s + run.t_events[0][landing], length, y[1::-1], self.strike(k, y[:2], y[2:])
@@ -204,6 +205,10 @@ class Walker:
         foot = before.place(q, before.foot())[0]
         contact = foot - np.array([0.0, before.swinging.radius])
         momenta = np.array([before.momentum(q, w, contact), before.momentum(q, w, before.hip(q), (1,))])
+        to_hip = before.hip(q) - [-before.standing.radius * q[1], 0.0]
+        impulse = self.push_offs[1 - k] * to_hip / np.hypot(*to_hip)
+        arm = before.hip(q) - contact
+        momenta[0] += arm[0] * impulse[1] - arm[1] * impulse[0]
         new_contact, new_hip = np.array([-after.standing.radius * exchanged[1], 0.0]), after.hip(exchanged)
 
         def balance(rates):

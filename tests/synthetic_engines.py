@@ -59,6 +59,7 @@ def truth():
         touch_along_m=along,
         slip_m=np.zeros(3),
         rolling_m=np.zeros(3),
+        stance_s=np.zeros(3),
         end_time_s=2.2,
         end_state=(0.0,) * 8,
         max_penetration_m=1e-4,

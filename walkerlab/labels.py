@@ -61,7 +61,9 @@ def unit_by_name(name: str) -> str:
 def axis_label(key: str) -> str:
     """Convert a key to an axis label without units, e.g. walker.thigh.mass_kg to 'thigh mass'."""
     parts = key.removeprefix("walker.").split(".")
-    return " ".join(part.removesuffix(f"_{unit_ending(part)}").replace("_", " ") for part in parts)
+    shown = (part.removesuffix(f"_{unit_ending(part)}") for part in parts if part != "leg_2")
+    words = " ".join(shown).replace("_", " ")
+    return f"{words.removeprefix('leg ')} of leg 2" if "leg_2" in parts else words
 
 
 def add_unit(words: str, unit: str) -> str:

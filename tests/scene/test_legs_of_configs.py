@@ -5,18 +5,20 @@ import math
 import numpy as np
 import pytest
 
+from walkerlab.config.drives import drives_of
 from walkerlab.config.files import builtin_config
 from walkerlab.config.reads import restrict
 from walkerlab.config.walkers import second_of
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.exported import prepare_export
+from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
 from walkerlab.physics.orbits.contact_map import lengths_between_touches
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.pipeline.progress import Silent
-from walkerlab.pipeline.stages import continuation
+from walkerlab.pipeline.stages import contact_sim, continuation
 from walkerlab.scene.contact import contact_gait, scene_on_pads, start_state, tolerances_of
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import have_different_legs, rigid_walker
@@ -121,6 +123,26 @@ def test_a_contact_walk_on_pads_limps_into_the_contact_gait(leg_2):
     assert np.abs(off - off.mean()).max() < 1e-4
 
 
+def test_stance_times_last_from_touch_to_lift_of_each_foot():
+    config = config_of("paper", HEAVY, "contact.pad_pitch=own")
+    rigid = gait_of(config)
+    scene = scene_on_pads(config, rigid.step_length, rigid.state)
+    interval = 1e-4
+    walk = scene.walk(start_state(scene, rigid.state), 6, tolerances_of(config, 6), interval)
+    touches = np.append(0.0, walk.touch_time_s)
+    inside = sample_feet(scene.walker, walk.samples)[:, :, 1] < 0.0
+    for step, stance_s in enumerate(walk.stance_s[:5]):
+        foot = (step + 1) % 2  # leg 2 stands first
+        after = walk.samples.time_s > touches[step] + 10 * interval
+        lift = walk.samples.time_s[after & ~inside[:, foot]][0]
+        assert touches[step] + stance_s == pytest.approx(lift, abs=2 * interval)
+    numbers = {"asymmetry": {"step_length": 0.0}}
+    first, second = walk.stance_s[5], walk.stance_s[4]
+    found = contact_sim.add_stance_time(numbers, walk)["asymmetry"]
+    assert found == {"step_length": 0.0, "stance_time": pytest.approx(2.0 * (second - first) / (second + first))}
+    assert abs(found["stance_time"]) > 1e-3
+
+
 @pytest.mark.parametrize(("name", "first", "second"), [
     ("paper", "{leg_mass_kg: 5.5, leg_2: {leg_mass_kg: 5.0}}", "{leg_mass_kg: 5.0, leg_2: {leg_mass_kg: 5.5}}"),
     ("kneed", "{type: kneed, leg_2: {shank: {mass_kg: 0.053}}}",
@@ -147,6 +169,45 @@ def test_a_damped_knee_takes_the_same_work_from_both_models():
     assert rigid.work["knees"] < 0.0
     assert walk.driven.work_per_step(8)["knees"] == pytest.approx(rigid.work["knees"], rel=0.05)
     assert walk.driven.hip == 0.0
+
+
+LEVEL = ("slope_deg=0", "walker.hip={spring_N_m_per_rad: 10}")
+
+
+def test_push_offs_of_both_legs_drive_a_gait_that_limps():
+    gait = gait_of(config_of("paper", *LEVEL, "push_off={impulse_N_s: 4, leg_2: {impulse_N_s: 3.9}}"))
+    equal = gait_of(config_of("paper", *LEVEL, "push_off.impulse_N_s=3.95"))
+    assert np.mean(gait.steps, axis=0) == pytest.approx(equal.steps[0], rel=1e-4)
+    # the weaker push of leg 2 comes as leg 1 lands, so the step of leg 2 that follows is the longer in time
+    assert gait.asymmetry["step_period"] > 1e-3
+
+
+def test_a_push_off_of_leg_2_that_is_like_that_of_leg_1_makes_no_difference():
+    config = config_of("paper", *LEVEL, "push_off={impulse_N_s: 4, leg_2: {impulse_N_s: 4}}")
+    assert not have_different_legs(config)
+    assert rigid_walker(config) == rigid_walker(config_of("paper", *LEVEL, "push_off.impulse_N_s=4"))
+
+
+def test_push_offs_that_differ_make_legs_that_differ():
+    config = config_of("paper", "push_off={impulse_N_s: 1, leg_2: {impulse_N_s: 2}}")
+    assert have_different_legs(config)
+    assert PIPELINE["tune"].why_unsuited(config) == "the legs differ"
+    assert drives_of(config) == ("a push-off of 1 N s by leg 1 and 2 N s by leg 2",)
+
+
+@pytest.mark.parametrize(("first", "second"), [(0.3, 0.0), (0.0, 0.3), (0.3, 0.2)])
+def test_each_leg_pushes_off_with_its_own_impulse_on_compliant_ground(first, second):
+    push = f"push_off={{impulse_N_s: {first}, leg_2: {{impulse_N_s: {second}}}}}"
+    config = config_of("paper", push, "contact.terrain=after-mid-swing")
+    gait = gait_of(config_of("paper"))
+    scene = scene_on_pads(config, gait.step_length, gait.state)
+    start = start_state(scene, gait.state)
+    one, two = (scene.walk(start, steps, tolerances_of(config, steps)) for steps in (2, 3))
+    assert two.steps == 3
+    # leg 1 lands first, and leg 2 trails
+    assert (one.driven.push_off > 0.0) == (second > 0.0)
+    assert (two.driven.push_off > one.driven.push_off) == (first > 0.0)
+    assert two.energy_balance_residual_J < 1e-6
 
 
 @pytest.mark.parametrize("stage", [

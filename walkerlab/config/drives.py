@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from walkerlab.config.fields import Block, key
 from walkerlab.config.numbers import short_number
+from walkerlab.config.second_leg import SecondPushOff
 
 KUO: Final = "Kuo, Energetics of actively powered locomotion, J. Biomech. Eng. 124 (2002)"
 STRONGEST: Final = 1e9
@@ -39,14 +40,22 @@ class PushOff(Block):
     duration_s: float = key(
         0.005, "s", "duration in the contact model; in the rigid model it acts instantaneously", ge=1e-9, le=10.0
     )
+    leg_2: SecondPushOff | None = None
+
+
+def push_offs(push_off: Any) -> tuple[float, float]:
+    """Return the impulse (N s) of each leg's push-off."""
+    second = None if push_off.leg_2 is None else push_off.leg_2.impulse_N_s
+    return push_off.impulse_N_s, push_off.impulse_N_s if second is None else second
 
 
 def drives_of(config: Any) -> tuple[str, ...]:
     """Describe the drives that supply energy to a config's walker."""
-    push = config.push_off.impulse_N_s
+    first, second = push_offs(config.push_off)
+    push = f"{short_number(first)} N s{'' if first == second else f' by leg 1 and {short_number(second)} N s by leg 2'}"
     torque = config.walker.hip.torque_N_m
     return describe_nonzero(
-        {f"a push-off of {short_number(push)} N s": push, f"a hip torque of {short_number(torque)} N m": torque}
+        {f"a push-off of {push}": max(first, second), f"a hip torque of {short_number(torque)} N m": torque}
     )
 
 

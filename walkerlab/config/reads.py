@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from walkerlab.config.ground import Footholds
     from walkerlab.config.identify import Identify
     from walkerlab.config.recording import RecordedFile
+    from walkerlab.config.second_leg import SecondPushOff
     from walkerlab.config.walkers import Walker
 
 
@@ -55,6 +56,8 @@ def restrict(config: Any, takes: type | None) -> Any:
 class PushOffAtOnce(Protocol):
     @property
     def impulse_N_s(self) -> float: ...
+    @property
+    def leg_2(self) -> SecondPushOff | None: ...
 
 
 class RigidConfig(Protocol):

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field
 from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustness, Stability, Sweep
 from walkerlab.config.check import Check
 from walkerlab.config.contact import Contact
-from walkerlab.config.drives import PushOff, acting_on
+from walkerlab.config.drives import PushOff, acting_on, push_offs
 from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
 from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
@@ -275,7 +275,7 @@ class Config(Block):
 
     _fits = check_against("start", "walker", why_no_state)
     _pushes = check_against(
-        "push_off", "walker", lambda value, walker: why_no_push_off(walker) if value.impulse_N_s else ""
+        "push_off", "walker", lambda value, walker: why_no_push_off(walker) if any(push_offs(value)) else ""
     )
     _stands = check_against("contact", "walker", lambda value, walker: why_no_contact(walker) if value else "")
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkerlab.config.drives import push_offs
 from walkerlab.config.walkers import AssembledWalker, Kneed
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.extensions import declared, load
@@ -128,7 +129,8 @@ def require_known_legs(config: ContactConfig) -> None:
 
 
 def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
-    pulse = {"push_off_duration": config.push_off.duration_s} if config.push_off.impulse_N_s != 0.0 else {}
+    pushes = push_offs(config.push_off)
+    pulse = {"push_offs": pushes, "push_off_duration": config.push_off.duration_s} if any(pushes) else {}
     dampings = knee_dampings(config.walker)
     knees = {"knees": tuple(map(damper, dampings))} if any(dampings) else {}
     return changed_forms(walker, **drive_parameters(config), **pulse, **knees)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from walkerlab.config.drives import push_offs
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import (
     LIGHTEST_CONTACT,
@@ -76,7 +77,7 @@ def own_parts(walker: AssembledWalker) -> Assembly:
 
 
 def drive_parameters(config: RigidConfig) -> dict[str, Any]:
-    return {"hip": tuple(dict(config.walker.hip).values()), "push_off": config.push_off.impulse_N_s}
+    return {"hip": tuple(dict(config.walker.hip).values()), "push_off": max(push_offs(config.push_off))}
 
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:

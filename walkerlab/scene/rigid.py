@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from walkerlab.config.drives import push_offs
 from walkerlab.config.ground import Footholds
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
@@ -77,11 +78,16 @@ def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Rig
 def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
     """Return the model with the push-off, hip spring and knee dampers of the config."""
     driven = passive.changed(**drive_parameters(config))
-    first, second = knee_dampings(config.walker)
-    if first == second:
-        return driven.changed(knees=damper(first)) if first else driven
-    models = zip((driven, driven.exchanged), (first, second), strict=True)
-    return pair(*(replace_fields(model, {"knees": damper(damping)}) for model, damping in models))
+    dampings = knee_dampings(config.walker)
+    drives = [
+        {"push_off": push} | ({"knees": damper(damping)} if any(dampings) else {})
+        for push, damping in zip(push_offs(config.push_off), dampings, strict=True)
+    ]
+    if drives[0] == drives[1]:
+        return driven.changed(**drives[0])
+    return pair(
+        *(replace_fields(model, drive) for model, drive in zip((driven, driven.exchanged), drives, strict=True))
+    )
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)

@@ -37,7 +37,7 @@ class Plain(NamedTuple):
     inertias: np.ndarray  # (n,)
     foot_levers: np.ndarray  # (2, n, 2) to the centres of the balls
     foot_bodies: np.ndarray  # (2,)
-    radius: float
+    radii: np.ndarray  # (2,) of the balls
     knees: np.ndarray  # (knees, 2) thigh and shank
     leg: float
     gravity: float
@@ -55,7 +55,7 @@ class Plain(NamedTuple):
     release_at_touch: bool
     # N m/rad, N m s/rad, N m: spring, damper, and a torque that swings the free leg forward
     hip: np.ndarray = np.zeros(3)
-    push_off: float = 0.0  # N s
+    push_offs: np.ndarray = np.zeros(2)  # (2,) N s, of each foot
     push_off_duration: float = 1.0  # s
     heights: np.ndarray = np.zeros(1)  # (footholds,) m over the slope, the start's first; those beyond lie at the last
 
@@ -107,8 +107,8 @@ def straight_legs(leg, foot_to_mass, leg_mass, hip_mass, radius, inertia=0.0):
     feet = np.zeros((2, 2, 2))
     feet[0, 0, 1] = feet[1, 1, 1] = radius - leg
     return (
-        np.array([leg_mass, leg_mass, hip_mass]), levers, np.full(2, inertia), feet, np.array([0, 1]), radius,
-        np.zeros((0, 2), np.int64),
+        np.array([leg_mass, leg_mass, hip_mass]), levers, np.full(2, inertia), feet, np.array([0, 1]),
+        np.full(2, radius), np.zeros((0, 2), np.int64),
     )  # fmt: skip
 
 
@@ -120,7 +120,18 @@ def kneed_legs(thigh, thigh_mass_at, thigh_mass, shank, shank_mass_at, shank_mas
         levers[2 + k, k, 1], levers[2 + k, 2 + k, 1] = -thigh, -shank_mass_at
         feet[k, k, 1], feet[k, 2 + k, 1] = -thigh, radius - shank
     masses = np.array([thigh_mass, thigh_mass, shank_mass, shank_mass, hip_mass])
-    return masses, levers, np.zeros(4), feet, np.array([2, 3]), radius, np.array([[0, 2], [1, 3]])
+    return masses, levers, np.zeros(4), feet, np.array([2, 3]), np.full(2, radius), np.array([[0, 2], [1, 3]])
+
+
+def replace_second_leg(first, second):
+    """The same of the first leg of one pair and the second leg of another on the same hip."""
+    # masses, levers, bodies and feet of the two legs take turns
+    turns = [np.arange(len(own)) % 2 == 1 for own in first[:6]]
+    legs = [
+        np.where(odd.reshape(-1, *[1] * (own.ndim - 1)), other, own)
+        for own, other, odd in zip(first[:6], second[:6], turns, strict=True)
+    ]
+    return *legs, first[6]
 
 
 @inner
@@ -143,11 +154,11 @@ def turned(slope, levers, i, y, k):
 def foot_at(walker, foot, y):
     """Along, height, velocity of the contact point's material along, velocity of the height, of the contact point."""
     n = walker.inertias.size
-    x, h, v, w = y[0], y[1] - walker.radius, y[2 + n], y[3 + n]
+    x, h, v, w = y[0], y[1] - walker.radii[foot], y[2 + n], y[3 + n]
     for k in range(n):
         rx, rh = turned(walker.slope, walker.foot_levers, foot, y, k)
         x, h, v, w = x + rx, h + rh, v - y[4 + n + k] * rh, w + y[4 + n + k] * rx
-    return x, h, v + walker.radius * y[4 + n + walker.foot_bodies[foot]], w, v
+    return x, h, v + walker.radii[foot] * y[4 + n + walker.foot_bodies[foot]], w, v
 
 
 @inner
@@ -225,17 +236,17 @@ def push(walker, foot, y, b, along, upward):
     for k in range(walker.inertias.size):
         rx, rh = turned(walker.slope, walker.foot_levers, foot, y, k)
         b[2 + k] += rx * upward - rh * along
-    b[2 + walker.foot_bodies[foot]] += walker.radius * along
+    b[2 + walker.foot_bodies[foot]] += walker.radii[foot] * along
 
 
 @inner
 def push_off(walker, now, t, y, b):
     """The trailing leg's pulse, along the line from where its foot touches to the hip."""
     u, foot = (t - now.pushed_at) / walker.push_off_duration, 1 - now.stance
-    if not 0.0 < u < 1.0 or walker.push_off == 0.0:
+    if not 0.0 < u < 1.0 or walker.push_offs[foot] == 0.0:
         return
     x, h = foot_at(walker, foot, y)[:2]
-    force = 30.0 * (u * (1.0 - u)) ** 2 * walker.push_off / walker.push_off_duration
+    force = 30.0 * (u * (1.0 - u)) ** 2 * walker.push_offs[foot] / walker.push_off_duration
     force /= np.hypot(y[0] - x, y[1] - h)
     push(walker, foot, y, b, force * (y[0] - x), force * (y[1] - h))
 
@@ -289,7 +300,7 @@ def reaction(walker, now, y):
                     rx, rh = turned(walker.slope, walker.foot_levers, foot, y, k)
                     J[2 + k] = rx if axis == 1 else -rh
                 if axis == 0:
-                    J[2 + walker.foot_bodies[foot]] += walker.radius
+                    J[2 + walker.foot_bodies[foot]] += walker.radii[foot]
                 gives[axis] = J @ solve(A.copy(), J.copy())
             grip = 1.5 * walker.static * normal / walker.stiction
             fastest = max(fastest, grip * gives[0], c * gives[1], abs(vertical_velocity) / walker.full)
@@ -348,7 +359,7 @@ def energy(walker, has_ground, levels, y):
 @inner
 def material(walker, foot, y):
     """Where a foot would be had it not rolled."""
-    return foot_at(walker, foot, y)[0] + walker.radius * y[2 + walker.foot_bodies[foot]]
+    return foot_at(walker, foot, y)[0] + walker.radii[foot] * y[2 + walker.foot_bodies[foot]]
 
 
 @inner
@@ -440,7 +451,7 @@ def take_steps(walker, y, h, pinned, diary):
         deadline = min(grounded_at + 0.25 * tau, last + 10.0 * tau) - t
         now = Now(stance, pinned, locked, has_ground, levels, pushed_at)
         left_of_push = pushed_at + walker.push_off_duration - t
-        pushes = walker.push_off != 0.0 and ROUNDING < left_of_push < np.inf
+        pushes = walker.push_offs.max() != 0.0 and ROUNDING < left_of_push < np.inf
         if pushes:
             deadline = min(deadline, left_of_push)
         elif owed:
@@ -611,7 +622,7 @@ def take_steps(walker, y, h, pinned, diary):
         if walker.terrain == AFTER_MID_SWING and side[3 * other] > 0.0:
             has_ground[other] = (side[PASSING] > 0.0) == (other == 1)
         if knees:
-            if walker.release_at_touch and walker.push_off != 0.0:
+            if walker.release_at_touch and walker.push_offs.max() != 0.0:
                 owed = True
             elif walker.release_at_touch:
                 locked[other], armed[other] = False, False

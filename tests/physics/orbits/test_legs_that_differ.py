@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from plain_unequal_walk import Leg, Segment, Walker
+from unequal_walkers import KINDS, draw_walker, legs_of, model_of
 
 from walkerlab.physics.hybrid.recorded_walk import take_walk
 from walkerlab.physics.mechanics.hinges import HIP_ROW
-from walkerlab.physics.mechanics.rigid import rigid_on_slope
-from walkerlab.physics.mechanics.rigid_model import change_slope, pair, replace_fields
-from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, replace_second_leg, straight_legs
+from walkerlab.physics.mechanics.rigid_model import change_slope, pair
 from walkerlab.physics.orbits.fixed_point import SearchSettings, average_legs, find_gaits
 from walkerlab.physics.orbits.gradients import gait_quantities, gradients
 from walkerlab.physics.orbits.newton import Effort
@@ -28,59 +27,6 @@ from walkerlab.physics.orbits.similarity import unit_walker
 from walkerlab.physics.orbits.step_map import gait_near, walk_steps
 
 FEW_STARTS = SearchSettings(20, 100)
-KINDS = ("masses", "straight", "round", "kneed", "kneed and round", "one knee")
-
-
-def varied(draw, leg, share):
-    """The leg with each number changed by up to a share of it."""
-
-    def near(value):
-        return value * draw.uniform(1.0 - share, 1.0 + share)
-
-    segments = tuple(Segment(*map(near, vars(segment).values())) for segment in leg.segments)
-    return Leg(segments, near(leg.radius), leg.centre_ahead)
-
-
-def draw_walker(kind, seed):
-    draw = np.random.default_rng(seed)
-    knees = Leg((Segment(0.5, 0.5, 0.325, 0.0, 0.0), Segment(0.5, 0.05, 0.125, 0.0, 0.0)), 0.0)
-    if kind == "one knee":  # Miandoab and Beigzadeh's
-        kneed = Leg((Segment(0.379, 8.76, 0.143, 0.0, 0.129), Segment(0.388, 2.70, 0.157, 0.0, 0.032)), 0.0)
-        straight = Leg((Segment(0.767, 11.46, 0.235, 0.0, 0.479),), 0.0)
-        legs, hip, slope = (varied(draw, kneed, 2e-3), varied(draw, straight, 2e-3)), 37.08, 0.04
-        return Walker(legs, hip, slope, knee_damping=(draw.uniform(0.0, 0.15), 0.0))
-    if kind.startswith("kneed"):
-        leg, hip, slope = replace(knees, radius=0.1 if "round" in kind else 0.0), 0.5, 0.05
-        return Walker((varied(draw, leg, 4e-3), varied(draw, leg, 4e-3)), hip, slope)
-    leg = Leg((Segment(1.0, 5.0, 0.5, 0.01 if kind == "round" else 0.0, 0.1),), 0.25 if kind == "round" else 0.0)
-    other = varied(draw, leg, 5e-3)
-    if kind == "masses":
-        (own,) = leg.segments
-        other = Leg((replace(own, mass=own.mass * draw.uniform(0.85, 1.15), below=own.below * 1.04),), leg.radius)
-    if kind == "round":
-        leg, other = replace(leg, centre_ahead=0.02), replace(other, centre_ahead=0.025)
-    return Walker((leg, other), 10.0, draw.uniform(0.015, 0.04))
-
-
-def assembly(leg, hip_mass):
-    limbs = [Limb(each.length, each.mass, each.below, each.ahead, each.inertia) for each in leg.segments]
-    build = straight_legs if len(limbs) == 1 else kneed_legs
-    return build(*limbs, hip_mass, Arc(leg.radius, leg.centre_ahead))
-
-
-def model_of(plain):
-    first, second = (assembly(leg, plain.hip_mass) for leg in plain.legs)
-    model = rigid_on_slope(replace_second_leg(first, second), plain.gravity, plain.slope)
-    if not any(plain.knee_damping):
-        return model
-    models = zip((model, model.exchanged), plain.knee_damping, strict=True)
-    return pair(*(replace_fields(each, {"knees": (0.0, damping, 0.0)}) for each, damping in models))
-
-
-def legs_of(state):
-    """Angles and rates of both legs."""
-    n = len(state) // 2
-    return np.array([*state[:2], *state[n : n + 2]])
 
 
 def best(walker):
@@ -96,6 +42,18 @@ def test_a_gait_returns_after_a_stride_of_plain_integration(kind, seed):
     steps, end = plain.stride(gait.state)
     np.testing.assert_allclose(steps, gait.steps, rtol=1e-10)
     np.testing.assert_allclose(end, legs_of(gait.state), atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["masses", "round", "kneed"])
+def test_a_gait_whose_legs_push_off_differently_returns_after_a_stride(kind):
+    plain = draw_walker(kind, 9)
+    strength = 0.004 * sum(segment.mass for leg in plain.legs for segment in leg.segments)
+    plain = replace(plain, push_offs=(strength, 1.5 * strength))
+    gait = best(model_of(plain))
+    steps, end = plain.stride(gait.state)
+    np.testing.assert_allclose(steps, gait.steps, rtol=1e-10)
+    np.testing.assert_allclose(end, legs_of(gait.state), atol=1e-10)
+    assert gait.work["push_off"] > 0.0
 
 
 def test_multipliers_of_a_stride_are_those_of_differences_by_plain_integration():

@@ -41,8 +41,11 @@ def test_unit_is_read_from_the_longest_matching_suffix(name, unit):
 
 @pytest.mark.parametrize(
     ("name", "label"),
-    [("walker.thigh.mass_kg", "thigh mass"), ("work_per_step_J.hip_torque", "work per step hip torque"), ("s", "s")],
-)
+    [
+        ("walker.thigh.mass_kg", "thigh mass"), ("work_per_step_J.hip_torque", "work per step hip torque"), ("s", "s"),
+        ("walker.leg_2.leg_mass_kg", "mass of leg 2"), ("walker.leg_2.thigh.length_m", "thigh length of leg 2"),
+    ],
+)  # fmt: skip
 def test_axis_labels_contain_no_unit(name, label):
     assert axis_label(name) == label
 

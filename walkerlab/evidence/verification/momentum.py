@@ -160,14 +160,19 @@ class RigidMasses:
         """Return the masses in each of the states (strikes, 2 n). In the first state leg `first` (0 or 1) swings."""
         return [self.turns[(first + k) % 2].pose(state) for k, state in enumerate(states)]
 
-    def momentum_change(self, before: Sequence[Moving], after: Sequence[Moving], push_off: float = 0.0) -> float:
-        """Return the largest relative change of the conserved momenta over heel strikes. `push_off` is in N s."""
+    def momentum_change(
+        self, before: Sequence[Moving], after: Sequence[Moving], push_offs: tuple[float, float] = (0.0, 0.0)
+    ) -> float:
+        """Return the largest relative change of the conserved momenta over heel strikes.
+
+        push_offs  N s, of each leg
+        """
         change = 0.0
         size = 1e-300
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
             at_start = np.array(self.turns[k % 2].momenta(old, new=False))
             at_end = np.array(self.turns[(k + 1) % 2].momenta(new, new=True))
-            at_start[0] += moment_of(push_off, old)
+            at_start[0] += moment_of(push_offs[(k + 1) % 2], old)
             change = max(change, *np.abs(at_end - at_start))
             size = max(size, *np.abs(at_start), *np.abs(at_end))
         return finite(change / size)
@@ -318,7 +323,7 @@ def impulse_rate(samples: ContactSamples, scene: ContactScene, config: RigidConf
         up = form.hip_y[: angles.shape[1]]
         line = y[:, :2] + np.column_stack([c @ x - s @ up, s @ x + c @ up]) - foot
         u = np.clip((samples.time_s[:, None] - touches) / form.push_off_duration, 0.0, 1.0)
-        bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_off / form.push_off_duration
+        bell = 30.0 * ((u * (1.0 - u)) ** 2).sum(axis=1) * form.push_offs[pushing] / form.push_off_duration
         push = (bell / np.hypot(*line.T))[:, None] * line
         rates += np.column_stack([push, cross(foot, push)])
     return rates

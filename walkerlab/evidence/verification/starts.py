@@ -97,10 +97,10 @@ class RigidStart(CaseStart):
         strikes = RigidMasses(assembly_of(self.config.walker, rigid=True), self.config.slope_rad)
         before = strikes.poses(record.before)
         after = strikes.poses(record.after, first=1)
-        push = float(self.walker.push_off)
+        pushes = (float(self.walker.push_off), float(self.walker.exchanged.push_off))
         distance = feet_off_the_slope(before) / self.walker.leg_length
-        momentum_change = strikes.momentum_change(before, after, push)
-        gain = 0.0 if push else energy_won(before, after) / self.energy
+        momentum_change = strikes.momentum_change(before, after, pushes)
+        gain = 0.0 if any(pushes) else energy_won(before, after) / self.energy
         measured = {
             "distance of the feet from the slope at heel strike, in leg lengths": finite(distance),
             "momentum changed by a heel strike": momentum_change,

@@ -12,13 +12,13 @@ from walkerlab.physics.kernels import kernel_part
 
 
 @kernel_part
-def pulse_force(system: OnGround, t: float) -> float:
+def pulse_force(system: OnGround, t: float, foot: int) -> float:
     if system.form.push_off == 0.0 or system.progress.steps == 0:
         return 0.0
     u = (t - system.progress.last_touch) / system.form.push_off_duration
     if u <= 0.0 or u >= 1.0:
         return 0.0
-    return 30.0 * (u * (1.0 - u)) ** 2 * system.form.push_off / system.form.push_off_duration
+    return 30.0 * (u * (1.0 - u)) ** 2 * system.form.push_offs[foot] / system.form.push_off_duration
 
 
 @kernel_part
@@ -40,7 +40,7 @@ class Push(NamedTuple):
 def push_on(system: OnGround, t: float, foot: int, s: Any, c: Any) -> Push:
     """Compute the push-off on a foot at time t (s). It is zero outside a pulse and on the stance foot."""
     form = system.form
-    force = pulse_force(system, t) if foot != system.progress.stance else 0.0
+    force = pulse_force(system, t, foot) if foot != system.progress.stance else 0.0
     if force == 0.0:
         return Push(0.0, 0.0, 0.0, 0.0)
     ahead = 0.0

@@ -54,6 +54,7 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
     radius: Floats  # (2,) m, radii of the balls
     hip_x: Floats  # (n,) m, levers from the root to the hip
     hip_y: Floats
+    push_offs: Floats  # (2,) N s, impulse of each foot's pulse; `push_off` is the larger one
     push_off_duration: float  # s
     onto: Integers  # (bodies of the walker,) index of each of them in this form
     first: Integers  # (n,) for each body of this form, index of the first of the walker's bodies merged into it
@@ -71,7 +72,7 @@ FORM_SHAPES: dict[str, tuple[int, ...]] = {
     **tree.mechanism_shapes(MAX_BODIES, 1, 3),
     **dict.fromkeys(("hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
-    "radius": (2,),
+    **dict.fromkeys(("radius", "push_offs"), (2,)),
 }
 FORM = tree.record_type(GroundModel, FORM_SHAPES)
 

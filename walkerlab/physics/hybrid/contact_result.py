@@ -105,6 +105,7 @@ class ContactWalkResult(WalkRecord):
 
     slip_m: Floats  # (steps,) material slip of the stance foot; the last step is missing if its foot has not lifted
     rolling_m: Floats  # (steps,) rolling distance of the stance foot in these steps
+    stance_s: Floats  # (steps,) time from touch to lift of the stance foot in these steps
     end_state: State
     max_penetration_m: float
     energy_balance_residual_J: float
@@ -341,6 +342,7 @@ def gather(
         work=WalkWork(*stopped.work.tolist()),
         slip_m=walk_state.slip[:lifted],
         rolling_m=walk_state.rolling[:lifted],
+        stance_s=walk_state.lift_time[:lifted] - np.append(0.0, walk_state.touch_time)[:lifted],
         end_state=stopped.state,
         max_penetration_m=float(observer.tally.max_penetration),
         energy_balance_residual_J=float(observer.tally.residual),

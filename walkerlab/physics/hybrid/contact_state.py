@@ -53,6 +53,7 @@ class WalkState(NamedTuple):
     # not lifted yet
     slip: Any
     rolling: Any  # (steps,) m, rolling distance of each step's stance foot
+    lift_time: Any  # (steps,) s, when each step's stance foot lifted, or when the other touched if it has not yet
     has_ground: Any  # (2,) whether there is ground under a foot
     level: Any  # (2,) m, height of the ground above the slope, for each foot
     cells: Any  # (2,) number of the cell below each foot, in the foot's lane of pads
@@ -61,6 +62,7 @@ class WalkState(NamedTuple):
     touched: Any  # (2,) m, `material_along` of each foot at that touch
     slipped: Any  # (2,) m, slip of each foot from that touch to its latest lift
     rolled: Any  # (2,) m, rolling distance of each foot in the same time
+    lifted: Any  # (2,) s, time of each foot's latest lift
     leaving: Any  # (2,) whether a foot is the former stance foot and has not lifted yet
     knee: Any  # (2,) state of each knee
     knee_strike: Any  # (steps + 1,) s, time at which the swing leg's knee locked in each step; -1 if it did not
@@ -86,6 +88,7 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
         touch_height=np.zeros(steps),
         slip=np.zeros(steps),
         rolling=np.zeros(steps),
+        lift_time=np.zeros(steps),
         has_ground=has_ground,
         level=np.zeros(2),
         cells=cells,
@@ -94,6 +97,7 @@ def new_walk_state(walker: ContactWalker, ground: JudgedGround, stance: int, ste
         touched=np.array([material_along(walker.whole, foot, feet[foot].along, y) for foot in range(2)]),
         slipped=np.zeros(2),
         rolled=np.zeros(2),
+        lifted=np.zeros(2),
         knee=knees_at_start(walker, stance, y),
         knee_strike=np.full(steps + 1, -1.0),
         leaving=np.zeros(2, np.int8),

@@ -84,7 +84,7 @@ def apply_event(
     if kind == HEIGHT:
         walk_state.sides[event] = -walk_state.sides[event]
         if is_above(walk_state, foot):
-            lift(system.form, walk_state, feet, foot, y)
+            lift(system.form, walk_state, feet, foot, t, y)
             if next_foothold_counts(walk_state, foot):
                 return set_foothold(system, observer, walk_state, feet[foot].height, foot, y)
         else:
@@ -163,13 +163,17 @@ def find_ground(walk_state: WalkState, foot: int, above: bool) -> None:
 
 
 @kernel_part
-def lift(form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, y: Any) -> None:
+def lift(
+    form: GroundModel, walk_state: WalkState, feet: tuple[FootMotion, FootMotion], foot: int, t: float, y: Any
+) -> None:
     """Handle a foot that rises above the ground, at the end of its stance or of a scuff."""
     stands = foot == walk_state.progress.stance
     if stands or walk_state.leaving[foot] != 0:
         note_slip(form, walk_state, feet, foot, y)
+        walk_state.lifted[foot] = t
         if not stands:
             step = walk_state.progress.steps - 1
+            walk_state.lift_time[step] = t
             walk_state.slip[step], walk_state.rolling[step] = walk_state.slipped[foot], walk_state.rolled[foot]
         walk_state.leaving[foot] = 0
     find_ground(walk_state, foot, True)
@@ -211,6 +215,8 @@ def touch(
     if not is_above(walk_state, stance):
         note_slip(form, walk_state, feet, stance, y)
         walk_state.leaving[stance] = 1
+        walk_state.lifted[stance] = t
+    walk_state.lift_time[step] = walk_state.lifted[stance]
     walk_state.slip[step], walk_state.rolling[step] = walk_state.slipped[stance], walk_state.rolled[stance]
     walk_state.foothold[foot] = feet[foot].along
     walk_state.touched[foot] = material

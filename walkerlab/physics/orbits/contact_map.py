@@ -302,7 +302,7 @@ def ground_with_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround
 
 
 def shorten(walk_state: WalkState, steps: int) -> WalkState:
-    fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling")
+    fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling", "lift_time")
     return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
 
 

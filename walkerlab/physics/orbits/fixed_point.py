@@ -365,8 +365,12 @@ def average_legs(walker: RigidModel, share: float) -> RigidModel:
 
 def scale_drive(walker: RigidModel, slope: float, share: float) -> RigidModel:
     """Return the walker with a fraction `share` of its drive, on a slope (rad) between `slope` and the walker's."""
-    parts = {name: share * walker[name] for name in ("laws", "push_off")}
-    return change_slope(walker.changed(**parts), slope + share * (walker.slope - slope))
+
+    def weaker(model: RigidModel) -> RigidModel:
+        return replace_fields(model, {name: share * model[name] for name in ("laws", "push_off")})
+
+    driven = weaker(walker) if walker.paired_with is None else pair(weaker(walker), weaker(walker.paired_with))
+    return change_slope(driven, slope + share * (walker.slope - slope))
 
 
 @dataclass

@@ -157,7 +157,8 @@ class Stage:
     def why_no_such_legs(self, config: Config) -> str | None:
         """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
         # walkers made of parts have no key `leg_2`
-        if self.name in FOR_LEGS_THAT_DIFFER or getattr(config.walker, "leg_2", ...) is None:
+        one_leg = getattr(config.walker, "leg_2", ...) is None and config.push_off.leg_2 is None
+        if self.name in FOR_LEGS_THAT_DIFFER or one_leg:
             return None
         from walkerlab.scene.rigid import have_different_legs  # imported here: equal legs need no mechanics
 

@@ -17,6 +17,8 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.walk import (
+    STRIDE,
+    asymmetry_of,
     content_of_walk,
     legs,
     numbers_of,
@@ -84,11 +86,23 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
         )
 
 
+def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict[str, Any]:
+    """Return the asymmetry of a walk's last stride, with that of the times from touch to lift, leg 2 minus leg 1."""
+    # leg 2 stands in the first step of a stride; the foot that stood last may not have lifted
+    count = walk.steps - walk.steps % STRIDE
+    if not count or walk.stance_s.size < count:
+        return {}
+    second, first = walk.stance_s[count - STRIDE : count].tolist()
+    return {"asymmetry": {**numbers["asymmetry"], "stance_time": asymmetry_of(first, second)}}
+
+
 def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     scuffed = require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
     strikes = walk.knee_strike_time_s
+    numbers = numbers_of(walk)
     return {
-        **numbers_of(walk),
+        **numbers,
+        **add_stance_time(numbers, walk),
         **pace_of(config, walk),
         "advice": SCUFFED if scuffed else walk.advice,
         "max_penetration_m": walk.max_penetration_m,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from walkerlab.config.drives import drives_of, springs_of
+from walkerlab.config.drives import drives_of, push_offs, springs_of
 from walkerlab.config.reads import FixedPointConfig, RigidConfig
 from walkerlab.errors import NoAnswer
 from walkerlab.labels import Label
@@ -79,7 +79,7 @@ def advice(config: RigidConfig) -> str:
         "for the contact model's pads their pitch (contact.pad_pitch: a number)"
     )
     drives = "push_off.impulse_N_s or walker.hip.torque_N_m"
-    if config.push_off.impulse_N_s or config.walker.hip.torque_N_m:
+    if any(push_offs(config.push_off)) or config.walker.hip.torque_N_m:
         tried = f"The drive may be too strong or too weak on this slope: try another {drives}"
     elif config.slope_rad <= 0.0:
         tried = f"Let the slope descend in walking direction (slope_deg above 0), or drive the walker ({drives})"

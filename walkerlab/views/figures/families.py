@@ -169,6 +169,8 @@ MIN_PANEL_SPAN: Final = 0.05
 """Minimum span of panel (b) as a fraction of the full range, and of a vertical axis as a fraction of its magnitude."""
 TOLD_APART: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
+CLOSER: Final = 0.8
+"""Fraction of the full range below which the range around the bifurcations is shown in panels of its own."""
 POINTS_BETWEEN: Final = 16
 """Sampling points per interval of a branch, to find the extremes of a quantity and to plot multipliers."""
 
@@ -241,7 +243,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
-    """Return the parameter range around the bifurcations and any attractor, or None if there are no bifurcations."""
+    """Return the parameter range around the bifurcations and any attractor, or None if it is no closer view."""
     summary = results[CONTINUATION_STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]
     if not found:
@@ -250,7 +252,8 @@ def close_of(results: Results) -> tuple[float, float] | None:
     least = min(found)
     most = max(*ends, max(found))
     room = max(ROOM * (most - least), 0.5 * (MIN_PANEL_SPAN * (summary["to"] - summary["from"]) - (most - least)))
-    return max(least - room, summary["from"]), min(most + room, summary["to"])
+    close = max(least - room, summary["from"]), min(most + room, summary["to"])
+    return close if close[1] - close[0] < CLOSER * (summary["to"] - summary["from"]) else None
 
 
 def bounds(results: Results, name: str, close: tuple[float, float] | None) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from walkerlab.config.walkers import describe_second_leg
+from walkerlab.config.second_leg import describe_second_leg
 from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE, join_words
 from walkerlab.outcome import OUTCOME_TEXTS, Outcome, outcome_of
 from walkerlab.physics.energy_channels import CHANNELS

@@ -156,10 +156,10 @@ class RuleFollower:
             share = crossing(old.height, old.vertical_velocity, new.height, new.vertical_velocity, h)
             feet_at_event = foot_within_step(before[0], now[0], share, h), foot_within_step(before[1], now[1], share, h)
             y = tuple(self.scene.about_centre(q - (1.0 - share) * h * v, v).tolist())
+            time_at_event = self.time_s + share * h
             if above:
-                contact_transitions.lift(form, walk_state, feet_at_event, foot, y)
+                contact_transitions.lift(form, walk_state, feet_at_event, foot, time_at_event, y)
             else:
-                time_at_event = self.time_s + share * h
                 self._end(contact_transitions.touch(form, walk_state, feet_at_event, foot, time_at_event, y))
         completed = walk_state.progress.steps == walk_state.touch_time.size
         if completed and not contact_state.is_to_lift(walk_state):

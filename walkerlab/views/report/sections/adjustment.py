@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from walkerlab.config.drives import push_offs
 from walkerlab.labels import join_words
 from walkerlab.views.report.blocks import COSTS, Paragraph, Results, Section, stage_section
 from walkerlab.views.report.gaits import symbol, works
@@ -35,7 +36,7 @@ def limit(results: Results) -> Section | None:
     summary = results.summary("tune")
     reaches = summary.get("reaches") or {}
     orders = summary.get("orders") or {}
-    pushes = results.config.push_off.impulse_N_s != 0.0
+    pushes = any(push_offs(results.config.push_off))
     note = words("adjustment.factors", pushes)
     titles = words.terms("adjustment.distances").items()
     columns = [measured(title, key, partial(number, digits=3)) for key, title in titles]

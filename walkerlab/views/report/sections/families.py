@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from walkerlab.config.drives import push_offs
 from walkerlab.labels import add_unit, axis_label
 from walkerlab.pipeline.store.content import Group
 from walkerlab.views.report.blocks import Diagram, GaitMark, Paragraph, Results, Section, Walker, stage_section
@@ -100,7 +101,7 @@ def gait_diagram(results: Results) -> Diagram | None:
     period = np.concatenate([branch["step_period"].ravel() for branch in branches])
     across = DiagramAxis(value, Diagram.LEFT, Diagram.WIDTH - Diagram.RIGHT)
     up = DiagramAxis(period, Diagram.HEIGHT - Diagram.BOTTOM, Diagram.TOP)
-    pushes = results.config.push_off.impulse_N_s != 0.0
+    pushes = any(push_offs(results.config.push_off))
     gap = SAMPLING_MARGIN * sampling_gap(results.config)
     unit = summary["unit"]
     marks = []

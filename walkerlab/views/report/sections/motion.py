@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from walkerlab.config.drives import push_offs
 from walkerlab.labels import CONTACT_STAGE, RIGID_STAGE
 from walkerlab.pipeline.store.footholds import ground_levels
 from walkerlab.views.report.blocks import MAIN, Gallery, Pad, Paragraph, Player, Results, Section, Walker
@@ -39,7 +40,7 @@ def player(results: Results, most: int = MAX_SHOWN_STEPS) -> Player | None:
     steps = {MODEL_NAMES[stage].lower(): len(results.summary(stage)["step_periods_s"]) for stage in tracks}
     return Player(
         title="The walk.",
-        caption=words("motion.caption", max(steps.values()), most, config.push_off.impulse_N_s != 0.0),
+        caption=words("motion.caption", max(steps.values()), most, any(push_offs(config.push_off))),
         alt=words("motion.alt", steps, math.degrees(config.slope_rad)),
         walkers=tuple(walker(results, stage, track) for stage, track in tracks.items()),
         slope_rad=config.slope_rad,
@@ -90,7 +91,7 @@ def walker(results: Results, stage: str, track: Track) -> Walker:
         strikes=tuple(round(time, 6) for time in strikes),
         stills=stills(track, strikes),
         ends="" if summary["outcome"] == WALKED_LABEL else ends(summary["outcome"]),
-        pushes=results.config.push_off.impulse_N_s != 0.0,
+        pushes=any(push_offs(results.config.push_off)),
     )
 
 
