@@ -5,6 +5,7 @@ It needs the package mujoco.
 """
 
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import mujoco
 import numpy as np
 
 FRAME_S = 1.0 / 60.0
+WINDOW_CLOSES_S = 5.0
 
 
 class Walk:
@@ -170,6 +172,12 @@ def main(path: str, steps: int, view: bool) -> None:
             viewer.sync()
             shown_s += FRAME_S
             time.sleep(max(0.0, shown_s - (time.monotonic() - begun)))
+    if viewer is not None:
+        viewer.close()
+        # Python crashes or hangs if it exits before the window's thread ends (MuJoCo 4.0.0).
+        for thread in threading.enumerate():
+            if thread is not threading.current_thread():
+                thread.join(WINDOW_CLOSES_S)
     if seen < steps:
         print(f"it walked {seen} of {steps} steps")
         return
