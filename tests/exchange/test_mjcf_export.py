@@ -1,6 +1,7 @@
 """Exported MJCF: it compiles silently, carries the walker at the law's depth, and walks as our contact model does."""
 
 import importlib.util
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -388,6 +389,18 @@ def test_script_of_a_driven_walker_finds_the_model_in_its_folder(tmp_path, argum
     done = subprocess.run([sys.executable, "level.py", *arguments], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert [line.partition(":")[0] for line in done.stdout.splitlines()] == ["step 1", "step 2", "step 2"]
+
+
+@pytest.mark.skipif(
+    shutil.which("xvfb-run") is None or shutil.which("xauth") is None, reason="no display: apt-get install xvfb xauth"
+)
+def test_script_shows_the_walk_in_a_window_and_exits(tmp_path):
+    for name, text in files_of("mjcf", "contact", *ROUND_KNEED).files.items():
+        (tmp_path / name).write_text(text)
+    command = ["xvfb-run", "-a", sys.executable, "kneed_round_feet.py", "1", "--view"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert [line.partition(":")[0] for line in done.stdout.splitlines()] == ["step 1", "step 1"]
 
 
 @pytest.mark.parametrize(

@@ -434,9 +434,8 @@ def friction_function(leg: str, law: Coulomb) -> str:
 
 def add_push_offs(model: AdamsModel, export: Exported) -> None:
     """Add the push-off pulses on the trailing feet. They begin at the touchdown times of walkerlab's walk."""
-    impulse = export.config.push_off.impulse_N_s
     duration = export.config.push_off.duration_s
-    if impulse == 0.0:
+    if not any(export.impulses_N_s):
         return
     for number, leg in enumerate(LEGS):
         foot = FootTerms(export, number)
@@ -446,13 +445,15 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
             begin = finite(time)
             end = finite(time + duration)
             share = f"(TIME-{begin})*({end}-TIME)/{finite(duration**2)}"
-            force = finite(30.0 * impulse / duration)
+            # of a unit impulse, because a trailing knee is held during the pulse of a leg without impulse, too
+            force = finite(30.0 / duration)
             model.variables[pulse] = f"IF(TIME-{begin}:0,0,IF({end}-TIME:0,0,{force}*({share})**2))"
         marker = f"{{{export.names[0]}.hinge}},{{{foot.marker}}},{{{ORIGIN}}}"
         up = f"DY({marker})+{finite(foot.radius)}" if foot.radius else f"DY({marker})"
         model.variables[f"{leg}_pulses"] = "+".join(f"VARVAL({{{pulse}}})" for pulse in pulses) or "0"
         model.variables[f"{leg}_line"] = f"SQRT(DX({marker})**2+({up})**2)"
-        line = f"VARVAL({{{leg}_pulses}})/VARVAL({{{leg}_line}})"
+        impulse = finite(export.impulses_N_s[number])
+        line = f"{impulse}*VARVAL({{{leg}_pulses}})/VARVAL({{{leg}_line}})"
         model.variables[f"{leg}_push_x"] = f"{line}*DX({marker})"
         model.variables[f"{leg}_push_y"] = f"{line}*({up})"
 
@@ -545,7 +546,7 @@ def step_events(export: Exported, swing: int) -> Iterator[Event]:
     yield Event(f"{leg}_bent", (f"stop_{number}", on_bent_knee))
     yield Event(f"{leg}_straight", (f"lock_{number}",), (f"stop_{number}", on_bent_knee))
     released = (f"lock_{trailing}",)
-    if knee_rules(export.config.walker).release_at_touch and not export.config.push_off.impulse_N_s:
+    if knee_rules(export.config.walker).release_at_touch and not any(export.impulses_N_s):
         yield Event(f"{leg}_touches", (), released)
     else:
         yield Event(f"{leg}_touches")

@@ -133,7 +133,7 @@ def parts_left_out(export: Exported, config: Config, kind: Kind, law: Law, scrip
         if export.config is not config:
             yield "the plastic impact that locks a knee; a stop catches it first, as with walker.knee.lock: compliant"
         when = "act at the touch times of walkerlab's walk, as ADAMS functions have no memory"
-        if config.push_off.impulse_N_s:
+        if any(export.impulses_N_s):
             yield f"the trigger of push-offs; open-loop pulses {when}"
         if export.hip.torque_N_m:
             yield f"the trigger that switches the hip torque between legs; switches {when}"

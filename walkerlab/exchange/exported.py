@@ -73,6 +73,12 @@ class Exported:
         return self.scene.from_base(self.scene.start)
 
     @property
+    def impulses_N_s(self) -> tuple[float, float]:
+        """Impulse of the push-off of each leg."""
+        impulse = self.config.push_off.impulse_N_s
+        return impulse, impulse
+
+    @property
     def hip(self) -> Hip:
         return self.config.walker.hip
 

@@ -345,10 +345,10 @@ def pad_text(export: Exported, number: int, pad: Pad) -> str:
 
 def custom_texts(export: Exported) -> Iterator[str]:
     """Yield the values that the script reads: drives, rules of the knees, periods and lengths of walkerlab's steps."""
-    push_off = export.config.push_off
+    first, second = export.impulses_N_s
     hip = export.hip
     walk = export.walk
-    yield f'<numeric name="push_off" data="{push_off.impulse_N_s!r} {push_off.duration_s!r}"/>'
+    yield f'<numeric name="push_off" data="{first!r} {second!r} {export.config.push_off.duration_s!r}"/>'
     yield f'<numeric name="hip_torque" data="{hip.torque_N_m!r}"/>'
     if export.knee_links:
         at_touch = int(export.scene.ours.whole.release_at_touch)
@@ -401,7 +401,7 @@ def tuning_lines(export: Exported, target: EngineContact) -> Iterator[str]:
 
 def parts_of_script(export: Exported) -> list[str]:
     """List the drives and the locks of knees that only the script can simulate."""
-    parts = {"push-offs": export.config.push_off.impulse_N_s, "hip torque": export.hip.torque_N_m}
+    parts = {"push-offs": max(export.impulses_N_s), "hip torque": export.hip.torque_N_m}
     parts |= {"locks of the knees": len(export.knee_links)}
     return [name for name, value in parts.items() if value != 0]
 

@@ -5,6 +5,7 @@ It needs the package mujoco.
 """
 
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import mujoco
 import numpy as np
 
 FRAME_S = 1.0 / 60.0
+WINDOW_CLOSES_S = 5.0
 
 
 class Walk:
@@ -27,7 +29,8 @@ class Walk:
     def __init__(self, model: Any) -> None:
         self.model = model
         self.data = mujoco.MjData(model)
-        self.impulse, self.duration = model.numeric("push_off").data
+        *self.impulses, self.duration = model.numeric("push_off").data
+        self.pushed = any(self.impulses)
         (self.torque,) = model.numeric("hip_torque").data
         self.hip = model.joint("hip")
         self.impratio = model.opt.impratio
@@ -73,7 +76,7 @@ class Walk:
                 self.scale_friction()
             if self.knees:
                 self.turn_knees()
-        if self.impulse or self.torque:
+        if self.pushed or self.torque:
             self.drive(1 - self.stance)
 
     def look_for_touch(self) -> None:
@@ -99,15 +102,15 @@ class Walk:
         self.data.qfrc_applied[:] = 0.0
         self.data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
         share = (self.data.time - self.touches_s[-1]) / self.duration if self.touches_s else 0.0
-        if self.impulse and 0.0 < share < 1.0:
-            self.push(self.feet[swing], share)
+        if self.pushed and 0.0 < share < 1.0:
+            self.push(self.feet[swing], self.impulses[swing], share)
 
-    def push(self, foot: int, share: float) -> None:
+    def push(self, foot: int, impulse: float, share: float) -> None:
         """Push a foot towards the hip. `share` is the elapsed fraction of the pulse."""
         point = self.data.geom_xpos[foot] - self.model.geom_size[foot, 0] * self.up
         line = self.data.xanchor[self.hip.id] - point
         line[1] = 0.0
-        force = 30.0 * (share * (1.0 - share)) ** 2 * self.impulse / self.duration * line / np.linalg.norm(line)
+        force = 30.0 * (share * (1.0 - share)) ** 2 * impulse / self.duration * line / np.linalg.norm(line)
         body = self.model.geom_bodyid[foot]
         mujoco.mj_applyFT(self.model, self.data, force, np.zeros(3), point, body, self.data.qfrc_applied)
 
@@ -120,7 +123,7 @@ class Walk:
             motion = np.zeros(6)
             mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, self.feet[self.stance], motion, 0)
             self.sinks = self.sinks and not self.at_touch and motion[3:] @ self.up < 0.0
-            if not self.sinks and (self.impulse == 0.0 or data.time >= self.touches_s[-1] + self.duration):
+            if not self.sinks and (not self.pushed or data.time >= self.touches_s[-1] + self.duration):
                 self.pushes = self.bent[trailing] = False
                 data.eq_active[self.locks[trailing]] = 0
         for leg, knee in enumerate(self.knees):
@@ -170,6 +173,12 @@ def main(path: str, steps: int, view: bool) -> None:
             viewer.sync()
             shown_s += FRAME_S
             time.sleep(max(0.0, shown_s - (time.monotonic() - begun)))
+    if viewer is not None:
+        viewer.close()
+        # Python crashes or hangs if it exits before the window's thread ends (MuJoCo 4.0.0).
+        for thread in threading.enumerate():
+            if thread is not threading.current_thread():
+                thread.join(WINDOW_CLOSES_S)
     if seen < steps:
         print(f"it walked {seen} of {steps} steps")
         return

@@ -125,7 +125,8 @@ def test_same_contact_law_gives_the_same_walk_in_an_engine(engine, drives):
     truth = simulate(scene, "radau5", 1e-10, 2, until).samples.states[1]
     errors = []
     name = next(name for name, entry in engine.adapter().INTEGRATORS.items() if entry.order > 1)
-    for step in (1.6e-4, 4e-5):
+    # with the coarse step, Drake's method is unstable in the first strike of the limping walker
+    for step in (1.6e-4 if drives in DRIVES else 8e-5, 4e-5):
         task = WalkTask(engine.name, Stepping(name, until / round(until / step)), scene, 2, until, None, 50_000)
         answer = task.run()
         assert answer.outcome == "walked"
