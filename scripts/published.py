@@ -12,11 +12,10 @@ from pathlib import Path
 from walkerlab.config.check import Check
 from walkerlab.config.loader import load
 from walkerlab.evidence.check.answer import Checked, check_gait
-from walkerlab.evidence.check.gaits import gait_near
-from walkerlab.evidence.check.mistakes import families_of, mistakes_of
+from walkerlab.evidence.check.causes import families_of, mistakes_of
+from walkerlab.evidence.check.gaits import CheckedStep, gait_near
 from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker
 from walkerlab.evidence.check.section import COLUMNS, headline, remarks, source_of
-from walkerlab.evidence.check.walks import CheckedStep
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 
@@ -111,7 +110,7 @@ def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, Plain
     """Return the right gait of a config's walker, and its walkers with mistakes."""
     config = load(Path(name)).config
     right = Checked(config, Check(), find_gaits(rigid_walker(config))).right
-    known = [*mistakes_of(right.walker)]
+    known = [(each.what, each.walker) for each in mistakes_of(right.walker)]
     known += [(each.what.format(f"{TYPICAL:g}"), each.of_size(TYPICAL)) for each in families_of(right.walker)]
     return right, known
 

@@ -15,7 +15,10 @@ Instant = Literal["after-strike", "before-strike", "mid-stance"]
 MAX_PRINTED = 64  # characters of a value
 _NUMBER: Final = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
 _SIGNED: Final = rf"[-+]?{_NUMBER}"
-_WORDS: Final = {"zero": "0", "one": "1", "two": "2", "half": "0.5"}
+_WORDS: Final = {
+    "zero": "0", "half": "0.5", "one": "1", "two": "2", "three": "3", "four": "4", "five": "5", "six": "6",
+    "seven": "7", "eight": "8", "nine": "9", "ten": "10",
+}  # fmt: skip
 FORMS: Final = "a number such as 0.1895, 0.62+0.1i, < 1, 0.51 ± 0.02 or 0.4 to 0.6"
 
 
@@ -55,7 +58,8 @@ def parse_printed(text: str) -> PrintedValue | None:
     """Read a printed value, or return None if it has none of the allowed forms."""
     plain = text.strip().lower().replace("−", "-").replace("–", "-").replace("\xa0", " ")
     plain = re.sub(r"\s*[×x·*]\s*10\s*\^?\s*\{?([-+]?\d+)\}?", r"e\1", plain).replace("+/-", "±").replace("+-", "±")
-    plain = re.sub(r"\b(zero|one|two|half)\b", lambda match: _WORDS[match[1]], plain)
+    plain = re.sub(r"\b10\s*\^\s*\{?([-+]?\d+)\}?", r"1e\1", plain)
+    plain = re.sub(rf"\b({'|'.join(_WORDS)})\b", lambda match: _WORDS[match[1]], plain)
     if re.fullmatch(_SIGNED, plain):
         return PrintedValue(text, digits_of(plain))
     compact = plain.replace(" ", "")

@@ -80,6 +80,27 @@ def test_compiled_and_plain_models_agree_on_built_in_walkers(name):
     assert answer["routes"]["difference"] < 1e-12
 
 
+def test_a_damped_knee_is_part_of_the_plain_model():
+    config = load(Path("kneed"), ["walker.knee.damping_N_m_s_per_rad=0.02"]).config
+    answer = check_gait(config.model_copy(update={"check": Check()}))
+    assert answer["routes"]["difference"] < 1e-12
+
+
+def test_a_state_printed_for_a_walker_with_knees_is_compared_with_others_without_an_error():
+    # the search for a gravity with which the state is periodic must not leave the positive ones
+    state = ["0.1877", "-0.2884", "-1.1014", "-0.9399"]
+    answer = walkerlab.check("kneed", {"state": state, "period_s": "0.5643"})
+    assert answer.finding == "different, unexplained"
+
+
+def test_a_mistake_is_found_in_conventions_that_are_not_stated():
+    """The state is that of a script whose strike is wrong; its second angle is taken for an absolute one."""
+    config = load(PUBLISHED / "passivewalker-2009.yaml", ["check.angles.second=absolute"]).config
+    (explanation,) = check_gait(config)["explanations"]
+    assert explanation["kind"] == "mistake"
+    assert explanation["what"].startswith("the second angle is relative, stance leg minus swing leg, and the strike")
+
+
 def test_energy_is_constant_within_a_plain_swing():
     walker = plain_walker(load(Path("round-feet")).config)
     start = np.array(find_gaits(rigid_walker(load(Path("round-feet")).config), 0).gait.state)

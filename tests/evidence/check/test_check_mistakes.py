@@ -15,7 +15,7 @@ from walkerlab.evidence.check.answer import check_gait
 from walkerlab.views.cli.main import program
 
 SAMPLE = [(words, (6, 10, 4)[place % 3]) for place, words in enumerate([*MISTAKES][::3])]
-KNEED_SAMPLE = [(words, (6, 10)[place % 2]) for place, words in enumerate([*mistaken_knees.MISTAKES][::5])]
+KNEED_SAMPLE = [(words, (6, 10)[place % 2]) for place, words in enumerate([*mistaken_knees.MISTAKES][1::8])]
 
 
 @pytest.fixture(scope="module")

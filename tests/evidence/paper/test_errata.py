@@ -58,7 +58,7 @@ def test_fixed_points_return_after_a_step_of_an_independent_integration(study, n
 
 def test_only_the_sign_of_a_5_as_printed_gives_x_p():
     def distance(state):
-        return max(abs(x - entry.value) / entry.last_digit for x, entry in zip(state, X_P, strict=True))
+        return max(abs(x - entry.value) / entry.digits.unit for x, entry in zip(state, X_P, strict=True))
 
     study = study_the_paper()
     assert distance(study.as_printed.state) < 1.0

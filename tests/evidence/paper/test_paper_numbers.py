@@ -41,7 +41,6 @@ from walkerlab.evidence.paper.printed import (
     Printed,
     adams_start_as_printed,
     fixed_point_as_printed,
-    number,
     slope_of,
     walker_of_the_paper,
 )
@@ -63,11 +62,11 @@ def printed(text):
 )
 def test_printed_number_has_a_value_and_a_last_digit(text, value, last_digit):
     assert printed(text).value == pytest.approx(value, rel=1e-15)
-    assert printed(text).last_digit == pytest.approx(last_digit)
+    assert printed(text).digits.unit == pytest.approx(last_digit)
 
 
 def test_verbal_comparisons_are_read_as_numbers():
-    assert number("less than 1%") == number("less than one") == 1
+    assert printed("less than 1%").value == printed("less than one").value == 1
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from walkerlab.evidence.check.conventions import (
     stated,
 )
 from walkerlab.evidence.check.explanations import Explanation, Question, explain, find_periodic_changes, undecided
-from walkerlab.evidence.check.gaits import gait_near, plain_walker, scales, why_not_plain
+from walkerlab.evidence.check.gaits import PLAIN, CheckedStep, gait_near, plain_walker, scales, why_not_plain
 from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, PlainWalker
 from walkerlab.evidence.check.printed import (
     DIFFERENT,
@@ -37,7 +37,6 @@ from walkerlab.evidence.check.printed import (
     items_of,
     judge,
 )
-from walkerlab.evidence.check.walks import PLAIN, CheckedStep
 from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
@@ -45,8 +44,7 @@ from walkerlab.scene.rigid import rigid_walker, state_names
 SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L and g of 1
 SAME_GAIT: Final = 1e-6
 CHOSEN: Final = "chosen"
-PREFERENCE: Final = 0.5  # factor on the distance of the gait that `fixedpoint` chooses
-SMALL_VALUE: Final = 1e-3  # smallest printed value whose differences are relative to it, not absolute
+SMALL_VALUE: Final = 1e-3  # of a printed value, below which differences count absolutely
 OF_GAITS: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
     "energy_J", "energy_drift_J", "cost_of_transport", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m",
@@ -77,12 +75,15 @@ def refuse_unknown(config: CheckConfig) -> None:
             hint = suggestion(name, known)
             place = ("check", "printed", name)
             raise ConfigError(f"check.printed: a gait has no {name}.{hint}", f"Choose from {', '.join(known)}.", place)
-    lists = {"state": check.printed.get("state"), "state_before": check.state_before}
-    for name, texts in lists.items():
+    for name, texts in states_of(check).items():
         if isinstance(texts, str):
             raise ConfigError(f"check.printed: {name} is one value.", "Give a list of angles and rates.")
         if texts and not why_not_plain(config):
-            stated(check.angles, check.instant, len(texts), 3 if config.walker.type == "kneed" else 2, name)
+            stated(check, len(texts), 3 if config.walker.type == "kneed" else 2, name)
+
+
+def states_of(check: Check) -> dict[str, Any]:
+    return {"state": check.printed.get("state"), "state_before": check.state_before}
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class Checked:
     @cached_property
     def items(self) -> list[Item]:
         """Printed numbers of a gait, those of states first."""
-        listed = {"state": self.check.printed.get("state"), "state_before": self.check.state_before}
+        listed = states_of(self.check)
         return items_of({**listed, **self.check.printed}, {name: self.components(name) for name in listed})
 
     def components(self, name: str) -> list[str]:
@@ -116,11 +117,9 @@ class Checked:
     def conventions(self) -> dict[str, Convention]:
         """Conventions of the printed states, by name."""
         found = {}
-        for name, texts in (("state", self.check.printed.get("state")), ("state_before", self.check.state_before)):
+        for name, texts in states_of(self.check).items():
             if texts:
-                instant = self.check.instant if name == "state" else "before-strike"
-                bodies = 3 if self.walker.kneed else 2
-                reading = stated(self.check.angles, instant, len(texts), bodies, name)
+                reading = stated(self.check, len(texts), 3 if self.walker.kneed else 2, name)
                 printed = items_of({name: texts}, {})
                 unit = max(item.unit for item in printed)
                 numbers = [item.printed.value.real for item in printed]
@@ -130,8 +129,9 @@ class Checked:
     @property
     def convention(self) -> Convention:
         """Convention of the printed state or, if none is printed, this package's own."""
-        default = stated(self.check.angles, self.check.instant, 2 * len(self.check.angles.order or (0, 0)), 3)
-        return self.conventions.get("state") or self.conventions.get("state_before") or default
+        if self.conventions:
+            return next(iter(self.conventions.values()))
+        return stated(self.check, 2 * len(self.check.angles.order or (0, 0)), 3)
 
     @property
     def has_both_legs(self) -> bool:
@@ -142,20 +142,20 @@ class Checked:
         """Return a printed state of all bodies. Values that are not printed are those of the state `known`."""
         if name not in self.conventions:
             return None
-        numbers = [item.printed.value.real for item in self.items if item.quantity == name]
-        return self.conventions[name].read(self.walker, numbers, known)
+        return self.conventions[name].read(self.walker, self.numbers(name), known)
+
+    def numbers(self, name: str) -> list[float]:
+        return [item.printed.value.real for item in self.items if item.quantity == name]
 
     def rounding(self, name: str, known: Floats) -> Floats:
-        """Return the change of each number of a state if its printed value changes by a unit of the last digit."""
+        """Return how much the numbers of a state change if each printed one changes by a unit of its last digit."""
         convention = self.conventions[name]
-        items = [item for item in self.items if item.quantity == name]
-        numbers = np.array([item.printed.value.real for item in items])
+        units = [item.unit for item in self.items if item.quantity == name]
+        numbers = np.array(self.numbers(name))
         state = convention.read(self.walker, numbers.tolist(), known)
         total = np.zeros(len(known))
-        for place, item in enumerate(items):
-            moved = numbers.copy()
-            moved[place] += item.unit
-            total += np.abs(convention.read(self.walker, moved.tolist(), known) - state)
+        for move in np.diag(units):
+            total += np.abs(convention.read(self.walker, (numbers + move).tolist(), known) - state)
         return total
 
     @cached_property
@@ -195,7 +195,8 @@ class Checked:
         values = walk.values(self.items, self.convention)
         pairs = [(item.printed.value, values[item.name]) for item in self.items]
         return sum(
-            1.0 if value is None else min(abs(value - printed) / (abs(printed) + 1e-3), 1.0) for printed, value in pairs
+            1.0 if value is None else min(abs(value - printed) / (abs(printed) + SMALL_VALUE), 1.0)
+            for printed, value in pairs
         )
 
     def judged(self) -> Iterator[tuple[Item, complex | None, Judgement]]:
@@ -239,20 +240,19 @@ def check_gait(config: CheckConfig, explains: bool = True) -> dict[str, Any]:
     if config.check is None:
         raise ConfigError("the config has no check block.", "`walkerlab init FILE --check` writes one to fill in.")
     refuse_unknown(config)
-    reason = why_not_plain(config)
-    search = GaitSearch((), None, reason) if reason else find_gaits(rigid_walker(config), config.seed)
-    if reason:
+    if reason := why_not_plain(config):
         return answer_without(config.check, f"{reason}, so no second route confirms the right values")
-    checked = Checked(config, config.check, search)
-    rows = [as_row(item, right, verdict) for item, right, verdict in checked.judged()]
-    if checked.right is None:
-        return answer_without(config.check, f"the walker has no gait here ({search.reason})")
+    checked = Checked(config, config.check, find_gaits(rigid_walker(config), config.seed))
+    right = checked.right
     question = checked.question
-    assert question is not None
-    differs = any(verdict.digits < item.digits for item, right, verdict in checked.judged() if right is not None)
-    explanations, closest = explain(question) if differs and explains else ([], None)
+    if right is None or question is None:
+        return answer_without(config.check, f"the walker has no gait here ({checked.search.reason})")
+    judged = [*checked.judged()]
+    rows = [as_row(*each) for each in judged]
+    searched = explains and any(verdict.digits < item.digits for item, value, verdict in judged if value is not None)
+    explanations, closest = explain(question) if searched else ([], None)
     periodic = periodicity(checked, question)
-    if periodic and differs and explains and not periodic["is_periodic"]:
+    if periodic and searched and not periodic["is_periodic"]:
         periodic["periodic_with"] = find_periodic_changes(question)
     return {
         "source": config.check.source.model_dump(),
@@ -265,9 +265,9 @@ def check_gait(config: CheckConfig, explains: bool = True) -> dict[str, Any]:
         "explanations": [asdict(each) for each in explanations],
         "closest": closest,
         "undecided": undecided(explanations),
-        "searched": differs and explains,
-        "nearest_gait": nearest_gait(checked, checked.right),
-        "routes": routes(checked.right),
+        "searched": searched,
+        "nearest_gait": nearest_gait(checked, right),
+        "routes": routes(right),
     }
 
 
@@ -275,9 +275,9 @@ def answer_without(check: Check, reason: str) -> dict[str, Any]:
     """Return the answer if there is no right gait to compare with."""
     items = items_of({**check.printed, "state_before": check.state_before}, {})
     rows = [as_row(item, None, judge(item, None, reason)) for item in items]
-    nothing: dict[str, Any] = {"periodic": None, "momenta": [], "explanations": [], "nearest_gait": None}
     head = {"source": check.source.model_dump(), "finding": NOT_COMPARABLE, "reason": reason, "values": rows}
-    return {**head, **nothing, "closest": None, "undecided": "", "searched": False, "routes": None}
+    lists: dict[str, Any] = {"momenta": [], "explanations": [], "undecided": "", "searched": False}
+    return {**head, **lists, **dict.fromkeys(("periodic", "closest", "nearest_gait", "routes"))}
 
 
 def as_row(item: Item, right: complex | None, verdict: Judgement) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Final, get_args
 
 import numpy as np
 
-from walkerlab.config.check import Instant, PrintedAngles
+from walkerlab.config.check import Check, Instant
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.check.plain_walker import (
     BENT,
@@ -131,11 +131,13 @@ INSTANT_WORDS: Final = {
 }
 
 
-def stated(angles: PrintedAngles, instant: Instant, count: int, bodies: int, name: str = "state") -> Convention:
-    """Return the convention that a config states for a state of `count` numbers.
+def stated(check: Check, count: int, bodies: int, name: str = "state") -> Convention:
+    """Return the convention that a config states for a printed state of `count` numbers.
 
     Raises ConfigError if they do not fit.
     """
+    angles = check.angles
+    instant = "before-strike" if name == "state_before" else check.instant
     order = angles.order or DEFAULT_ORDERS.get(count)
     fits = order is not None and 2 * len(order) == count
     if order is None or not fits or any(BODIES[body] >= bodies for body in order):

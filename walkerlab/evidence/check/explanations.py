@@ -8,37 +8,41 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from operator import itemgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.config.numbers import short_number
 from walkerlab.config.reads import RigidConfig
-from walkerlab.evidence.check.conventions import Convention, alternatives, start_from
-from walkerlab.evidence.check.gaits import gait_near
-from walkerlab.evidence.check.misprints import misprints_of, parameters, transposed, vary_walker
-from walkerlab.evidence.check.mistakes import MistakeFamily, families_of, mistakes_of
+from walkerlab.evidence.check.causes import (
+    Candidate,
+    MistakeFamily,
+    families_of,
+    misprints_of,
+    mistakes_of,
+    parameters,
+    transposed,
+    walker_with,
+)
+from walkerlab.evidence.check.conventions import Convention, alternatives, full_state, start_from
+from walkerlab.evidence.check.gaits import CheckedStep, gait_near
 from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
 from walkerlab.evidence.check.printed import Item
-from walkerlab.evidence.check.walks import CheckedStep
 from walkerlab.labels import join_words
 
 REFINED: Final = 5  # candidates that are solved
-FARTHEST_GUESS = 0.3  # rad; first guesses farther from the printed state are not used
-SAME_WALK = 1e-7  # largest relative difference between first guesses that count as the same
-# rounds that fit a mistake's size; smallest factor by which it must reduce the distance from the printed values
-FITTING_ROUNDS, LEAST_GAIN = 4, 3.0
+FARTHEST_GUESS = 0.3  # rad; a first guess farther from the printed state has no meaning
+SAME_WALK = 1e-7  # relative change of a first guess that is no change
+FITTING_ROUNDS, LEAST_GAIN = 4, 3.0  # of the size of a mistake, and how much closer it must bring the printed values
 ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
 SIZE_SHARE = 0.03  # relative error of a fitted size within which a round one is tried
-# Ranges of sizes by their unit. Smaller sizes cannot be told from the usual errors of programs.
-LIMITS: Final = {"s": (2e-5, 0.2), "rad": (1e-5, 0.3)}
-MIN_EXPLAINED = 3  # fewest numbers that an explanation must reproduce if it does not reproduce all
-MUCH_CLOSER = 5.0  # smallest factor by which a reported cause reduces the largest difference
-MAX_CHANGES = 3  # most conventions that one explanation changes
+FEW = 3  # numbers that can be explained while others are not
+MUCH_CLOSER = 5.0  # how much closer a cause must come to be worth telling
+READINGS = 2  # other conventions in which a mistake is searched
+NEARLY = 2.0  # ratio of two distances between which the number of changes decides
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,13 @@ class Explanation:
     what: str
     reproduces: tuple[str, ...]  # names of printed numbers
     digits: int  # smallest number of digits that agree
+
+
+class Attempt(NamedTuple):
+    """The gait of a walker that may explain the printed values."""
+
+    candidate: Candidate
+    gait: CheckedStep
 
 
 @dataclass(frozen=True)
@@ -66,58 +77,63 @@ class Question:
     def walker(self) -> PlainWalker:
         return self.right.walker
 
-    def explanation(self, kind: str, what: str, items: Sequence[Item] = ()) -> Explanation:
-        reproduced = items or self.items
-        return Explanation(kind, what, tuple(each.name for each in reproduced), min(each.digits for each in reproduced))
-
-    def reproduced(
-        self, walk: CheckedStep, convention: Convention | None = None, items: Sequence[Item] | None = None
-    ) -> list[Item]:
-        """Return the printed numbers that agree with a gait in every digit."""
-        items = self.items if items is None else items
-        values = walk.values(items, convention or self.convention)
-        return [item for item in items if item.fits(values[item.name])]
-
-    def fits(self, walk: CheckedStep, convention: Convention | None = None) -> bool:
-        """Whether a gait agrees with the printed numbers in every digit. Numbers that need no derivative come first."""
-        return all(
-            len(self.reproduced(walk, convention, items)) == len(items) for items in (self.quick_items, self.items)
-        )
-
-    def explained_by(self, attempt: Attempt) -> Explanation | None:
-        """Return the explanation by the gait of an attempt, or None if it explains too little.
-
-        The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
-        right.
-        """
-        if len(self.reproduced(attempt.gait, items=self.state_items)) < len(self.state_items):
-            return None
-        reproduced = self.reproduced(attempt.gait)
-        others = [item for item in self.items if item not in reproduced]
-        kind = attempt.candidate.kind
-        what = attempt.candidate.what
-        return self.explanation(kind, what, reproduced) if not others or len(reproduced) >= MIN_EXPLAINED else None
-
-    @cached_property
-    def right_items(self) -> list[Item]:
-        """Printed numbers that agree with the right gait in every digit."""
-        return self.reproduced(self.right)
-
-    def miss(self, walk: CheckedStep) -> float:
-        """Return the largest distance of a walk from a printed value, in units of its last digit."""
-        values = walk.values(self.quick_items, self.convention)
-        return max((item.miss(values[item.name]) for item in self.quick_items), default=math.inf)
-
     @cached_property
     def state_items(self) -> list[Item]:
         """Printed numbers of states."""
         return [item for item in self.items if item.quantity.startswith("state")]
 
     @cached_property
+    def exact_items(self) -> list[Item]:
+        """Printed numbers that need no derivative."""
+        return [item for item in self.items if item.quantity not in ("multipliers", "spectral_radius")]
+
+    @cached_property
     def quick_items(self) -> list[Item]:
         """Printed numbers of states or, if none is printed, all that need no derivative."""
-        slow = ("multipliers", "spectral_radius")
-        return self.state_items or [item for item in self.items if item.quantity not in slow]
+        return self.state_items or self.exact_items
+
+    def explanation(self, kind: str, what: str, items: Sequence[Item] = ()) -> Explanation:
+        reproduced = items or self.items
+        return Explanation(kind, what, tuple(each.name for each in reproduced), min(each.digits for each in reproduced))
+
+    def reproduced(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> list[Item]:
+        """Return the printed numbers of which a gait has every digit."""
+        values = walk.values(items, convention or self.convention)
+        return [item for item in items if item.fits(values[item.name])]
+
+    def fits(self, walk: CheckedStep, convention: Convention) -> bool:
+        """Whether a gait has every printed digit. What needs no derivative is compared first."""
+        return all(
+            len(self.reproduced(walk, items, convention)) == len(items) for items in (self.quick_items, self.items)
+        )
+
+    def explained_by(self, attempt: Attempt) -> Explanation | None:
+        """Return what the gait of an attempt explains, or None if it explains too little.
+
+        The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
+        right.
+        """
+        if len(self.reproduced(attempt.gait, self.state_items)) < len(self.state_items):
+            return None
+        reproduced = self.reproduced(attempt.gait, self.items)
+        if len(reproduced) < min(FEW, len(self.items)):
+            return None
+        return self.explanation(attempt.candidate.kind, attempt.candidate.what, reproduced)
+
+    def miss(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> float:
+        """Return the largest distance of a walk from a printed value, in units of its last digit."""
+        values = walk.values(items, convention or self.convention)
+        return max((item.miss(values[item.name]) for item in items), default=math.inf)
+
+    def misses(self, walker: PlainWalker | None) -> Floats | None:
+        """Return the signed distances of a walker's gait, by a first guess, in units of the last digits."""
+        walk = None if walker is None else self.guess(walker, EXACT)
+        if walk is None:
+            return None
+        values = walk.values(self.quick_items, self.convention)
+        known = [(item, values[item.name]) for item in self.quick_items if item.printed.bounds is None]
+        found = [(value.real - item.printed.value.real) / item.unit for item, value in known if value is not None]
+        return np.array(found) if len(found) > 1 else None
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a walk near a walker's gait: a Newton step from the printed state, or from the right gait."""
@@ -128,7 +144,11 @@ class Question:
         move = np.linalg.solve(np.eye(len(start)) - self.right.derivative, step.after - start)
         if np.abs(move[:2]).max() > FARTHEST_GUESS:
             return None
-        after = walker.step(start + move, tolerance) if self.needs_times else step
+        # a value may be printed that the state alone does not determine
+        needs_times = self.convention.instant != "after-strike" or any(
+            item.quantity != "state" for item in self.quick_items
+        )
+        after = walker.step(start + move, tolerance) if needs_times else step
         return None if after is None else CheckedStep(walker, start + move, after)
 
     def attempt(self, candidate: Candidate, guess: CheckedStep) -> Iterator[Attempt]:
@@ -137,58 +157,65 @@ class Question:
         if gait is not None:
             yield Attempt(candidate, CheckedStep(candidate.walker, *gait))
 
-    @property
-    def needs_times(self) -> bool:
-        """Whether a value is printed that the state alone does not determine."""
-        return self.convention.instant != "after-strike" or any(item.quantity != "state" for item in self.quick_items)
-
-
-class Candidate(NamedTuple):
-    """A walker that may explain the printed values."""
-
-    kind: str
-    what: str
-    walker: PlainWalker
-    family: str = ""  # the mistake without its size, if it has one
-
-
-class Attempt(NamedTuple):
-    """The gait of a walker that may explain the printed values."""
-
-    candidate: Candidate
-    gait: CheckedStep
-
 
 def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | None]:
     """Return the explanations that fit, and the cause that comes closest if none does.
 
-    Conventions come first, then misprinted values, then mistakes and misprinted parameters together.
+    Conventions come first, then misprinted values, then mistakes and misprinted parameters together, and at last these
+    in other conventions.
     """
     if sum(item.printed.bounds is None for item in question.items) < 2:
         return [], None
     if found := [*conventions(question), *misprinted_values(question)]:
         return found, None
-    attempts = [*solve_best(question, candidates(question)), *fit_families(question)]
-    found = list(strike_at_start(question))
-    families: set[str] = set()
-    for attempt in attempts:
-        explanation = None if attempt.candidate.family in families else question.explained_by(attempt)
-        if explanation is not None:
-            found.append(explanation)
-            families |= {attempt.candidate.family} - {""}
+    attempts = [*attempts_at(question)]
+    found = [*at_the_start(question), *explained(question, attempts)]
+    if not found:
+        for changes, reading in closer_readings(question):
+            for each in explained(reading, attempts_at(reading)):
+                if len(each.reproduces) == len(question.items):
+                    found.append(replace(each, what=f"{changes}, and {each.what}"))
+            if found:
+                break
     most = max((len(each.reproduces) for each in found), default=0)
     complete = [each for each in found if len(each.reproduces) == most]
     return complete, None if complete else closest(question, attempts)
 
 
+def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt]) -> Iterator[Explanation]:
+    """Yield what the gaits of attempts explain. A mistake that has a size counts once."""
+    families: set[str] = set()
+    for attempt in attempts:
+        explanation = None if attempt.candidate.family in families else question.explained_by(attempt)
+        if explanation is not None:
+            yield explanation
+            families |= {attempt.candidate.family} - {""}
+
+
+def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
+    """Yield conventions in which the right gait comes much closer to the printed values, with the question in them."""
+    if question.state is None:
+        return
+    far = question.miss(question.right, question.exact_items) / MUCH_CLOSER
+    readings: dict[float, Convention] = {}
+    for other in alternatives(question.convention):
+        # of conventions that differ in nothing that is printed, the first has the fewest changes
+        readings.setdefault(question.miss(question.right, question.exact_items, other), other)
+    near = NEARLY * min(readings)
+    closest = [other for miss, other in readings.items() if miss <= near and miss < far]
+    numbers = [item.printed.value.real for item in question.items if item.quantity == "state"]
+    known = full_state(question.right.start, question.walker.kneed)
+    for other in closest[:READINGS]:
+        state = other.read(question.walker, numbers, known)
+        changes = join_words([*other.differences(question.convention)])
+        yield changes, replace(question, convention=other, state=state)
+
+
 def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
     """Return the cause that brings a gait much closer to the printed values, or None if no cause does."""
-    if not question.quick_items:
-        return None
-    without = question.miss(question.right)
-    miss, attempt = min(
-        ((question.miss(each.gait), each) for each in attempts), default=(math.inf, None), key=itemgetter(0)
-    )
+    without = question.miss(question.right, question.quick_items)
+    distances = ((question.miss(each.gait, question.quick_items), each) for each in attempts)
+    miss, attempt = min(distances, default=(math.inf, None), key=itemgetter(0))
     if attempt is None or miss * MUCH_CLOSER > without:
         return None
     kind = attempt.candidate.kind
@@ -196,83 +223,78 @@ def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] |
     return {"kind": kind, "what": what, "miss_in_units": miss, "without_in_units": without}
 
 
-def candidates(question: Question) -> Iterator[Candidate]:
-    """Yield walkers with mistakes or misprints whose size is known."""
-    for what, walker in mistakes_of(question.walker):
-        yield Candidate("mistake", what, walker)
-    for key, value, how, walker in misprints_of(question.config):
-        yield Candidate("misprint", f"{key} is {short_number(value)} ({how})", walker)
-
-
-def solve_best(question: Question, walkers: Iterable[Candidate]) -> Iterator[Attempt]:
-    """Yield the gaits of the most promising candidates."""
+def attempts_at(question: Question) -> Iterator[Attempt]:
+    """Yield the gaits of the most promising candidates, then those of mistakes whose size is fitted."""
     right = question.guess(question.walker)
     guesses = []
-    for place, candidate in enumerate(walkers):
+    for place, candidate in enumerate((*mistakes_of(question.walker), *misprints_of(question.config))):
         guess = question.guess(candidate.walker)
-        if guess is not None and (right is None or not is_same_walk(guess, right)):
-            guesses.append((question.miss(guess), place, candidate, guess))
+        if guess is not None and (right is None or not same(guess, right)):
+            guesses.append((question.miss(guess, question.quick_items), place, candidate, guess))
     for _, _, candidate, guess in heapq.nsmallest(REFINED, guesses):
         yield from question.attempt(candidate, guess)
+    if len(question.items) < FEW:
+        return
+    for family in families_of(question.walker):
+        for size in sizes_to_try(fitted_size(question, family)):
+            candidate = Candidate("mistake", family.what.format(f"{size:.4g}"), family.of_size(size), family.what)
+            guess = question.guess(candidate.walker, EXACT)
+            if guess is not None:
+                yield from question.attempt(candidate, guess)
 
 
-def is_same_walk(walk: CheckedStep, other: CheckedStep) -> bool:
+def same(walk: CheckedStep, other: CheckedStep) -> bool:
     return bool(np.abs(walk.start - other.start).max() < SAME_WALK * np.abs(other.start).max())
 
 
-def fit_families(question: Question) -> Iterator[Attempt]:
-    """Yield the gaits of walkers with mistakes that have a size, which is fitted to the printed values."""
-    if len(question.items) < MIN_EXPLAINED:
-        return
-    for family in families_of(question.walker):
-        size = fitted_size(question, family)
-        for tried in () if size is None else sizes_to_try(size):
-            walker = family.of_size(tried)
-            guess = question.guess(walker, EXACT)
-            what = family.what.format(f"{tried:.4g}")
-            if guess is not None:
-                yield from question.attempt(Candidate("mistake", what, walker, family.what), guess)
+class Fit(NamedTuple):
+    """Value of a parameter that brings gaits closest to the printed values."""
+
+    value: float
+    change: float  # relative change in the last round
+    without: Floats  # distances before the fit, in units of last digits
+    there: Floats  # those at the last value that was tried
+    left: Floats  # those that remain if gaits change in proportion to the parameter
+
+
+def fit(
+    question: Question, walker_of: Callable[[float], PlainWalker | None], begin: float, near: float,
+    limits: tuple[float, float],
+) -> Fit | None:  # fmt: skip
+    """Fit a parameter to the printed values by secants from a first value, or return None if that leads nowhere."""
+    without = question.misses(walker_of(begin))
+    result = None
+    for _ in range(FITTING_ROUNDS):
+        there = question.misses(walker_of(near))
+        if without is None or there is None or near == begin:
+            return None
+        slope = (there - without) / (near - begin)
+        move = -float(slope @ without) / float(slope @ slope or math.inf)
+        value = begin + move
+        if not limits[0] <= value <= limits[1]:
+            return None
+        result = Fit(value, abs(value / near - 1.0), without, there, without + move * slope)
+        if result.change < CONVERGED:
+            break
+        near = value
+    return result
+
+
+CONVERGED: Final = 1e-6  # relative change of a fitted value
 
 
 def fitted_size(question: Question, family: MistakeFamily) -> float | None:
     """Return the size of a mistake that brings its gait closest to the printed values, or None if none does."""
-    low, high = LIMITS[family.unit]
-    without = signed_misses(question, question.guess(family.of_size(0.0), EXACT))
-    size = family.first
-    best = 0.0
-    left = without
-    for _ in range(FITTING_ROUNDS):
-        there = signed_misses(question, question.guess(family.of_size(size), EXACT))
-        if without is None or there is None:
-            return None
-        slope = (there - without) / size
-        best = -float(slope @ without) / float(slope @ slope or math.inf)
-        if not low <= best <= high:
-            return None
-        left = without + best * slope
-        if abs(best / size - 1.0) < SIZE_SHARE:
-            break
-        size = best
-    if without is None or left is None or np.abs(left).max() * LEAST_GAIN > np.abs(without).max():
+    found = fit(question, family.of_size, 0.0, family.first, family.limits)
+    if found is None or np.abs(found.left).max() * LEAST_GAIN > np.abs(found.without).max():
         return None
-    return best
+    return found.value
 
 
-def signed_misses(question: Question, walk: CheckedStep | None) -> Floats | None:
-    """Return the signed distances of a walk from the printed values in units of their last digits."""
-    if walk is None:
-        return None
-    values = walk.values(question.quick_items, question.convention)
-    found = [
-        (values[item.name].real - item.printed.value.real) / item.unit  # type: ignore[union-attr]
-        for item in question.quick_items
-        if values[item.name] is not None and item.printed.bounds is None
-    ]
-    return np.array(found) if len(found) > 1 else None
-
-
-def sizes_to_try(size: float) -> Iterator[float]:
+def sizes_to_try(size: float | None) -> Iterator[float]:
     """Yield round sizes near a fitted one, then the fitted one itself."""
+    if size is None:
+        return
     power = 10.0 ** math.floor(math.log10(size))
     for digit in (*ROUND_SIZES, 10.0):
         if abs(digit * power / size - 1.0) < SIZE_SHARE:
@@ -281,36 +303,29 @@ def sizes_to_try(size: float) -> Iterator[float]:
     yield size
 
 
-def strike_at_start(question: Question) -> Iterator[Explanation]:
-    """Yield the explanation that a script meets the event at the start, if only the printed multipliers contain -1."""
-    listed = [item for item in question.items if item.quantity == "multipliers"]
-    minus_one = [item for item in listed if item.fits(-1.0)]
+def at_the_start(question: Question) -> Iterator[Explanation]:
+    """Yield that a script meets the event at the start, if the multipliers have a -1 that the gait has not."""
+    minus_one = [item for item in question.items if item.quantity == "multipliers" and item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
-    values = question.right.values(others, question.convention)
-    if minus_one and all(item.fits(values[item.name]) for item in others):
+    if minus_one and len(question.reproduced(question.right, others)) == len(others):
         what = "the integration starts on the strike's surface and meets it at once, which adds a multiplier of -1"
         yield question.explanation("mistake", what)
 
 
-def conventions(question: Question) -> list[Explanation]:
-    """Return the conventions with the fewest changes under which the right gait has every printed digit."""
+def conventions(question: Question) -> Iterator[Explanation]:
+    """Yield other conventions under which the right gait has every printed digit, those with the fewest changes."""
     found: list[tuple[int, str]] = []
-    measures = {item.quantity for item in question.items}
     for what, walk in scenes(question):
         for other in (question.convention, *alternatives(question.convention)):
             changes = [*([what] if what else []), *other.differences(question.convention)]
-            if len(changes) > (min(found)[0] if found else MAX_CHANGES) or (not changes):
+            if not changes or (found and len(changes) > min(found)[0]):
                 continue
-            if not measures & {"state", "state_before"} and not only_times(question.convention, other):
-                continue
-            if question.fits(walk, other):
+            times = replace(question.convention, time=other.time, steps=other.steps)
+            if (question.state_items or other == times) and question.fits(walk, other):
                 found.append((len(changes), join_words(changes)))
-    fewest = min((count for count, _ in found), default=0)
-    return [question.explanation("convention", what) for count, what in dict.fromkeys(found) if count == fewest]
-
-
-def only_times(convention: Convention, other: Convention) -> bool:
-    return replace(other, time=convention.time, steps=convention.steps) == convention
+    for changed, what in dict.fromkeys(found):
+        if changed == min(found)[0]:
+            yield question.explanation("convention", what)
 
 
 def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
@@ -339,7 +354,7 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     item = wrong[0]
     name = item.name.removeprefix("state.").replace("_", " ").replace(".", ", ")
     printed = item.printed.real.value
-    reproduced = [each for each in question.items if each in question.right_items or each is item]
+    reproduced = [item, *question.reproduced(question.right, question.items)]
     if item.fits(-right):
         yield question.explanation("misprint", f"the sign of the printed {name} is wrong", reproduced)
     elif any(item.fits(right + printed - other) for other in transposed(printed)):
@@ -353,29 +368,11 @@ def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
     states = replace(question, items=[item for item in question.items if item.quantity == "state"])
     found: list[dict[str, float | str]] = []
     for key, value in parameters(question.config).items():
-        size = one_change(states, key, value)
-        if size is not None:
-            found.append({"key": key, "value": float(f"{size:.6g}")})
+        walker_of = partial(walker_with, question.config, key)
+        change = fit(states, walker_of, value, value * (1.0 + 1e-4), (-math.inf, math.inf))
+        if change is not None and change.change < CONVERGED and np.abs(change.there).max() <= 1.0:
+            found.append({"key": key, "value": float(f"{change.value:.6g}")})
     return found
-
-
-def one_change(question: Question, key: str, value: float) -> float | None:
-    """Return the value of a parameter for which the printed state is periodic to its digits, or None."""
-    without = signed_misses(question, question.guess(question.walker))
-    near = value * (1.0 + 1e-4)
-    for _ in range(FITTING_ROUNDS):
-        changed = vary_walker(question.config, key, near)
-        there = None if changed is None else signed_misses(question, question.guess(changed))
-        if without is None or there is None or near == value:
-            return None
-        slope = (there - without) / (near - value)
-        if not slope @ slope:
-            return None
-        best = value - float(slope @ without / (slope @ slope))
-        if abs(best - near) < 1e-6 * abs(value):
-            return best if np.abs(there).max() <= 1.0 else None
-        near = best
-    return None
 
 
 def undecided(explanations: Sequence[Explanation]) -> str:

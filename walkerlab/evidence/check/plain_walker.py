@@ -63,6 +63,7 @@ class PlainWalker:
     hip: tuple[float, float, float] = (0.0, 0.0, 0.0)  # spring, damper and torque between the legs
     push_off: float = 0.0  # N s
     free_at_strike: bool = False  # whether the trailing knee is free during the heel strike
+    knee_damping: float = 0.0  # N m s/rad, while the knee is free
     # mistakes
     signs: Mapping[tuple[str, int, int], float] = field(default_factory=dict)  # factors on velocity terms, by phase
     keeps_trailing_rate: bool = False
@@ -183,6 +184,10 @@ class PlainWalker:
         twist = torque - spring * (angles[SWING] - angles[STANCE]) - damper * (omega[SWING] - omega[STANCE])
         forces[SWING] += twist
         forces[STANCE] -= twist
+        if self.kneed and phase == BENT:
+            drag = self.knee_damping * (omega[SHANK] - omega[SWING])
+            forces[SHANK] -= drag
+            forces[SWING] += drag
         if follows:
             M = (Z.T @ M @ Z).tolist()
             forces = (Z.T @ forces).tolist()

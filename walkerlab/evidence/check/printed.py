@@ -75,14 +75,23 @@ class Item:
         return abs(right - self.printed.value) / self.unit
 
 
-def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
-    """Count the digits of a printed number that agree with the right one, given the error of the right one."""
-    difference = abs(right - printed.value)
+def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
+    """Return how a right value agrees with all printed digits: 'rounded', 'cut off', or '' if it does not.
+
+    error  of the right value
+    """
+    if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
+        return "rounded"
     longer = abs(right) - abs(printed.value)
     same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
-    cut_off = same_sign and -error <= longer < printed.unit + error
-    if cut_off or difference <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
+    return "cut off" if same_sign and -error <= longer < printed.unit + error else ""
+
+
+def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
+    """Return how many digits of a printed number agree with the right one, within the error of the right one."""
+    if agreement(printed, right, error):
         return printed.count
+    difference = abs(right - printed.value)
     agreeing = printed.count - 1
     while agreeing > 0 and difference > 0.5 * printed.unit * 10.0 ** (printed.count - agreeing):
         agreeing -= 1

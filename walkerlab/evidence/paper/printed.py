@@ -1,10 +1,12 @@
 """Numbers printed in the paper, with their sources, and the walker that they describe."""
 
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
+from functools import cached_property
 from typing import Final
 
+from walkerlab.config.check import Digits, parse_printed
 from walkerlab.config.contact import MM_PER_M, Contact
+from walkerlab.evidence.check.printed import agreement
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
 
@@ -21,40 +23,26 @@ class Printed:
     unit: str
     text: str  # text as printed, which shows the last significant digit
 
-    @property
-    def value(self) -> float:
-        return float(number(self.text))
+    @cached_property
+    def digits(self) -> Digits:
+        """The number, read as a printed gait's is. Its bounds and unit of percent are left out."""
+        printed = parse_printed(self.text.rstrip("% "))
+        assert printed is not None
+        return printed.real
 
     @property
-    def last_digit(self) -> float:
-        exponent = number(self.text).as_tuple().exponent
-        return 10.0 ** int(exponent)
+    def value(self) -> float:
+        return self.digits.value
 
     @property
     def rounding(self) -> tuple[float, float]:
         """Smallest and largest value that round to the printed one."""
-        half = 0.5 * self.last_digit
+        half = 0.5 * self.digits.unit
         return self.value - half, self.value + half
 
     def agreement(self, value: float | None) -> str:
         """Agreement of a value with the printed digits: 'rounded', 'cut off', or '' if it disagrees."""
-        if value is None:
-            return ""
-        expected = number(self.text)
-        decimal = Decimal(repr(float(value)))
-        last = Decimal(1).scaleb(int(expected.as_tuple().exponent))
-        if decimal.quantize(last, ROUND_HALF_UP) == expected:
-            return "rounded"
-        return "cut off" if decimal.quantize(last, ROUND_DOWN) == expected else ""
-
-
-NUMBER_WORDS: Final = {"one": "1", "five": "5", "zero": "0"}
-
-
-def number(text: str) -> Decimal:
-    """Parse a text such as '-0.60', '+41%', '< 1 %', '10^5', '1e-4' or 'five'."""
-    plain = text.replace("less than", "").strip("<+% ")
-    return Decimal(NUMBER_WORDS.get(plain, plain.replace("10^", "1e")))
+        return "" if value is None else agreement(self.digits, value)
 
 
 X_P: Final = tuple(
@@ -164,7 +152,7 @@ def adams_start_as_printed() -> tuple[float, float, float, float]:
 
 def slope_of(theta_1: Printed, theta_2: Printed) -> tuple[float, float]:
     """Slope (rad) on which both feet of a printed state stand, and its uncertainty due to rounding."""
-    return -0.5 * (theta_1.value + theta_2.value), 0.25 * (theta_1.last_digit + theta_2.last_digit)
+    return -0.5 * (theta_1.value + theta_2.value), 0.25 * (theta_1.digits.unit + theta_2.digits.unit)
 
 
 def walker_of_the_paper(c21_sign: float) -> RigidWalker:
