@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Compare ten steps of exported walkers in MuJoCo with our contact model: make tables of docs/exchange.md and legs.md.
+"""Compare ten steps of exported walkers in MuJoCo with our contact model.
+
+The results are in docs/exchange-details.md and docs/legs.md.
 
 Usage: python scripts/mujoco_walks.py [CONFIG [KEY=VALUE ...]], by default the walkers of both tables
 

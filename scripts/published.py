@@ -1,12 +1,13 @@
-"""Write docs/published.md from the configs in configs/published, with a table of mistakes that are known from programs.
+"""Write the pages on published gaits and known mistakes from the configs in configs/published.
 
-python scripts/published.py            writes the page
-python scripts/published.py --check    exits 1 if it is not what the code gives
+python scripts/published.py            writes published.md, published-right.md and known-mistakes.md in docs
+python scripts/published.py --check    exits 1 if a page is not what the code gives
 """
 
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from walkerlab.config.check import Check
@@ -20,47 +21,93 @@ from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 
 ROOT = Path(__file__).parent.parent
-PAGE = ROOT / "docs" / "published.md"
-ORDER = ("explained", "partly explained", "different, unexplained", "reproduced")
+DOCS = ROOT / "docs"
+REPRODUCED = "reproduced"
+ORDER = ("explained", "partly explained", "different, unexplained", REPRODUCED)
 TYPICAL = 1e-3  # size of mistakes that have one, rad or s
 FOLDER = ROOT / "configs" / "published"
+MADE = "<!-- made by scripts/published.py from configs/published -->"
+STORY = "passivewalker-2009"
 HEAD = """# Published gaits, checked
 
-Papers and programs print gaits. This page compares them with the right ones. Three stories first:
+Papers and programs print gaits, and other programs copy the digits. On this page {all} printed gaits are computed
+again: {right} are right, {wrong} are not.
 
-- A script that many programs have copied prints 15 digits of a gait with round feet. They are wrong from the fourth
-  on, because its heel strike subtracts one term with the legs' inertia too often
-  ([passivewalker-2009](#passivewalker-2009)). A later script of the same hand has the right strike
-  ([passivewalker-sim](#passivewalker-sim)).
-- A much-quoted state of a walker with knees is not periodic ([hsu-chen-2007](#hsu-chen-2007)). The cause is unknown.
-- The paper that this project reproduces has a wrong sign in its equations, and its own fixed point shows it
-  ([adams-compass](#adams-compass)).
+{made}
+
+This one, of a walker with round feet, is in a script that many programs have copied. It prints 15 digits, of which
+at most the first four are right:
+
+{story}
+
+The cause is one term. The heel strike of the script subtracts the inertia of a leg times the rate between the legs,
+where nothing should be subtracted. With this mistake all digits follow. A later script of the same hand has the
+right strike ([passivewalker-sim](published-right.md#passivewalker-sim)). Type this to see it for yourself, or any
+other name from the table below:
+
+```
+walkerlab check published/passivewalker-2009.yaml
+```
+
+Two more stories: a much-quoted state of a walker with knees is not periodic, and the cause is unknown
+([hsu-chen-2007](#hsu-chen-2007)). And the paper that this project reproduces has a wrong sign in its equations,
+which its own fixed point shows ([adams-compass](#adams-compass)).
+
+Next come the gaits that differ, one by one. Those that are right have [a page of their own](published-right.md),
+and [known mistakes](known-mistakes.md) shows how each mistake changes a gait. To check yours, see [whose third
+digit is right](check.md).
+
+## Gaits that differ
+
+{overview}
 
 *Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
-one that shares no equations with it. A value is *reproduced* if the right value, rounded or cut off, has its digits:
-all of them, or at least three that are also at least half. Otherwise it is *different*. If values differ, the program
-looks for one cause that gives all of them: a convention, a mistake that is known from programs, or a misprint. It is
-*explained* if there is one, and *partly explained* if a cause gives some of the values to their last digit.
+one that shares no equations with it. For each value there is a verdict:
 
-To check a gait of your own, write its config with `walkerlab init my-gait.yaml --check` and type `walkerlab check
-my-gait.yaml` ([how to](howto.md#find-out-whose-third-digit-is-right)). The last section lists
-[mistakes that are known](#known-mistakes), and how each changes a gait.
+- *Reproduced*: the right value, rounded or cut off, has the printed digits: all of them, or at least three that are
+  also at least half. Otherwise the value is *different*.
+- If values differ, the program looks for one cause that gives all of them: a convention, a mistake that is known
+  from programs, or a misprint. The gait is *explained* if there is one, and *partly explained* if a cause gives
+  some of the values to their last digit.
 
-<!-- made by scripts/published.py from configs/published -->
+Values have the names that they have in the block `check` of a config.
 """
-TAIL = """## Known mistakes
-
-A mistake changes the gait of the compass at 3 degrees (config `slope-3deg`) or of a walker with round feet
-(`passivewalker-2009`) by this much. `I` is the inertia of a leg.
-
-{mistakes}
-
-## The longest case
+TAIL = """## The longest case
 
 The study that this project reproduces prints 38 values; [the study](study.md) judges each with its evidence. Its
-words are the same: *reproduced* and *explained* mean what they mean here. *Contradicted* is a different value that
-other values of the paper refute, and *not reproduced* is a value that is different and unexplained, or that cannot be
-compared.
+words *reproduced* and *explained* mean what they mean here. *Contradicted* is a different value that other values
+of the paper refute, and *not reproduced* is a value that is different and unexplained, or that cannot be compared.
+"""
+RIGHT = """# Published gaits that are right
+
+These {right} gaits are reproduced, most of them to the last printed digit. You can test your own program with them:
+the column *right* often has more digits than the source.
+
+{made}
+
+{overview}
+
+`walkerlab check published/NAME.yaml` computes one of them again. [Published gaits, checked](published.md) has those
+that differ, and says what *reproduced* means.
+"""
+MISTAKES = """# Known mistakes in programs for walkers
+
+Your gait is close to the right one, but not equal to it. Each row below is a mistake that `walkerlab check` tries on
+your values ([whose third digit is right](check.md)), and how much it changes a gait.
+
+{made}
+
+## Compass
+
+The compass at 3 degrees (config `slope-3deg`), in order of the change of the period:
+
+{compass}
+
+## Round feet
+
+The walker `published/passivewalker-2009.yaml`, whose legs have inertia. `I` is the inertia of a leg.
+
+{round}
 """
 
 
@@ -74,20 +121,47 @@ def comment_of(file: Path) -> str:
     return " ".join(lines)
 
 
-def entry(file: Path, checks: dict) -> list[str]:
-    """Return the lines of one printed gait."""
+@dataclass(frozen=True)
+class Entry:
+    """A printed gait: its name, source, finding, count of reproduced values, table and paragraphs."""
+
+    name: str
+    source: str
+    finding: str
+    reproduced: str
+    table: str
+    paragraphs: tuple[str, ...]
+
+
+def entry_of(file: Path) -> Entry:
+    """Check a printed gait, and return what the pages say of it."""
     summary = check_gait(load(file).config)
     source = summary["source"]
-    title = ", ".join(str(source[key]) for key in ("authors", "year") if source[key]) or source["title"]
-    checks[file.stem] = (title, finding_of(summary))
-    heads = [column.title for column in COLUMNS]
-    table = [f"| {' | '.join(heads)} |", f"|{' --- |' * len(heads)}"]
-    rows = ([column.cell(row).text for column in COLUMNS] for row in summary["values"])
-    table += [f"| {' | '.join(cells)} |" for cells in rows]
-    told = [text for text in remarks(summary) if not text.startswith(("The right gait", "Two independent"))]
-    parts = [f"## {file.stem}", source_of(source), comment_of(file), "\n".join(table), f"**{headline(summary)}**"]
-    command = f"```\nwalkerlab check published/{file.name}\n```"
-    return [*parts, *told, command]
+    rows = summary["values"]
+    table = table_of(
+        [column.title for column in COLUMNS], [[column.cell(row).text for column in COLUMNS] for row in rows]
+    )
+    reproduced = sum(row["verdict"] == REPRODUCED for row in rows)
+    in_the_table = ("The right gait", "Two independent")
+    return Entry(
+        name=file.stem,
+        source=", ".join(str(source[key]) for key in ("authors", "year") if source[key]) or source["title"],
+        finding=finding_of(summary),
+        reproduced=f"{reproduced} of {len(rows)}",
+        table=table,
+        paragraphs=(
+            comment_of(file),
+            f"**{headline(summary)}**",
+            table,
+            *(text for text in remarks(summary) if not text.startswith(in_the_table)),
+            source_of(source),
+        ),
+    )
+
+
+def table_of(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in [heads, ["---"] * len(heads), *rows])
 
 
 def finding_of(summary: Mapping) -> str:
@@ -96,14 +170,38 @@ def finding_of(summary: Mapping) -> str:
     return "partly explained" if unexplained and summary["explanations"] else summary["finding"]
 
 
-def page() -> str:
-    checks: dict[str, tuple[str, str]] = {}
-    entries = {file.stem: entry(file, checks) for file in sorted(FOLDER.glob("*.yaml"))}
-    names = sorted(checks, key=lambda name: (ORDER.index(checks[name][1]), name))
-    rows = [f"| [{name}](#{name}) | {checks[name][0]} | {checks[name][1]} |" for name in names]
-    overview = ["| gait | source | finding |\n| --- | --- | --- |\n" + "\n".join(rows)]
-    parts = [part for name in names for part in entries[name] if part]
-    return HEAD + "\n" + "\n\n".join([*overview, *parts, TAIL.format(mistakes=mistakes())])
+def pages() -> dict[str, str]:
+    """Return the text of each page by its file name."""
+    entries = [entry_of(file) for file in sorted(FOLDER.glob("*.yaml"))]
+    entries.sort(key=lambda entry: (ORDER.index(entry.finding), entry.name))
+    right = [entry for entry in entries if entry.finding == REPRODUCED]
+    wrong = [entry for entry in entries if entry.finding != REPRODUCED]
+    counts = {"all": len(entries), "right": len(right), "wrong": len(wrong), "made": MADE}
+    story = next(entry.table for entry in entries if entry.name == STORY)
+    compass, round_feet = mistakes()
+    texts = {
+        "published.md": [HEAD.format(story=story, overview=overview(wrong), **counts), *sections(wrong), TAIL],
+        "published-right.md": [RIGHT.format(overview=overview(right), **counts), *sections(right)],
+        "known-mistakes.md": [MISTAKES.format(compass=compass, round=round_feet, **counts)],
+    }
+    return {name: re.sub(r"[ \t]+\n", "\n", "\n".join(parts)) for name, parts in texts.items()}
+
+
+def overview(entries: Sequence[Entry]) -> str:
+    """Return a table with a row for each printed gait."""
+    rows = [[f"[{each.name}](#{each.name})", each.source, each.reproduced, each.finding] for each in entries]
+    return table_of(["gait", "source", "values reproduced", "finding"], rows)
+
+
+def sections(entries: Sequence[Entry]) -> list[str]:
+    """Return a section for each printed gait."""
+    texts = []
+    for each in entries:
+        # The page begins with the table of this gait.
+        above = each.table if each.name == STORY else None
+        paragraphs = [text for text in each.paragraphs if text and text != above]
+        texts.append("\n\n".join([f"## {each.name}", *paragraphs]) + "\n")
+    return texts
 
 
 def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, PlainWalker]]]:
@@ -115,31 +213,36 @@ def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, Plain
     return right, known
 
 
-def mistakes() -> str:
-    """Return the table of known mistakes, with the changes of a gait that each of them causes."""
-    lines = ["| mistake | walker | stance angle | stance rate | period |", "| --- | --- | --- | --- | --- |"]
+def mistakes() -> list[str]:
+    """Return a table of known mistakes for each walker, with the change of the gait that each mistake causes."""
+    tables = []
     listed: set[str] = set()
-    for name, title in {"slope-3deg": "compass", str(FOLDER / "passivewalker-2009.yaml"): "round feet"}.items():
+    for name in ("slope-3deg", str(FOLDER / f"{STORY}.yaml")):
         right, known = walkers_with_mistakes(name)
+        rows = []
         for what, walker in known:
             if what in listed:
                 continue
             listed.add(what)
             gait = gait_near(walker, right.start)
-            changes = ("no gait near", "", "")
-            if gait is not None:
-                pairs = [(gait[0][k], right.start[k]) for k in (STANCE, 2 + STANCE)]
-                pairs.append((gait[1].period, right.step.period))
-                changes = tuple(f"{100.0 * (wrong / true - 1.0):+.2g} %" for wrong, true in pairs)
-            lines.append(f"| {what} | {title} | {' | '.join(changes)} |")
-    return "\n".join(lines)
+            if gait is None:
+                rows.append((0.0, [what, "no gait near", "", ""]))
+                continue
+            pairs = [(gait[0][k], right.start[k]) for k in (STANCE, 2 + STANCE)]
+            pairs.append((gait[1].period, right.step.period))
+            changes = [100.0 * (wrong / true - 1.0) for wrong, true in pairs]
+            rows.append((abs(changes[-1]), [what, *(f"{change:+.2g} %" for change in changes)]))
+        rows.sort(key=lambda row: -row[0])
+        tables.append(table_of(["mistake", "stance angle", "stance rate", "period"], [cells for _, cells in rows]))
+    return tables
 
 
 def main() -> int:
-    text = re.sub(r"[ \t]+\n", "\n", page())
+    texts = pages()
     if "--check" in sys.argv[1:]:
-        return int(text != PAGE.read_text(encoding="utf-8"))
-    PAGE.write_text(text, encoding="utf-8")
+        return int(any(text != (DOCS / name).read_text(encoding="utf-8") for name, text in texts.items()))
+    for name, text in texts.items():
+        (DOCS / name).write_text(text, encoding="utf-8")
     return 0
 
 

@@ -233,7 +233,7 @@ def test_walker_that_falls_takes_fewer_steps_than_requested(tmp_path, capsys):
     assert capsys.readouterr().out.splitlines()[-1] == "it walked 1 of 3 steps"
 
 
-# docs/exchange.md has all ten steps
+# docs/exchange-details.md has all ten steps
 @pytest.mark.parametrize(
     ("walker", "steps"), [(KNEED, 2), (ROUND_KNEED, 2), (LEVEL_KNEED, 3), (STOPPED, 2), (AT_TOUCH, 2)]
 )
