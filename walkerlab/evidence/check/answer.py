@@ -45,7 +45,7 @@ from walkerlab.scene.rigid import rigid_walker, state_names
 SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L and g of 1
 SAME_GAIT: Final = 1e-6
 CHOSEN: Final = "chosen"
-PREFERENCE: Final = 0.5  # factor on the distance of the gait that `fixedpoint` chooses
+PREFERENCE: Final = 0.5  # factor on the distance of the gait that `fixedpoint` chooses, which makes it preferred
 SMALL_VALUE: Final = 1e-3  # smallest printed value whose differences are relative to it, not absolute
 OF_GAITS: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
