@@ -20,7 +20,7 @@ CONTROLS: Final = ("Cc", "Cf", "Zl", "Zp")
 def add_run_options(text: str, options_of: Callable[[str], str]) -> str:
     """Append the options that select the run to every command in a message. `options_of` returns those of a command.
 
-    A setting of the command, `--set KEY=VALUE`, replaces those of its key.
+    If the command already sets a key (`--set KEY=VALUE`), other settings of that key are left out.
     """
 
     def add_options(match: re.Match[str]) -> str:

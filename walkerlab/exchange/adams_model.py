@@ -29,7 +29,8 @@ GROUND = "ground"
 ORIGIN = "ground.origin"
 BELOW = "ground.below"
 FREE_LENGTH_MM = 100.0
-"""Free length in IMPACT for a point foot: the foot's height is measured from a marker this far below the ground."""
+"""Free length in IMPACT for a point foot. Heights of the foot are measured from a marker at this depth in the ground.
+"""
 PAD_MM = 50.0
 """Thickness of the pads."""
 LEGS = ("leg_1", "leg_2")

@@ -475,7 +475,7 @@ def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
 
 
 def named_column(recording: Recording, name: str) -> str:
-    """Return the column that a user names as in the file's header, with or without the unit in brackets."""
+    """Return the column that a user names. The unit in brackets, which the header may have, can be left out."""
     name = name.strip()
     return name if name in recording.columns else UNIT_IN_NAME.sub("", name)
 

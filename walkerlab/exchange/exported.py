@@ -47,7 +47,7 @@ class Exported:
     """Walker on its ground at the start of a walk, with walkerlab's simulation of that walk."""
 
     config: Config
-    scene: EngineScene  # walker and ground as other programs see them
+    scene: EngineScene  # walker and ground in the form that other programs need
     steps: int  # maximum number of steps of the walk
     walk: ContactWalkResult  # walk of the contact model from that start
     heights: Floats | None  # (footholds,) heights of uneven ground (m); None on even ground
@@ -124,7 +124,7 @@ class Exported:
         return tuple(pads)
 
     def lane_shift_m(self, foot: int) -> float:
-        """Distance (m) along the slope of a foot's pads from those of equal legs, whose steps are equally long."""
+        """Distance (m) along the slope by which a foot's pads are shifted because the steps of the two legs differ."""
         terrain = self.scene.ground.terrain
         return terrain.lanes[foot] - round(terrain.lanes[foot] / terrain.pitch) * terrain.pitch
 

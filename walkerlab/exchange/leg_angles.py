@@ -1,4 +1,4 @@
-"""Repair recorded leg angles before the search for heel strikes: full turns, swapped legs, outliers, signs, way back.
+"""Repair recorded leg angles before heel strikes are sought: full turns, swapped legs, outliers, signs, return walks.
 
 Each repair is listed in the doubts of the walk, with samples and times.
 """

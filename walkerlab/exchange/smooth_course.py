@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs, noise_of, typical_interval
 
 HIGHEST_DEGREE: Final = 7  # degree of the polynomial through a step; its error is 0.1 mrad for straight legs
-SAMPLES_PER_DEGREE: Final = 3  # samples of a step for each degree above 1
+SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree of its polynomial above 1
 FAR_PERCENT: Final = 80  # percentile of the angle between the legs above which they count as far apart
 SEARCH_RANGE: Final = 0.3  # time before and after a first guess of a strike to search, as a fraction of a step
 MARGIN: Final = 0.2  # time around the neighbouring strikes that the fit of a strike leaves out, as a fraction of a step
@@ -28,7 +28,7 @@ FASTEST: Final = 6.0  # fastest motion between two samples, as a multiple of fas
 BRIEF: Final = 0.25  # shortest time of a leg far ahead, as a fraction of long ones
 LONGEST: Final = 0.3  # longest stretch off the course, as a fraction of a step; a longer one is a lasting jump
 BORDER: Final = 0.1  # part of a step at the far end of a fit that other fits cover
-LASTING: Final = 0.15  # the same for lasting jumps
+LASTING: Final = 0.15  # as `BORDER`, for lasting jumps
 LENGTHS: Final = 16  # number of lengths of a stretch that are tried first
 FIRST_TRIALS: Final = 25  # number of instants tried for a strike
 NEXT_TRIALS: Final = (9,)  # numbers of instants tried around the best

@@ -207,9 +207,10 @@ def add_bias(fit: Fit, t: Array, y: Array, at: float, degree: int) -> Fit:
 
 
 def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
-    """Fit polynomials that meet at an instant, without a side that has too few samples, or None if both have.
+    """Fit polynomials before and after an instant that meet there, or return None if both sides have too few samples.
 
-    Few samples on a side, as where a recording begins just before a strike, would bend the other side to a low degree.
+    A side with too few samples, for example where a recording begins just before a strike, is not fitted, because
+    it would force a low degree on the other side.
     """
     both = {"before": t < at, "after": t >= at}
     fewest = max(degree + 1, LOPSIDED * max(int(np.sum(side)) for side in both.values()))

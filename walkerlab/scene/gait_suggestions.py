@@ -119,7 +119,7 @@ def rigid_alone(scene: RigidConfig) -> Config:
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
-    """Return the distance (m) of the feet ahead of the shanks with the most stable gait, and this gait, or None."""
+    """Find how far ahead of the shanks (m) the feet have to be for the most stable gait, and this gait, if any."""
     candidates = []
     for ahead_m in feet_ahead(config):
         walker = Parameter(f"walker.{FOOT_KEY}", "m", ("walker", FOOT_KEY)).vary(config, rigid_walker)(ahead_m)

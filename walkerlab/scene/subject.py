@@ -96,7 +96,7 @@ def find_model_gait(
     if answer.gait is None:
         raise NoAnswer(f"no gait of the contact model: {answer.reason}", answer.advice)
     if require_contact(config).terrain == "checkerboard":
-        note("the contact model walks on after-mid-swing ground, as pads would end disturbed walks")
+        note("the contact model walks on after-mid-swing ground, because pads would end disturbed walks")
     length = float(answer.gait.lengths_m.mean())
     z = contact_map(config, SLOPE, 1.0, length).scale_section(answer.gait.z)
     return ModelUnderTest(CONTACT, config, z, length)

@@ -44,7 +44,7 @@ from walkerlab.scene.rigid import rigid_walker, state_names
 SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L and g of 1
 SAME_GAIT: Final = 1e-6
 CHOSEN: Final = "chosen"
-SMALL_VALUE: Final = 1e-3  # of a printed value, below which differences count absolutely
+SMALL_VALUE: Final = 1e-3  # smallest printed value whose differences are relative to it, not absolute
 OF_GAITS: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
     "energy_J", "energy_drift_J", "cost_of_transport", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m",

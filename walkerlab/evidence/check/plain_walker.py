@@ -215,7 +215,10 @@ class PlainWalker:
         return float(state[SWING] - state[SHANK])
 
     def energy(self, phase: str, state: Floats) -> float:
-        """Return kinetic plus potential energy (J). Heights are from where an upright stance leg touches the slope."""
+        """Return kinetic plus potential energy (J).
+
+        Heights are measured from the point where an upright stance leg touches the slope.
+        """
         Z = self.reduction(phase)
         angles, omega = np.reshape(state, (2, -1)) @ Z.T
         levers = self.phases[phase].levers

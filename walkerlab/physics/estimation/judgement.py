@@ -116,7 +116,7 @@ def name_and_unit(quantity: str) -> tuple[str, str]:
 
 
 def alternation_of(residuals: Floats) -> float:
-    """Return how much odd and even steps differ, as a normal deviate with the same tail probability as Student's t."""
+    """Test whether odd and even steps differ. Return the normal deviate with the tail probability of Student's t."""
     odd = residuals[::2]
     even = residuals[1::2]
     if min(odd.size, even.size) < 2:

@@ -309,7 +309,8 @@ def noise_at(logs: Floats, sources: tuple[int, ...], leg_length_m: float = 1.0) 
 def whitening(data: Linearised, noise: Noise) -> Callable[[Floats], Floats]:
     """Return a function that whitens values (values,), or columns (values, n), of a walk with this noise.
 
-    It makes values of covariance G D^2 G^T + noise^2 independent, of unit variance, with D the disturbances' spread.
+    Values with the covariance G D^2 G^T + noise^2, where D is the spread of the disturbances, become independent and
+    of unit variance.
     """
     scale = 1.0 / noise.measurement[data.quantity]
     U, s, _ = np.linalg.svd(data.G * data.spread(noise) * scale[:, None], full_matrices=False)

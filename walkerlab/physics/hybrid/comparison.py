@@ -135,7 +135,7 @@ def add_strike_samples(motion: Motion) -> Motion:
 
 
 def jumps_among(times: Array, time: float, strikes: Array, close: float) -> bool:
-    """Whether a strike lies in the interval spanned by `times` and `time`, more than `close` (s) from `time`."""
+    """Whether a strike occurs between any of `times` and `time`. Strikes within `close` (s) of `time` do not count."""
     between = (strikes > min(times[0], time)) & (strikes < max(times[-1], time)) & (np.abs(strikes - time) > close)
     return bool(between.any())
 

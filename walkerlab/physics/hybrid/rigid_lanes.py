@@ -219,8 +219,8 @@ def load_state(rows: Any, row: int) -> tuple[Lanes, Lanes, Lanes, Lanes]:
 def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     """Try a solver step in every lane, accept it where no event is possible, and return whether a lane needs attention.
 
-    Attention is due if the solver step may contain an event or ends at one, time is over, or solver steps are too many
-    or too small.
+    A lane needs attention if the solver step may contain an event or ends at one, the time is over, or solver steps are
+    too many or too small.
     """
     rows = memory.rows
     y = load_state(rows, START_STATE)

@@ -55,7 +55,7 @@ def rigid_on_level_ground(assembly: Assembly, gravity: float, knee_locked_at_str
         raise ValueError(
             "only one leg has a knee, which must be locked during heel strike (knee.at_heel_strike: locked)"
         )
-    # lengths and falls are scaled by the length of leg 1, which stands in the second model
+    # Lengths and falls are scaled by the length of leg 1. In the second model leg 1 is the stance leg.
     return pair(models[0].changed(leg_length=models[1].leg_length), models[1])
 
 

@@ -208,7 +208,9 @@ class BranchTracer:
         return GaitBranch(period, tuple(points), (first, end), tuple(bifurcations), tuple(crossings))
 
     def check_after(self, last: CurvePoint[Cycle]) -> Callable[[CurvePoint[Cycle]], bool]:
-        """Return a check of the next point: multipliers near the unit circle move little, and all steps are needed."""
+        """Return a test of the next point: multipliers near the unit circle move little, and no shorter gait is
+        reached.
+        """
         # A pair of crossings is missed if multipliers move far. A gait of fewer steps solves the equations too, and a
         # long step may reach it. Its branch meets this one only at a flip, where a multiplier of the cycle is 1.
         critical = [m for m in last.evaluated.data.multipliers if 1.0 / CRITICAL_RANGE < abs(m) < CRITICAL_RANGE]
@@ -307,7 +309,7 @@ class BranchFollower(BranchTracer):
                     (*reversed(behind.bifurcations), *branch_ahead.bifurcations),
                     (*reversed(behind.crossings), *branch_ahead.crossings),
                 )
-            # `lies_on` misses gaits beyond a branch's ends, so look for the branch's own gaits on the new one
+            # `lies_on` misses gaits beyond a branch's ends, so known gaits are also sought on the new branch.
             within = [branch for branch in like if self.covers(branch_ahead, branch)]
             if all(branch.reach < branch_ahead.reach and branch not in previous for branch in within):
                 branches = [*(branch for branch in branches if branch not in within), branch_ahead]

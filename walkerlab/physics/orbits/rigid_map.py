@@ -73,8 +73,8 @@ SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
 NO_RESIDUAL = 1e300
 NEAR_RESIDUAL = 1e-6
-# A start counts as a known gait within this distance of it, if a Newton move with that gait's derivative leaves at
-# most this fraction of the distance.
+# A start within this distance of a known gait leads to that gait if a Newton move with the gait's derivative reduces
+# the distance to this fraction or less.
 RECOGNITION_DISTANCE = 0.1
 RECOGNITION_RESIDUAL = 0.1
 # results other than the index of a known gait

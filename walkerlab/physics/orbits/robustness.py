@@ -63,7 +63,7 @@ class GaitOnMap(NamedTuple):
 
     @property
     def leg(self) -> int:
-        """The leg, 1 or 2, that swings in the first step that can be disturbed."""
+        """Leg (1 or 2) that swings in the first step that a disturbance can affect."""
         return 1 + (self.swing + self.step_map.disturbs_after) % 2
 
     def stride(self, z: Floats, p: float, derived: bool = True) -> Cycle:

@@ -1,4 +1,4 @@
-"""The `identify` block as `identify` and `plan` read it: parameters to estimate, priors, models and their checks."""
+"""Checks of the `identify` block that the stages `identify` and `plan` share: parameters, priors and models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Content of results: a summary, and labelled arrays in groups, built from rows. It knows no files and no HDF5."""
+"""Content of results: a summary, and labelled arrays in groups, built from rows, independent of files and HDF5."""
 
 import hashlib
 import math

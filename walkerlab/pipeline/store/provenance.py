@@ -1,4 +1,4 @@
-"""Provenance of results: software, machine, time and command. Recorded, but not part of the key."""
+"""Provenance of results: software, machine, time and command. It is recorded but is not part of the key."""
 
 import datetime
 import importlib.metadata

@@ -329,7 +329,8 @@ PUSH_SHARE = 0.3
 """Time for which an animation shows a push-off (s), and length of the mark relative to the leg."""
 FILM_SIZE = (6.4, 3.6)
 FILM_DPI = 100
-"""Size (in) and resolution (pixels per in) of a frame: both sides are even, as video formats require."""
+"""Size (in) and resolution (pixels per in) of a frame. Video formats require an even number of pixels along both sides.
+"""
 STEPS_SHOWN = 4
 RELIEF = 0.04
 RELIEF_UNDER = 0.075
