@@ -22,9 +22,9 @@ from walkerlab.pipeline.stages.numerical_error import SAMPLE
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import remove_timings
 from walkerlab.pipeline.store.files import refused
-from walkerlab.pipeline.store.runs import RunFolder
+from walkerlab.pipeline.store.runs import CHUNKS, RunFolder
 from walkerlab.pipeline.sweeps import sweep as sweeps
-from walkerlab.pipeline.sweeps.chunk import FOLDER, Chunk, PointResult, compute_point, flatten_summary, omit_outputs
+from walkerlab.pipeline.sweeps.chunk import Chunk, PointResult, compute_point, flatten_summary, omit_outputs
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
 from walkerlab.pipeline.sweeps.result import Merge, as_csv, last_of_each
 from walkerlab.views.report.sweep_page import summary_lines
@@ -198,7 +198,7 @@ def test_shared_inputs_of_points_are_computed_once(toy, marks):
 
 def test_damaged_chunk_is_recomputed(toy, marks):
     first = toy.run("drop", GRAVITIES)
-    chunks = sorted((toy.runs / "paper" / FOLDER).iterdir())
+    chunks = sorted((toy.runs / "paper" / CHUNKS).iterdir())
     for path in chunks:
         path.write_bytes(path.read_bytes()[:-1])
     warnings = []
