@@ -54,9 +54,14 @@ def _different(base: dict[str, Any], changed: dict[str, Any]) -> dict[str, Any]:
 
 def to_commented_yaml(config: Config, left_alone: Collection[str] = ()) -> str:
     """Write a config as YAML with meaning, bounds and unit above each key, without the top-level keys `left_alone`."""
-    values = config.model_dump(mode="json", exclude=set(left_alone))
-    lines = [*_commented(config, values, ""), *(f"# {name}: {ELSEWHERE.format(name)}" for name in left_alone)]
-    return "".join(f"{line}\n" for line in lines)
+    kept = [name for name in type(config).model_fields if name not in left_alone]
+    return commented_keys(config, kept) + "".join(f"# {name}: {ELSEWHERE.format(name)}\n" for name in left_alone)
+
+
+def commented_keys(config: Config, names: Collection[str]) -> str:
+    """Write only some top-level keys of a config, as `to_commented_yaml` does."""
+    values = config.model_dump(mode="json", include=set(names))
+    return "".join(f"{line}\n" for line in _commented(config, values, ""))
 
 
 def _commented(block: Block, values: dict[str, Any], indent: str, path: str = "") -> Iterator[str]:

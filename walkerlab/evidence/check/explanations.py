@@ -213,6 +213,8 @@ def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
 
 def closest(question: Question, attempts: Sequence[Attempt]) -> dict[str, Any] | None:
     """Return the cause that brings a gait much closer to the printed values, or None if no cause does."""
+    if not question.quick_items:
+        return None
     without = question.miss(question.right, question.quick_items)
     distances = ((question.miss(each.gait, question.quick_items), each) for each in attempts)
     miss, attempt = min(distances, default=(math.inf, None), key=itemgetter(0))

@@ -30,7 +30,7 @@ def spell_name(name: str) -> str:
         return part.replace("_", " ")
     if quantity == "state_before":
         return f"{part.replace('_', ' ')} before"
-    return f"{quantity}, {part}" if part else quantity
+    return f"{quantity} {part}" if part else quantity
 
 
 def answer(summary: Row) -> list[str | Table]:
@@ -76,6 +76,8 @@ def headline(summary: Row) -> str:
     if len(rows) == 1:
         return "Different, unexplained: the printed value differs, and one value does not tell why."
     what = f"{len(wrong)} of {len(rows)} printed values differ"
+    if len(explanations) == 1:
+        return f"Different, partly explained: {follow(explanations[0], rows)} if {explanations[0]['what']}."
     if explanations:
         return f"Different, partly explained: {what}, and no cause found reproduces more than some of them."
     return f"Different, unexplained: {what}, and no known convention, mistake or misprint reproduces them all."
@@ -94,7 +96,7 @@ def remarks(summary: Row) -> Iterator[str]:
     """Yield sentences about explanations, periodicity, momenta, the nearest gait and the two routes."""
     rows = summary["values"]
     explanations = summary["explanations"]
-    if explanations and not (summary["finding"] == EXPLAINED and len(explanations) == 1):
+    if len(explanations) > 1:
         for place, each in enumerate(explanations, 1):
             yield f"{place}. {each['kind'].capitalize()}: {follow(each, rows)} if {each['what']}."
     if summary["undecided"]:

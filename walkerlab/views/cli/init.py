@@ -10,13 +10,12 @@ from walkerlab.config.loader import load, safe_name
 from walkerlab.config.problems import explain_missing_feature, suggestion
 from walkerlab.config.reference import as_json_schema
 from walkerlab.config.schema import QUESTIONS, Config
-from walkerlab.config.writer import to_commented_yaml
+from walkerlab.config.writer import commented_keys, to_commented_yaml
 from walkerlab.errors import ConfigError, StorageError
 from walkerlab.pipeline.store.files import make_folder, write_atomically
 
 SCHEMA = ".walkerlab-schema.json"
-
-
+PRINTED_WITH_GAITS: Final = ("name", "walker", "gravity_m_s2", "slope_rad")
 CHECK_TO_FILL_IN: Final = """
 check:                               # a printed gait; `walkerlab check` says whether it is right, and if not, why
   source: {title: null, authors: null, year: null, where: null}
@@ -36,18 +35,22 @@ check:                               # a printed gait; `walkerlab check` says wh
 
 
 def write_config(file: Path, walker: str, checks: bool = False) -> str:
-    """Write a walker's commented config and schema. `checks` adds a block `check` to fill in.
+    """Write a walker's commented config and schema, or with `checks` a short one with a printed gait to fill in.
 
     Raises ConfigError for an unknown type, StorageError if writing fails.
     """
-    config = load(Path(template(walker))).config
+    builtin = template(walker)
+    config = load(Path(builtin)).config
     if file.exists():
         raise StorageError(f"{file} already exists.", "Choose another name; nothing was overwritten.")
     default = Config()
     untouched = [name for name in QUESTIONS if getattr(config, name) == getattr(default, name)]
     renamed = config.model_copy(update={"name": safe_name(file.stem), "source": None})
-    text = f"# yaml-language-server: $schema={SCHEMA}\n{to_commented_yaml(renamed, untouched)}"
-    text += CHECK_TO_FILL_IN if checks else ""
+    text = f"# yaml-language-server: $schema={SCHEMA}\n"
+    if checks:
+        text += f"extends: {builtin}\n{commented_keys(renamed, PRINTED_WITH_GAITS)}{CHECK_TO_FILL_IN}"
+    else:
+        text += to_commented_yaml(renamed, untouched)
     command = f"`walkerlab {'check' if checks else 'report -c'} {shlex.quote(str(file))}`"
     following = f"fill in what is printed, then {command}" if checks else command
     try:
