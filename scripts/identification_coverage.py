@@ -1,13 +1,14 @@
 """Identify walkers from synthetic walks and compare errors with the spread of the estimates.
 
 Usage: python scripts/identification_coverage.py [WALKS, 1000 by default] [steps | angles | contact] [CONFIG ...]
-       [--disturbed-by floor | kicks | pushes | slope]
+       [--disturbed-by floor | kicks | pushes | slope] [--noise normal | correlated | heavy-tailed]
 
 Walks start off the gait, are disturbed on their way, and are measured with noise; `contact` are steps of the contact
 model. The disturbance is a rough floor; random changes of the rates at each heel strike; random pushes at the hip in
-the middle of each swing; or a slope that varies smoothly along the ramp. Printed for each walker: the number of walks
-that took all steps and that the model fits, and the share without doubt; the share whose 95 % region holds the truth,
-with its binomial error; and for each parameter the mean standard error over the spread of the estimates.
+the middle of each swing; or a slope that varies smoothly along the ramp. Correlated noise forgets its past within
+`MEMORY` values; heavy-tailed noise is Student's t with three degrees of freedom. Printed for each walker: the number of
+walks that took all steps and that the model fits, and the share without doubt; the share whose 95 % region holds the
+truth, with its binomial error; and for each parameter the mean standard error over the spread of the estimates.
 """
 
 import argparse
@@ -55,6 +56,23 @@ less."""
 KICK, RAMP, WAVE, PUSH, MIDDLE = 2e-3, 1e-4, 7.0, 5e-4, 0.4
 """Changes of the rates at heel strikes, as a fraction of the rates; largest change of a varying slope's rise per step,
 in leg lengths; steps of its wave; pushes, as a fraction of m sqrt(g l), and when in a gait's step they come."""
+
+
+MEMORY = 10
+
+
+def noise_of(kind, draw, shape):
+    """Draw noise of unit variance, (values, ...), of one of the three kinds."""
+    if kind == "heavy-tailed":
+        return draw.standard_t(3, shape) / math.sqrt(3.0)
+    white = draw.normal(size=shape)
+    if kind == "normal":
+        return white
+    kept = math.exp(-1.0 / MEMORY)
+    rows = [white[0]]
+    for row in white[1:]:
+        rows.append(kept * rows[-1] + math.sqrt(1.0 - kept**2) * row)
+    return np.array(rows)
 
 
 def kicked_walk(walks, z, p, kick, draw):
@@ -113,7 +131,7 @@ def walk_in_parts(walks, unit, z, parts_of):
 class Truth:
     """A walker of a config, and synthetic walks of it."""
 
-    def __init__(self, name, keys, level="steps", disturbed_by="floor"):
+    def __init__(self, name, keys, level="steps", disturbed_by="floor", noise="normal"):
         self.config, self.keys, self.level = load(Path(name)).config, keys, level
         self.gait = run_in_memory("fixedpoint", self.config).summary
         self.model = CONTACT if level == "contact" else RIGID
@@ -123,7 +141,7 @@ class Truth:
         self.z, self.leg = subject.z, self.config.walker.leg_length_m
         self.values, self.clock = np.array(self.family.start), math.sqrt(self.leg / (self.config.gravity_m_s2 / 9.81))
         self.start_change, self.roughness = DISTURBANCES.get(name, DISTURBANCE)
-        self.disturbed_by = disturbed_by
+        self.disturbed_by, self.noise = disturbed_by, noise
 
     def walk(self, seed):
         """Measure a walk; None if it ends early. Returns also a weighing of the last parameter."""
@@ -136,13 +154,15 @@ class Truth:
         if walked is None:
             return None
         periods, lengths, sampled = walked
-        noisy = periods + draw.normal(0.0, NOISE[0] * self.clock, STEPS)
+        noisy = periods + NOISE[0] * self.clock * noise_of(self.noise, draw, STEPS)
         if self.level != "angles":
-            return MeasuredWalk(noisy, lengths + draw.normal(0.0, NOISE[1] * self.leg, STEPS)), weighed
+            return MeasuredWalk(noisy, lengths + NOISE[1] * self.leg * noise_of(self.noise, draw, STEPS)), weighed
         touches = np.append(0.0, np.cumsum(periods))
         times = np.arange(0.0, touches[-1] * (1.0 - 1e-9), 2e-3 * self.clock)
         angles = sampled(times)
-        return split_into_steps(times, angles + draw.normal(0.0, ANGLE_NOISE, angles.shape), touches), weighed
+        return split_into_steps(
+            times, angles + ANGLE_NOISE * noise_of(self.noise, draw, angles.shape), touches
+        ), weighed
 
     def take_disturbed_walk(self, z, heights, draw):
         """Return periods, lengths and a function that samples the angles of a walk; None if it ends early."""
@@ -194,23 +214,24 @@ def coverage(truth, seeds):
     return np.array(inside), np.array(estimates), np.array(errors), np.array(fits)
 
 
-def coverage_on_all_cores(name, level, walks, disturbed_by):
+def coverage_on_all_cores(name, level, walks, disturbed_by, noise):
     """Return the same for seeds 0 to walks, with a process for each core."""
     cores = os.process_cpu_count() if hasattr(os, "process_cpu_count") else os.cpu_count()
     with ProcessPoolExecutor(cores) as pool:
-        parts = pool.map(coverage_of, [(name, level, disturbed_by, range(core, walks, cores)) for core in range(cores)])
+        tasks = [(name, level, disturbed_by, noise, range(core, walks, cores)) for core in range(cores)]
+        parts = pool.map(coverage_of, tasks)
         return (np.concatenate(columns) for columns in zip(*parts, strict=True))
 
 
 def coverage_of(task):
-    name, level, disturbed_by, seeds = task
-    return coverage(Truth(name, WALKERS[name], level, disturbed_by), seeds)
+    name, level, disturbed_by, noise, seeds = task
+    return coverage(Truth(name, WALKERS[name], level, disturbed_by, noise), seeds)
 
 
-def main(walks, level, names, disturbed_by):
+def main(walks, level, names, disturbed_by, noise):
     for name in names:
         begun = time.perf_counter()
-        inside, estimates, errors, fits = coverage_on_all_cores(name, level, walks, disturbed_by)
+        inside, estimates, errors, fits = coverage_on_all_cores(name, level, walks, disturbed_by, noise)
         share, spread = inside.mean(), estimates.std(axis=0, ddof=1)
         ratios = np.sqrt((errors**2).mean(axis=0)) / spread
         print(
@@ -227,5 +248,6 @@ if __name__ == "__main__":
     parser.add_argument("level", nargs="?", default="steps", choices=("steps", "angles", "contact"))
     parser.add_argument("configs", nargs="*")
     parser.add_argument("--disturbed-by", default="floor", choices=("floor", "kicks", "pushes", "slope"))
+    parser.add_argument("--noise", default="normal", choices=("normal", "correlated", "heavy-tailed"))
     options = parser.parse_args()
-    main(options.walks, options.level, options.configs or WALKERS, options.disturbed_by)
+    main(options.walks, options.level, options.configs or WALKERS, options.disturbed_by, options.noise)

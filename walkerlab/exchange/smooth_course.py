@@ -291,8 +291,9 @@ class Course:
         return self.guesses[place]
 
     def part(self, first_s: float, last_s: float, span_s: tuple[float, float]) -> Strike:
-        near = (self.time >= first_s) & (self.time <= last_s)
-        at_ends = bool(near[0]), bool(near[-1])
+        first, end = int(np.searchsorted(self.time, first_s)), int(np.searchsorted(self.time, last_s, "right"))
+        near = slice(first, end)
+        at_ends = first == 0, end == self.time.size
         return Strike(self.time[near], self.angle[near], self.rows[near], span_s, self.step_s, at_ends)
 
 

@@ -169,10 +169,16 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
 
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
     """Return the samples around an instant (times from it, and angles), with more of the step if samples are sparse."""
-    away = np.abs(time - near)
-    wanted = float(np.partition(away, min(2 * MIN_SAMPLES, away.size) - 1)[min(2 * MIN_SAMPLES, away.size) - 1])
-    inside = away <= max(WINDOW * period, min(wanted, WIDEST * period))
-    return time[inside] - near, angle[inside]
+    place = int(np.searchsorted(time, near))
+    away = np.sort(np.abs(time[max(0, place - 2 * MIN_SAMPLES) : place + 2 * MIN_SAMPLES] - near))
+    wanted = float(away[: 2 * MIN_SAMPLES][-1])
+    rows = rows_within(time, near, max(WINDOW * period, min(wanted, WIDEST * period)))
+    return time[rows] - near, angle[rows]
+
+
+def rows_within(time: Array, instant: float, half: float) -> slice:
+    """Return the samples within half a span of time before and after an instant."""
+    return slice(int(np.searchsorted(time, instant - half)), int(np.searchsorted(time, instant + half, "right")))
 
 
 def touch_of(fit: Fit, height: Height, time: float, leg: int) -> Touch:
@@ -248,7 +254,7 @@ def angles_at_jumps(
     """
     half = min(max(JUMP_WINDOW * period, JUMP_SAMPLES * float(np.median(np.diff(time)))), WIDEST * period)
     inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
-    near = [(touch.time_s, np.abs(time - touch.time_s) <= half) for touch in inside]
+    near = [(touch.time_s, rows_within(time, touch.time_s, half)) for touch in inside]
 
     def fits_at(shift: float) -> list[Fit]:
         fits = (fit_of_degree(time[rows] - instant, angle[rows], shift, JUMP_DEGREE) for instant, rows in near)

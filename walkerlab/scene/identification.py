@@ -9,17 +9,18 @@ from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+from scipy.special import fdtrc
 
 from walkerlab.config.fields import value_at
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit
-from walkerlab.physics.estimation.information import information_on, open_combinations
+from walkerlab.physics.estimation.information import information_on, open_combinations, robust_covariance
 from walkerlab.physics.estimation.judgement import judge
 from walkerlab.physics.estimation.measured_multipliers import measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
-from walkerlab.physics.estimation.mixed_model import estimate_noise, evaluate, reduce
+from walkerlab.physics.estimation.mixed_model import Reduced, estimate_noise, evaluate, reduce
 from walkerlab.physics.estimation.prediction import DELAY, EXACT_STEP, NUISANCES, Forecast, felt_directions
 from walkerlab.physics.estimation.result import (
     USABLE,
@@ -72,6 +73,10 @@ MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of 
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
 DECISIVE_GAIN: Final = 3.0  # of the log-likelihood, beyond which one more parameter explains the walk better
+PROMISING_GAIN: Final = 1.0  # of the log-likelihood with the noise as it is, below which one more is not pursued
+MOST_FREED: Final = 3  # number of parameters that are freed in turn
+SMALLEST_CHANGE: Final = 1e-4  # of a freed parameter, in its scale, that explains anything
+RARE_GAIN: Final = 0.03  # probability of a gain in right walks, with as many values, above which it is no surprise
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
@@ -239,7 +244,8 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
     fixed = [*fixed_parameters(subject, question, best)]
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
-        reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggest_parameter(fixed, best, len(keys)))
+        suggested = suggest_parameter(subject, keys, fixed, best)
+        reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
     dof = max(1, best.data.residuals.size - best.u.size)
     gait = gait_with_errors(best, information.covariance, subject.units if question.robustness else None)
@@ -301,38 +307,70 @@ def describe_pull(pull: Pull) -> str:
     )
 
 
-def suggest_parameter(others: Sequence[Fixed], fitted: Fitted, parameters: int) -> Iterator[str]:
-    """Yield the fixed parameter or nuisance that would raise the log-likelihood most if it were estimated as well.
+def suggest_parameter(
+    subject: ModelUnderTest, keys: Sequence[str], others: Sequence[Fixed], fitted: Fitted
+) -> Iterator[str]:
+    """Yield a fixed parameter or nuisance that would raise the log-likelihood if it were estimated as well.
 
-    The gain is that of a linearised step with new standard deviations. It is reduced by the fraction of the values that
-    the unknowns use up, since any additional parameter fits a short walk better.
+    Any additional parameter fits a short walk better, so the gain must also be a rare one for as many values.
     """
     data = fitted.data
-    problem = fitted.problem
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
-    remaining = (data.residuals.size - fitted.u.size - 1) / data.residuals.size
-    best = fitted.evaluation.likelihood
-    wider = None
-    for other in others:
-        rows = reduce(replace(data, J=np.column_stack((data.J, other.slope)), prior=priors))
-        evaluation = evaluate(rows, fitted.noise)
-        moves = np.abs([*evaluation.move[:parameters], evaluation.move[-1] if other.value else 0.0])
-        if evaluation.likelihood > best and moves.max() < LINEAR_MOVE:
-            best = evaluation.likelihood
-            wider = (other, rows)
-    if wider is not None:
-        other, rows = wider
-        noise = estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise)
-        free = evaluate(rows, noise)
-        gain = free.likelihood - fitted.evaluation.likelihood
-        if gain * remaining > DECISIVE_GAIN:
-            start = NUISANCES.get(other.name, (other.value, 0.0))[0]
+    widened = [reduce(replace(data, J=np.column_stack((data.J, other.slope)), prior=priors)) for other in others]
+    gains = [evaluate(rows, fitted.noise).likelihood - fitted.evaluation.likelihood for rows in widened]
+    values = data.residuals.size
+    freedom = max(1, values - fitted.u.size - 1)
+    for index in np.argsort(gains)[: -MOST_FREED - 1 : -1].tolist():
+        other = others[index]
+        if gains[index] < PROMISING_GAIN:
+            return
+        gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
+        rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN
+        if gain > DECISIVE_GAIN and rare and abs(change) > SMALLEST_CHANGE:
+            before = NUISANCES.get(other.name, (other.value, 0.0))[0]
             option = "--nuisance" if other.name in NUISANCES else "--fit"
-            value = add_unit(f"{start + free.move[-1] * other.scale:.4g}", other.unit)
+            after = add_unit(f"{before + change * other.scale:.4g}", other.unit)
             yield (
-                f"{other.name} of {value} instead of {start:.4g} would raise the log-likelihood by about {gain:.3g}: "
+                f"{other.name} of {after} instead of {before:.4g} would raise the log-likelihood by about {gain:.3g}: "
                 f"estimate it as well ({option} {other.name})"
             )
+            return
+
+
+def gain_of_freeing(
+    subject: ModelUnderTest, keys: Sequence[str], other: Fixed, rows: Reduced, fitted: Fitted
+) -> tuple[float, float]:
+    """Return how much the log-likelihood rises if one more parameter is estimated, and the change of this parameter.
+
+    The change is in the parameter's scale. Both are those of a linearised step with new standard deviations or, if the
+    step is long, of a new fit.
+
+    rows  data of the walk, with the derivative for one more parameter
+    """
+    problem = fitted.problem
+    count = len(keys)
+    step = evaluate(rows, fitted.noise).move
+    if np.abs([*step[:count], step[-1] if other.value else 0.0]).max() < LINEAR_MOVE:
+        free = evaluate(rows, estimate_noise(rows, problem.floors, problem.leg_length_m, fitted.noise))
+        return float(free.likelihood - fitted.evaluation.likelihood), float(free.move[-1])
+    if other.name in NUISANCES or subject.model != RIGID:
+        return 0.0, 0.0
+    start = np.insert(fitted.u, count, other.value / other.scale)
+    refitted = fit(free_parameter(subject, (*keys, other.name), problem), start)
+    if not isinstance(refitted, Fitted):
+        return 0.0, 0.0
+    gain = refitted.evaluation.likelihood - fitted.evaluation.likelihood
+    return float(gain), float(refitted.u[count] - start[count])
+
+
+def free_parameter(subject: ModelUnderTest, keys: Sequence[str], problem: FitProblem) -> FitProblem:
+    """Return a problem that fits one more parameter, the last of `keys`."""
+    family = ConfigFamily(subject.config, keys)
+    forecast = replace(
+        problem.forecast, walks=step_map_of(subject, family), admits=family.admits, scales=family.scales()
+    )
+    bounds = [*problem.bounds, (-math.inf, math.inf)]
+    return replace(problem, forecast=forecast, start=family.start, bounds=bounds)
 
 
 def sensitivities(
@@ -400,7 +438,7 @@ def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted
 def nuisances_with_errors(fitted: Fitted, names: Sequence[str]) -> dict[str, Uncertain]:
     """Return the estimated properties of clock and sensors with their standard errors."""
     forecast = fitted.forecast
-    variances = np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True))
+    variances = np.diag(robust_covariance(fitted, np.eye(fitted.u.size)))
     by_name = dict(zip(forecast.nuisances, variances[forecast.unknowns - len(forecast.nuisances) :], strict=True))
     values = forecast.sensors(fitted.u)
     return {name: Uncertain(values[name], NUISANCES[name][1] * math.sqrt(max(by_name[name], 0.0))) for name in names}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.physics.estimation.fit import Fitted
-from walkerlab.physics.estimation.mixed_model import Evaluation, evaluate, noise_at
+from walkerlab.physics.estimation.mixed_model import LOST_INFORMATION, Evaluation, evaluate, noise_at, whitening
 from walkerlab.physics.estimation.result import Information, Unidentifiable
 from walkerlab.physics.solvers.system import Floats
 
@@ -30,9 +30,54 @@ LOADED: Final = 0.1
 def information_on(fitted: Fitted, keys: tuple[str, ...]) -> Information:
     """Return a fit's information about its parameters."""
     values_count = fitted.data.residuals.size + len(fitted.data.prior)
-    plain = information_from(fitted.evaluation.information, keys, fitted.forecast.scales, values_count)
+    scales = fitted.forecast.scales
+    plain = information_from(fitted.evaluation.information, keys, scales, values_count)
     basis = plain.directions[~is_open(plain.singular_values)]
-    return replace(plain, freedom=effective_freedom(fitted, plain, basis), contributions=contributions(fitted, basis))
+    result = replace(plain, freedom=effective_freedom(fitted, plain, basis), contributions=contributions(fitted, basis))
+    groups = fitted.forecast.half_steps
+    if not groups.size:
+        return result
+    determined = np.eye(fitted.u.size)
+    determined[: len(keys), : len(keys)] = basis.T @ basis
+    covariance = robust_covariance(fitted, determined)[: len(keys), : len(keys)]
+    freedom = min(result.freedom, float(max(1, groups.max() + 1 - fitted.u.size)))
+    return replace(result, freedom=freedom, **in_units(covariance, scales))
+
+
+def robust_covariance(fitted: Fitted, along: Floats) -> Floats:
+    """Return the covariance (unknowns, unknowns) of unknowns that change only along columns (unknowns, n).
+
+    Errors of successive angles may go together. They count as independent from one half step, and one leg, to the next.
+    This is the sandwich estimator with jackknifed groups (CR3), where it is larger than the covariance of independent
+    errors. Without angles over time, all errors are independent.
+
+    Source: Bell and McCaffrey, Survey Methodology 28 (2002).
+    """
+    values, vectors = np.linalg.eigh(along.T @ fitted.evaluation.information @ along)
+    kept = values > LOST_INFORMATION * values.max()
+    root = along @ (vectors[:, kept] / np.sqrt(values[kept]))
+    groups = fitted.forecast.half_steps
+    if not groups.size:
+        return np.asarray(root @ root.T)
+    data = fitted.data
+    whiten = whitening(data, fitted.noise)
+    J = whiten(data.J @ root)
+    residuals = whiten(data.residuals - data.J @ fitted.evaluation.move)
+    meat = root.T @ fitted.rows.prior[1:, 1:] @ root
+    count = groups.max() + 1
+    for rows in (groups == group for group in range(count)):
+        # as if the fit had not followed the residuals of this group
+        score = np.linalg.solve(np.eye(len(meat)) - J[rows].T @ J[rows], J[rows].T @ residuals[rows])
+        meat += (1.0 - 1.0 / count) * np.outer(score, score)
+    values, vectors = np.linalg.eigh(meat)
+    root = root @ (vectors * np.sqrt(np.maximum(values, 1.0)))
+    return np.asarray(root @ root.T)
+
+
+def in_units(covariance: Floats, scales: Floats) -> dict[str, Any]:
+    """Return the covariance and the correlations of parameters from the covariance of scaled ones."""
+    errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return {"covariance": covariance * np.outer(scales, scales), "correlations": covariance / np.outer(errors, errors)}
 
 
 def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, values: int) -> Information:
@@ -44,10 +89,8 @@ def information_from(whole: Floats, keys: tuple[str, ...], scales: Floats, value
     directions = vectors[:, order].T
     basis = directions[~is_open(singular)]
     covariance = basis.T @ np.linalg.pinv(basis @ reduced @ basis.T, hermitian=True) @ basis
-    errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     freedom = float(max(1, values - len(whole)))
-    scaled = covariance * np.outer(scales, scales)
-    return Information(keys, covariance / np.outer(errors, errors), singular, directions, scaled, scales, freedom, {})
+    return Information(keys, singular, directions, scales=scales, freedom=freedom, **in_units(covariance, scales))
 
 
 def effective_freedom(fitted: Fitted, information: Information, basis: Floats) -> float:

@@ -94,15 +94,13 @@ def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
 def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     """Yield a reason to doubt the errors if averages over half steps scatter more than independent noise allows."""
     # Angles compared at fractions of steps inherit the errors of the measured heel strikes.
-    measured = fitted.forecast.measured
-    if not measured.sampled or fitted.forecast.in_phase:
+    groups = fitted.forecast.half_steps
+    if not groups.size:
         return
-    white = whitening(fitted.data, fitted.noise)(fitted.data.residuals).reshape(-1, 2)
-    half = 2 * measured.step + (measured.phase >= 0.5)
-    counts = np.bincount(half)
-    sums = np.array([np.bincount(half, leg) for leg in white.T])[:, counts > 0]
-    squares = float((sums**2 / counts[counts > 0]).sum())
-    freedom = max(1, sums.size - fitted.u.size)
+    counts = np.bincount(groups)
+    sums = np.bincount(groups, whitening(fitted.data, fitted.noise)(fitted.data.residuals))
+    squares = float((sums**2 / counts).sum())
+    freedom = max(1, counts.size - fitted.u.size)
     if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > MAX_DEPENDENCE:
         yield (
             f"residuals of successive angles are correlated (averages over half a step scatter "

@@ -121,6 +121,14 @@ class Forecast:
         sizes.append(self.measured.angles_rad.size)
         return np.repeat(np.arange(len(sizes)), sizes)
 
+    @cached_property
+    def half_steps(self) -> NDArray[np.int64]:
+        """Number (values,) of the half step and leg of each angle, or no values where steps or phases are compared."""
+        if self.in_phase or not self.measured.sampled:
+            return np.zeros(0, np.int64)
+        half = 2 * self.measured.step + (self.measured.phase >= 0.5)
+        return np.unique(2 * half[:, None] + [0, 1], return_inverse=True)[1].ravel()
+
     def parameters(self, u: Floats) -> tuple[float, ...]:
         return tuple((u[: self.scales.size] * self.scales).tolist())
 

@@ -56,16 +56,16 @@ class Information:
     """Information in a walk about the fitted parameters."""
 
     keys: tuple[str, ...]
-    correlations: Floats  # (parameters, parameters) correlations of the estimates
     # (parameters,) singular values of the sensitivity to scaled parameters, in standard deviations of the data, with
     # start and nuisances free
     singular_values: Floats
     directions: Floats  # (parameters, parameters) one row per singular value: components of the scaled parameters
     covariance: Floats  # (parameters, parameters) in the parameters' units, along determined directions
+    correlations: Floats  # (parameters, parameters) correlations of the estimates
     scales: Floats  # (parameters,) typical changes, in the parameters' units
     freedom: float  # degrees of freedom of Student's t for the errors
     # fraction of the information due to each measured quantity, averaged over determined directions
-    contributions: dict[str, float]
+    contributions: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
