@@ -105,7 +105,6 @@ def scene_on_pads(
     Raises NoAnswer if their pitch needs a contact gait and none is found.
     """
     own = None
-    require_known_legs(config)
     if wants_own_pitch(require_contact(config)):
         answer = answer or contact_gait(config, rigid_step, rigid_state)
         if answer.gait is None:
@@ -115,16 +114,6 @@ def scene_on_pads(
             first, second = lengths_between_touches(answer.gait)
             asymmetry = float((second - first) / own)
     return contact_scene(config, rigid_step, own, asymmetry)
-
-
-def require_known_legs(config: ContactConfig) -> None:
-    """Raise ConfigError for a leg with a knee beside one without, which the contact model does not know."""
-    if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
-        raise ConfigError(
-            "the contact model needs two legs of one kind, both with a knee or both without.",
-            "The rigid model walks with one knee: `walkerlab fixedpoint`, `walkerlab simulate`.",
-            ("walker",),
-        )
 
 
 def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:
