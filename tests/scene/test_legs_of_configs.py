@@ -15,11 +15,14 @@ from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
 from walkerlab.physics.orbits.contact_map import lengths_between_touches
 from walkerlab.physics.orbits.fixed_point import find_gaits
+from walkerlab.physics.orbits.step_map import walk_steps
 from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import contact_sim, continuation
 from walkerlab.scene.contact import contact_gait, scene_on_pads, start_state, tolerances_of
+from walkerlab.scene.families import contact_map
+from walkerlab.scene.parameter import SLOPE
 from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import have_different_legs, rigid_walker
 
@@ -235,13 +238,51 @@ def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     assert content.summary["bifurcations"] == []
 
 
-def test_the_contact_model_refuses_one_knee_beside_a_straight_leg():
+def test_an_export_of_one_knee_beside_a_straight_leg_is_refused():
     config = config_of("kneed", f"walker.leg_2={PEG}")
     assert rigid_walker(config).legs_differ
     with pytest.raises(ConfigError, match="both with a knee or both without"):
-        scene_on_pads(config, 0.4, (0.0,) * 6)
-    with pytest.raises(ConfigError, match="both with a knee or both without"):
         prepare_export(config, 0.4, (0.0,) * 6)
+
+
+ONE_KNEE_GROUND = (
+    "contact={stiffness: 300000, damping: 270, terrain: after-mid-swing, stiction_velocity: 10, friction_velocity: 100}"
+)
+
+
+def test_one_knee_beside_a_straight_leg_walks_on_compliant_ground_into_its_gait():
+    config = config_of("one-knee", ONE_KNEE_GROUND)
+    rigid = gait_of(config)
+    gait = contact_gait(config, rigid.step_length, rigid.state).gait
+    scene = scene_on_pads(config, rigid.step_length, rigid.state)
+    walk = scene.walk(start_state(scene, rigid.state), 12, tolerances_of(config, 12))
+    assert walk.steps == 12
+    np.testing.assert_allclose(walk.periods_s[-2:], gait.periods_s, atol=5e-4)
+    np.testing.assert_allclose(gait.periods_s, np.array(rigid.steps)[:, 0], atol=2e-3)
+    np.testing.assert_allclose(lengths_between_touches(gait), np.array(rigid.steps)[:, 1], atol=2e-3)
+    # the leg with the knee swings in every other step, and its knee locks once
+    assert np.isfinite(walk.knee_strike_time_s[::2]).all()
+    assert np.isnan(walk.knee_strike_time_s[1::2]).all()
+    assert walk.energy_balance_residual_J < walk.explained_residual_J
+    # where the straight leg swings, the section has two coordinates fewer
+    assert (gait.z.size, gait.steps[0].z.size) == (8, 6)
+    assert math.sqrt(abs(gait.multipliers[0])) == pytest.approx(rigid.spectral_radius, rel=0.05)
+
+
+def test_multipliers_of_one_knee_on_compliant_ground_are_those_of_differences():
+    config = config_of("one-knee", ONE_KNEE_GROUND)
+    rigid = gait_of(config)
+    gait = contact_gait(config, rigid.step_length, rigid.state).gait
+    step_map = contact_map(config, SLOPE, 1.0, float(gait.lengths_m.mean()))
+    z = step_map.scale_section(gait.z)
+    DP = walk_steps(step_map, z, config.slope_rad, 2).DP
+    size, columns = 1e-6, []
+    for unit in np.eye(z.size):
+        ends = [
+            walk_steps(step_map, z + sign * size * unit, config.slope_rad, 2, False).steps[-1].z for sign in (1, -1)
+        ]
+        columns.append((ends[0] - ends[1]) / (2.0 * size))
+    np.testing.assert_allclose(np.array(columns).T, DP, atol=1e-3 * np.abs(DP).max())
 
 
 def test_a_peg_leg_is_by_default_the_first_leg_with_its_knee_locked():

@@ -106,7 +106,6 @@ def scene_on_pads(
     Raises NoAnswer if their pitch needs a contact gait and none is found.
     """
     pitch = None
-    require_known_legs(config)
     if wants_own_pitch(require_contact(config)):
         search = search or contact_gait(config, rigid_step, rigid_state)
         if search.gait is None:
@@ -116,16 +115,6 @@ def scene_on_pads(
             first, second = lengths_between_touches(search.gait)
             asymmetry = float((second - first) / pitch)
     return contact_scene(config, rigid_step, pitch, asymmetry)
-
-
-def require_known_legs(config: ContactConfig) -> None:
-    """Raise ConfigError if only one leg has a knee, which the contact model does not support."""
-    if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
-        raise ConfigError(
-            "the contact model needs two legs of one kind, both with a knee or both without.",
-            "The rigid model walks with one knee: `walkerlab fixedpoint`, `walkerlab simulate`.",
-            ("walker",),
-        )
 
 
 def apply_drives(walker: ContactWalker, config: ContactConfig) -> ContactWalker:

@@ -63,6 +63,7 @@ def contact_walker(
     forms = np.zeros((2, 4), FORM)
     forms["gravity_along"], forms["gravity_down"] = gravity * math.sin(slope), gravity * math.cos(slope)
     forms["slope"], forms["kneed"], forms["release_at_touch"] = slope, bool(assembly.knees), rules.release_at_touch
+    forms["has_knee"] = [k < len(assembly.knees) for k in range(2)]
     for pinned, root in enumerate((about_centre(assembly), about_foot(assembly, pinned_foot))):
         for locked in range(4):
             knees = [k for k in range(len(assembly.knees)) if locked & 1 << k]
@@ -79,8 +80,8 @@ def check_walkable(assembly: Assembly) -> None:
         )
     if len(assembly.feet) != 2:
         raise ValueError(f"a walker has two feet; this assembly has {len(assembly.feet)}")
-    if len(assembly.knees) not in (0, 2):
-        raise ValueError(f"a walker has two knees or none; this assembly has {len(assembly.knees)}")
+    if len(assembly.knees) > 2:
+        raise ValueError(f"a walker has at most two knees; this assembly has {len(assembly.knees)}")
 
 
 def about_centre(assembly: Assembly) -> Root:
@@ -148,9 +149,15 @@ def fill(form: Any, assembly: Assembly, root: Root, locked: list[int], merges: b
     form["bodies"], form["radius"] = n, [foot.radius_m for foot in assembly.feet]
     form["onto"][: len(onto)], form["first"][:n] = onto, separate
     if knees:
-        form["hinges"][FIRST_KNEE:] = [(onto[shank], onto[thigh]) for thigh, shank in knees]
+        rigid = [onto[body] for body in leg_bodies(assembly)[len(knees) :, 0]]
+        form["hinges"][FIRST_KNEE:] = [
+            *((onto[shank], onto[thigh]) for thigh, shank in knees),
+            *((leg, leg) for leg in rigid),
+        ]
 
 
 def leg_bodies(assembly: Assembly) -> NDArray[np.int64]:
     named = assembly.legs if all(assembly.legs) else tuple((foot.body,) for foot in assembly.feet)
-    return np.array([[assembly.index(body) for body in leg] for leg in named])
+    most = max(map(len, named))
+    # a leg of fewer bodies repeats its last one
+    return np.array([[assembly.index(body) for body in (*leg, *leg[-1:] * (most - len(leg)))] for leg in named])

@@ -41,12 +41,14 @@ class GroundModel(tree.Mechanism):  # type: ignore[misc]  # as for Mechanism
 
     # The arrays have room for MAX_BODIES, so that one compiled walk serves all walkers; only n entries are used. The
     # rows of `hinges` are the hip (uppermost body of the first leg, then of the second) and each knee (shank, then
-    # thigh, with equal indices while they are merged into one body). E holds a single reduction.
+    # thigh, with equal indices while they are merged into one body, or if the leg has no knee and is always locked). E
+    # holds a single reduction.
 
     bodies: int  # [n]
     places: int  # number of root coordinates before the angles: 2, or 0 for a pinned form
     pinned: int  # index of the pinned foot; NO_FOOT in a free form
     kneed: bool
+    has_knee: Integers  # (2,) whether each leg has a knee
     release_at_touch: bool  # release the trailing knee at the touch, not when the leading foot stops sinking in
     foot_x: Floats  # (2, n) m, levers from the root to the centres of the ball feet, in the bodies' frames
     foot_y: Floats
@@ -72,7 +74,7 @@ FORM_SHAPES: dict[str, tuple[int, ...]] = {
     **tree.mechanism_shapes(MAX_BODIES, 1, 3),
     **dict.fromkeys(("hip_x", "hip_y", "onto", "first"), (MAX_BODIES,)),
     **dict.fromkeys(("foot_x", "foot_y", "rolling"), (2, MAX_BODIES)),
-    **dict.fromkeys(("radius", "push_offs"), (2,)),
+    **dict.fromkeys(("radius", "push_offs", "has_knee"), (2,)),
 }
 FORM = tree.record_type(GroundModel, FORM_SHAPES)
 

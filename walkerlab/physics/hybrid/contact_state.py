@@ -116,6 +116,7 @@ def knees_at_start(walker: ContactWalker, stance: int, y: State) -> NDArray[np.i
     swing = 1 - stance
     whole = walker.whole
     if walker.kneed:
+        knee[whole.has_knee == 0] = LOCKED
         knee[stance] = LOCKED
         if extension(whole, swing, y) < -MIN_FLEXION:
             knee[swing] = BENT

@@ -267,7 +267,7 @@ def is_straight(form: GroundModel, walk_state: WalkState, foot: int) -> bool:
 @kernel_part
 def follow_strike(form: GroundModel, walk_state: WalkState, trailing: int) -> None:
     """Release the trailing knee at a step's touch, or note what it waits for (`AT_COMPRESSION`, `AT_PULSE_END`)."""
-    if form.kneed:
+    if form.has_knee[trailing] != 0:
         if form.release_at_touch and form.push_off != 0.0:
             walk_state.progress.release = AT_PULSE_END
         elif form.release_at_touch:

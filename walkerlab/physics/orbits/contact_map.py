@@ -77,17 +77,23 @@ class SectionStep(MappedStep):
 
 def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Return the bodies that turn independently, the swing leg's first. The locked stance shank is left out."""
-    locked = walker.whole.knees[stance, 0] if walker.kneed else None
-    return (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
+    # if only one leg has a knee, there are fewer where that leg stands
+    locked = locked_shank(walker, stance)
+    bodies = (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
+    return tuple(dict.fromkeys(bodies))
+
+
+def locked_shank(walker: ContactWalker, stance: int) -> int | None:
+    """Return the shank of the stance leg, whose knee is locked, or None if it has no knee."""
+    return int(walker.whole.knees[stance, 0]) if walker.whole.has_knee[stance] else None
 
 
 def angled_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Return the bodies whose angles are coordinates, the swing leg's first."""
     # After a compliant stop has latched, the stance shank's angle differs from its thigh's.
     free = turning_bodies(walker, stance)[1:]
-    if walker.kneed and not isinstance(walker.stop, IdealLock):
-        return (*free, int(walker.whole.knees[stance, 0]))
-    return free
+    shank = None if isinstance(walker.stop, IdealLock) else locked_shank(walker, stance)
+    return free if shank is None else (*free, shank)
 
 
 def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tuple[int, ...]) -> Floats:
@@ -95,7 +101,7 @@ def fill_followers(walker: ContactWalker, stance: int, angles: Floats, fixed: tu
     form = walker.whole
     n = angles.size
     shank, thigh = form.knees[stance]
-    if walker.kneed and shank not in fixed:
+    if walker.whole.has_knee[stance] and shank not in fixed:
         angles[shank] = angles[thigh]
     for body in range(n):
         if form.E[0, body, body] == 0.0 and body not in fixed:
@@ -353,6 +359,14 @@ def replace_terrain(site: WalkerOnGround, terrain: Terrain) -> WalkerOnGround:
     return replace(site, ground=site.ground._replace(terrain=terrain))
 
 
+def section_units(site: WalkerOnGround, stance: int) -> Floats:
+    """Return the units (d,) of the coordinates on the section in which foot `stance` stands."""
+    L = site.ground.frame.leg_length
+    tau = site.ground.frame.pendulum_time
+    angles, rates = (len(bodies(site.walker, stance)) for bodies in (angled_bodies, turning_bodies))
+    return np.array([L, *[1.0] * angles, L / tau, L / tau, *[1.0 / tau] * rates])
+
+
 class ContactMap(StepMap):
     """Step map of a walker on compliant ground, scaled by leg length and pendulum time.
 
@@ -392,17 +406,16 @@ class ContactMap(StepMap):
         turning = turning_bodies(like.walker, STANCE_FOOT)
         rates = (f"rate_{body}" for body in turning)
         self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
-        L = like.ground.frame.leg_length
-        tau = like.ground.frame.pendulum_time
-        self._units = np.array([L, *[1.0] * len(angled), L / tau, L / tau, *[1.0 / tau] * len(turning)])
+        self._units = [section_units(like, stance_of(swing)) for swing in range(2)]
 
     def scale_section(self, z: Floats) -> Floats:
-        return np.asarray(z / self._units)
+        return np.asarray(z / self._units[0])
 
     def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, swing: int = 0) -> SectionStep:
         pitch_m = site.ground.terrain.pitch
         stance = stance_of(swing)
-        return step_from_section(site.walker, site.ground, self.tolerances, z * self._units, pitch_m, derived, stance)
+        z_m = z * self._units[swing % 2]
+        return step_from_section(site.walker, site.ground, self.tolerances, z_m, pitch_m, derived, stance)
 
     def step(self, z: Floats, p: float, derived: bool = True, swing: int = 0) -> MappedStep:
         site = self._at(p)
@@ -411,8 +424,9 @@ class ContactMap(StepMap):
         step = self._walk(site, z, derived, swing)
         if step.outcome is not Outcome.WALKED:
             return failed_step(step.outcome, z.size)
-        DP = step.DP * self._units / self._units[:, None] if derived else step.DP
-        return replace(step, z=step.z / self._units, DP=DP)
+        units, ahead = self._units[swing % 2], self._units[(swing + 1) % 2]
+        DP = step.DP * units / ahead[:, None] if derived else step.DP
+        return replace(step, z=step.z / ahead, DP=DP)
 
     def watch(self, z: Floats, p: float, steps: int) -> Floats:
         site = valid(self._at(p))
@@ -422,7 +436,7 @@ class ContactMap(StepMap):
         for swing in range(steps):
             step = self._walk(site, start, False, swing)
             slip = max(slip, abs(step.slip_m))
-            start = step.z / self._units
+            start = step.z / self._units[(swing + 1) % 2]
             if self._on_pads and steps == 1:
                 on_pads = replace_terrain(site, checkerboard(step.length_m, (0.0, 0.0)))
                 tripped = float(self._walk(on_pads, z, False).outcome is not Outcome.WALKED)
@@ -435,19 +449,19 @@ class ContactMap(StepMap):
         site = valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         scene = (site.walker, site.ground, endless)
-        walk = walk_from_section(*scene, z * self._units, heights_m, push_N_s, stance_of(swing))
-        return replace(walk, z=walk.z / self._units)
+        walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, stance_of(swing))
+        return replace(walk, z=walk.z / next(units for units in self._units if units.size == walk.z.size))
 
     def rest_on_ground(self, z: Floats, p: float) -> Floats:
         site = self._at(p)
-        return z if site is None else stand(site.walker, z * self._units, STANCE_FOOT) / self._units
+        return z if site is None else stand(site.walker, z * self._units[0], STANCE_FOOT) / self._units[0]
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         site = valid(self._at(p))
         touch = self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
-        return sample_legs_from_section(site.walker, site.ground, endless, z * self._units, heights_m, times)
+        return sample_legs_from_section(site.walker, site.ground, endless, z * self._units[0], heights_m, times)
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         stride = walk_steps(self, z, p, self.stride, derived=False)

@@ -198,7 +198,8 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: in
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
         outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)
-        return outcome, sum((weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True)), 0.0 * z)
+        weighted = (weight / h * step.z for step, (_, weight) in zip(steps, formula, strict=True))
+        return outcome, sum(weighted, 0.0 * steps[0].z)
     return None, 0.0 * z
 
 

@@ -2,13 +2,13 @@
 
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.engine_scene import EngineScene, engine_scene
+from walkerlab.exchange.engine_scene import EngineScene, engine_scene, refuse_one_knee
 from walkerlab.exchange.planar import SMALLEST_BALL_M
 from walkerlab.physics.ground.knees import IdealLock
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.contact_state import knees_at_start
 from walkerlab.physics.solvers.system import State
-from walkerlab.scene.contact import knee_rules, require_known_legs
+from walkerlab.scene.contact import knee_rules
 from walkerlab.scene.parts import assembly_of
 
 
@@ -19,7 +19,7 @@ def supported_scene(
 
     Raises ConfigError for a walker that other engines do not support.
     """
-    require_known_legs(config)
+    refuse_one_knee(config)
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(
