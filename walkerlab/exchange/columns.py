@@ -169,7 +169,7 @@ def as_walk(recording: Recording, asked: Recorded, slope_rad: float = 0.0) -> Re
 
 
 def set_frame_times(recording: Recording, asked: Recorded) -> tuple[Recording, list[str]]:
-    """If the user states a frame rate, replace the times by those of the frames. Also returns notes about the times.
+    """Replace the times by those of the frames if the user states a frame rate. Also return notes about the times.
 
     Frame numbers come from a column that counts frames, otherwise from regular times, otherwise from the sample order.
     """
