@@ -353,3 +353,19 @@ def test_sports2d_levels_the_floor_and_says_so(walks, sign, tmp_path):
     assert summary["doubts"][0].startswith("Sports2D (angles) levels the floor, so angles are taken from the floor's")
     path.write_text(sports2d_angles(angles_at(sampled()[0])), encoding="utf-8")
     assert steps_of(path, columns=columns, camera_tilt_deg=0)["doubts"] == []
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.05])
+def test_legs_that_do_not_meet_at_one_hip_are_doubted(apart_m, tmp_path):
+    time, angle = sampled()
+    hip, *feet = places_of(angle)[:, :, :2].swapaxes(0, 1)
+    other = np.c_[apart_m * np.sin(2.0 * np.pi * time), 0.0 * time]
+    # the whole second leg moves, so it keeps its length
+    markers = {"HIP1": hip, "FOOT1": feet[0], "HIP2": hip + other, "FOOT2": feet[1] + other}
+    header = ["time (s)", *(f"{name}.{axis} (m)" for name in markers for axis in "xy")]
+    table = np.c_[time, *markers.values()]
+    np.savetxt(tmp_path / "walk.csv", table, "%.9f", ",", header=",".join(header), comments="")
+    columns = {"angle 1": "HIP1>FOOT1", "angle 2": "HIP2>FOOT2"}
+    doubts = walkerlab.read_walk(tmp_path / "walk.csv", columns, slope_deg=math.degrees(SLOPE)).summary["doubts"]
+    assert [doubt for doubt in doubts if "meet at one hip" in doubt] == doubts
+    assert bool(doubts) is bool(apart_m)
