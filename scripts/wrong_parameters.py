@@ -13,7 +13,7 @@ from pathlib import Path
 
 from identification_coverage import Truth
 
-from walkerlab.api.memory import in_memory
+from walkerlab.api.memory import run_in_memory
 from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.errors import WalkerlabError
@@ -29,7 +29,7 @@ def verdict_of(name, truth, measured, wrong, share):
     """Return whether the answer must warn, whether it does, and a line about it."""
     values = dict(zip(KEYS, truth.values, strict=True))
     config = load(Path(name), (f"{wrong}={values[wrong] * (1.0 + share)}",)).config
-    gait = in_memory("fixedpoint", config).summary
+    gait = run_in_memory("fixedpoint", config).summary
     kept = [key for key in KEYS if key != wrong]
     fixed, free = (identify_walk(config, measured, gait, Identify(fit=dict.fromkeys(keys))) for keys in (kept, KEYS))
     off = max(abs(each.value - values[each.key]) / (each.standard_error or float("inf")) for each in fixed.estimates)

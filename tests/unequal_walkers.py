@@ -6,7 +6,7 @@ import numpy as np
 from plain_unequal_walk import Leg, Segment, Walker
 
 from walkerlab.physics.mechanics.rigid import rigid_on_slope
-from walkerlab.physics.mechanics.rigid_model import pair, with_fields
+from walkerlab.physics.mechanics.rigid_model import pair, replace_fields
 from walkerlab.physics.mechanics.walkers import Arc, Limb, kneed_legs, replace_second_leg, straight_legs
 
 KINDS = ("masses", "straight", "round", "kneed", "kneed and round", "one knee")
@@ -58,7 +58,7 @@ def model_of(plain):
     knees = [{"knees": (0.0, damping, 0.0)} if any(plain.knee_damping) else {} for damping in plain.knee_damping]
     drives = [own | {"push_off": push} for own, push in zip(knees, plain.push_offs, strict=True)]
     models = zip((model, model.exchanged), drives, strict=True)
-    return pair(*(with_fields(each, drive) for each, drive in models))
+    return pair(*(replace_fields(each, drive) for each, drive in models))
 
 
 def legs_of(state):
