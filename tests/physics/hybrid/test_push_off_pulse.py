@@ -62,7 +62,7 @@ def test_pulse_has_the_impulse_of_the_push_off_and_smooth_ends():
     assert not force[(times < 1.99999) | (times > 2.00501)].any()
     assert np.abs(np.diff(force)).max() < 1e-3 * force.max()
     before_any_touch = place_on_ground(scene.walker, (True, True), progress=new_progress(last_touch=2.0))
-    assert pulse_force(before_any_touch, 2.002) == 0.0
+    assert pulse_force(before_any_touch, 2.002, 0) == 0.0
 
 
 @pytest.mark.parametrize("name", PUSHED)
