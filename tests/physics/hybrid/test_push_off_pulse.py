@@ -57,12 +57,12 @@ def test_pulse_has_the_impulse_of_the_push_off_and_smooth_ends():
     _, scene, _ = scene_of("level")
     system = place_on_ground(scene.walker, (True, True), progress=new_progress(steps=1, last_touch=2.0))
     times = 2.0 + np.linspace(-0.001, 0.006, 70_001)
-    force = np.array([pulse_force(system, t) for t in times])
+    force = np.array([pulse_force(system, t, 0) for t in times])
     assert np.trapezoid(force, times) == pytest.approx(4.0, rel=1e-6)
     assert not force[(times < 1.99999) | (times > 2.00501)].any()
     assert np.abs(np.diff(force)).max() < 1e-3 * force.max()
     before_any_touch = place_on_ground(scene.walker, (True, True), progress=new_progress(last_touch=2.0))
-    assert pulse_force(before_any_touch, 2.002) == 0.0
+    assert pulse_force(before_any_touch, 2.002, 0) == 0.0
 
 
 @pytest.mark.parametrize("name", PUSHED)
