@@ -57,10 +57,17 @@ def builtin_config(name: str) -> ConfigFile:
     return ConfigFile(BUILTIN_FOLDER / f"{name}.yaml", f"built-in {name}.yaml")
 
 
+PUBLISHED: Final = Path("published")
+"""Folder of the built-in configs of published gaits."""
+
+
 def find_config(path: Path) -> ConfigFile:
-    """Resolve `--config`, which is an existing path or the name of a built-in config."""
-    if str(path) in builtin_names() and not is_file(path):
-        return builtin_config(str(path))
+    """Resolve `--config`, which is an existing path, the name of a built-in config, or that of a published gait."""
+    if not is_file(path):
+        if str(path) in builtin_names():
+            return builtin_config(str(path))
+        if path.parent == PUBLISHED and is_file(BUILTIN_FOLDER / path):
+            return ConfigFile(BUILTIN_FOLDER / path, f"built-in {path}")
     return file_at(path)
 
 

@@ -341,3 +341,19 @@ def test_published_configs_leave_the_names_of_built_in_configs_alone():
     docs = Path(__file__).parents[3] / "docs"
     pages = "".join((docs / name).read_text() for name in ("published.md", "published-right.md"))
     assert all(f"## {path.stem}\n" in pages for path in PUBLISHED.glob("*.yaml"))
+
+
+def test_published_gaits_are_known_to_all_commands(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    name = "published/garcia-1998.yaml"
+    assert "Right: 2 printed values reproduced" in run(name).output
+    shown = CliRunner().invoke(program(), ["fixedpoint", "-c", name])
+    assert shown.exit_code == 0, shown.output
+    assert "0.199832" in shown.output
+
+
+def test_the_form_for_a_printed_gait_has_only_what_a_check_reads(tmp_path):
+    file = tmp_path / "my-gait.yaml"
+    CliRunner().invoke(program(), ["init", str(file), "--check", "--type", "kneed"])
+    keys = [line.partition(":")[0] for line in file.read_text().splitlines() if line[:1].isalpha()]
+    assert keys == ["extends", "name", "walker", "gravity_m_s2", "slope_rad", "check"]

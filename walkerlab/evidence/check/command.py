@@ -67,11 +67,10 @@ def configs_in(paths: Sequence[Path]) -> Iterator[Path]:
     Raises ConfigError for a folder without any.
     """
     # imported here, as below: help must load neither the config nor NumPy
-    from walkerlab.config.files import BUILTIN_FOLDER, SUFFIXES
+    from walkerlab.config.files import BUILTIN_FOLDER, PUBLISHED, SUFFIXES
 
     for typed in paths:
-        installed = BUILTIN_FOLDER / typed
-        path = installed if not typed.exists() and installed.exists() else typed
+        path = BUILTIN_FOLDER / typed if typed == PUBLISHED and not typed.exists() else typed
         if not path.is_dir():
             yield path
             continue

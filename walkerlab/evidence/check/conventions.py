@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
-from typing import Final, get_args
+from itertools import permutations, product, starmap
+from typing import Any, Final, get_args
 
 import numpy as np
 
@@ -174,18 +174,11 @@ def alternatives(convention: Convention) -> Iterator[Convention]:
         orders = [("stance",), ("swing",)]
     seconds = tuple(SECOND_WORDS) if len(convention.order) > 1 else (convention.second,)
     layouts = ("angles-first", "interleaved") if len(convention.order) > 1 else (convention.layout,)
-    found = [
-        Convention(origin, second, unit, positive, order, layout, instant, time, steps)
-        for origin in ("vertical", "slope-normal")
-        for second in seconds
-        for unit in ("rad", "deg")
-        for positive in ("counter-clockwise", "clockwise")
-        for order in orders
-        for layout in layouts
-        for instant in get_args(Instant)
-        for time in ("", SCALED, *(f"{gravity:g}" for gravity in GRAVITIES))
-        for steps in (1, 2)
-    ]
+    choices: tuple[Sequence[Any], ...] = (
+        ("vertical", "slope-normal"), seconds, ("rad", "deg"), ("counter-clockwise", "clockwise"), orders, layouts,
+        get_args(Instant), ("", SCALED, *(f"{gravity:g}" for gravity in GRAVITIES)), (1, 2),
+    )  # fmt: skip
+    found = starmap(Convention, product(*choices))
     yield from sorted(found, key=lambda other: len(list(other.differences(convention))))[1:]
 
 

@@ -17,16 +17,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from walkerlab.config.reads import RigidConfig
-from walkerlab.evidence.check.causes import (
-    Candidate,
-    MistakeFamily,
-    families_of,
-    misprints_of,
-    mistakes_of,
-    parameters,
-    transposed,
-    walker_with,
-)
+from walkerlab.evidence.check import causes
+from walkerlab.evidence.check.causes import Candidate, MistakeFamily
 from walkerlab.evidence.check.conventions import Convention, alternatives, full_state, start_from
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
 from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
@@ -229,7 +221,7 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
     """Yield the gaits of the most promising candidates, then those of mistakes whose size is fitted."""
     right = question.guess(question.walker)
     guesses = []
-    for place, candidate in enumerate((*mistakes_of(question.walker), *misprints_of(question.config))):
+    for place, candidate in enumerate((*causes.mistakes_of(question.walker), *causes.misprints_of(question.config))):
         guess = question.guess(candidate.walker)
         if guess is not None and (right is None or not same(guess, right)):
             guesses.append((question.miss(guess, question.quick_items), place, candidate, guess))
@@ -237,7 +229,7 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
         yield from question.attempt(candidate, guess)
     if len(question.items) < FEW:
         return
-    for family in families_of(question.walker):
+    for family in causes.families_of(question.walker):
         for size in sizes_to_try(fitted_size(question, family)):
             candidate = Candidate("mistake", family.what.format(f"{size:.4g}"), family.of_size(size), family.what)
             guess = question.guess(candidate.walker, EXACT)
@@ -359,7 +351,7 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     reproduced = [item, *question.reproduced(question.right, question.items)]
     if item.fits(-right):
         yield question.explanation("misprint", f"the sign of the printed {name} is wrong", reproduced)
-    elif any(item.fits(right + printed - other) for other in transposed(printed)):
+    elif any(item.fits(right + printed - other) for other in causes.transposed(printed)):
         yield question.explanation("misprint", f"two digits of the printed {name} are transposed", reproduced)
 
 
@@ -369,8 +361,8 @@ def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
         return []
     states = replace(question, items=[item for item in question.items if item.quantity == "state"])
     found: list[dict[str, float | str]] = []
-    for key, value in parameters(question.config).items():
-        walker_of = partial(walker_with, question.config, key)
+    for key, value in causes.parameters(question.config).items():
+        walker_of = partial(causes.walker_with, question.config, key)
         change = fit(states, walker_of, value, value * (1.0 + 1e-4), (-math.inf, math.inf))
         if change is not None and change.change < CONVERGED and np.abs(change.there).max() <= 1.0:
             found.append({"key": key, "value": float(f"{change.value:.6g}")})

@@ -338,7 +338,8 @@ class PlainWalker:
             walk.step()
             after = event(walk.y)
             if before > 0.0 >= after:
-                time = crossing(event, walk.dense_output(), old_time, walk.t)
+                course = walk.dense_output()
+                time = brentq(lambda time, course=course: event(course(time)), old_time, walk.t, xtol=1e-15)
                 for _ in range(LOCATING_ROUNDS):
                     landing = solver(old_time, old, time)
                     while landing.status == "running":
@@ -379,11 +380,6 @@ class PlainWalker:
         locked = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
         rates = np.linalg.solve(locked.T @ M @ locked, locked.T @ M @ state[3:])
         return np.concatenate((state[:2], rates))
-
-
-def crossing(event: Event, course: Callable[[float], Floats], begin: float, end: float) -> float:
-    """Return the time at which an event function is zero on a course between two times."""
-    return float(brentq(lambda time: event(course(time)), begin, end, xtol=1e-15))
 
 
 class Phase(NamedTuple):
