@@ -54,6 +54,18 @@ def digits_of(text: str) -> Digits:
     return Digits(float(text), 10.0**scale, max(len(figures), 1))
 
 
+def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
+    """Return how a right value agrees with all printed digits: 'rounded', 'cut off', or '' if it does not.
+
+    error  of the right value
+    """
+    if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
+        return "rounded"
+    longer = abs(right) - abs(printed.value)
+    same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
+    return "cut off" if same_sign and -error <= longer < printed.unit + error else ""
+
+
 def parse_printed(text: str) -> PrintedValue | None:
     """Read a printed value, or return None if it has none of the allowed forms."""
     plain = text.strip().lower().replace("−", "-").replace("–", "-").replace("\xa0", " ")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from walkerlab.config.check import Digits, PrintedValue, parse_printed
+from walkerlab.config.check import Digits, PrintedValue, agreement, parse_printed
 
 REPRODUCED = "reproduced"
 DIFFERENT = "different"
@@ -73,18 +73,6 @@ class Item:
         if self.printed.both_signs:
             right = complex(right.real, abs(right.imag))
         return abs(right - self.printed.value) / self.unit
-
-
-def agreement(printed: Digits, right: float, error: float = 0.0) -> str:
-    """Return how a right value agrees with all printed digits: 'rounded', 'cut off', or '' if it does not.
-
-    error  of the right value
-    """
-    if abs(right - printed.value) <= 0.5 * printed.unit * (1.0 + 1e-9) + error:
-        return "rounded"
-    longer = abs(right) - abs(printed.value)
-    same_sign = right * printed.value > 0.0 or abs(right) < printed.unit
-    return "cut off" if same_sign and -error <= longer < printed.unit + error else ""
 
 
 def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
-from walkerlab.config.check import Digits, parse_printed
+from walkerlab.config.check import Digits, agreement, parse_printed
 from walkerlab.config.contact import MM_PER_M, Contact
-from walkerlab.evidence.check.printed import agreement
 from walkerlab.evidence.paper.appendix_a import RigidWalker
 from walkerlab.physics.ground.resting import RestingFoot, resting_foot
 
