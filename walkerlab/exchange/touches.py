@@ -163,8 +163,10 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
         if iteration >= DEGREE_ITERATIONS and abs(correction) < LOCATED * touch.error_s:
             return touch_of(add_bias(touch.fit, t, y, at, degree), height, near + at, leg)
         at += correction
-    # With much noise the samples that change sides keep moving the zero.
-    return touch if touch and abs(correction) < touch.error_s else None
+    # Samples that change sides keep moving the zero; it is then as uncertain as it moves.
+    if touch is None or abs(correction) > max(touch.error_s, 0.5 * float(np.median(np.diff(t)))):
+        return None
+    return replace(touch, error_s=float(np.hypot(touch.error_s, correction)))
 
 
 def samples_near(time: Array, angle: Array, near: float, period: float) -> tuple[Array, Array]:
