@@ -35,7 +35,7 @@ def files_of(kind, law, name, *sets):
 LIMPING = (
     ("paper", "walker.leg_2={leg_mass_kg: 5.5}", "strides=2"),
     ("round-feet", PADS, "walker.leg_2={leg_length_m: 0.4005, foot_radius_m: 0.102}", "strides=2"),
-    ("level", "walker.leg_2={leg_mass_kg: 5.1}", "strides=2"),
+    ("level", "walker.leg_2={leg_mass_kg: 5.1}", "push_off.leg_2={impulse_N_s: 3.9}", "strides=2"),
     (
         "kneed-round-feet", "walker.leg_2={shank: {mass_kg: 0.052}, foot_radius_m: 0.21}",
         "walker.knee.damping_N_m_s_per_rad=0.004", "strides=1",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import walkerlab
-from walkerlab.config.drives import Hip
+from walkerlab.config.drives import Hip, push_offs
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineScene, refuse_one_knee, scene_for_engines
@@ -88,8 +88,7 @@ class Exported:
     @property
     def impulses_N_s(self) -> tuple[float, float]:
         """Impulse of the push-off of each leg."""
-        impulse = self.config.push_off.impulse_N_s
-        return impulse, impulse
+        return push_offs(self.config.push_off)
 
     @property
     def hip(self) -> Hip:
