@@ -21,7 +21,7 @@ from walkerlab.api.memory import run_in_memory
 from walkerlab.config.loader import load
 from walkerlab.exchange.engine_scene import contact_target
 from walkerlab.exchange.export import export_model
-from walkerlab.exchange.exported import prepare_export
+from walkerlab.exchange.exported import GaitStart, prepare_export
 from walkerlab.exchange.mujoco_script import Walk
 
 WALKERS = ("paper", "level", "kneed-round-feet")
@@ -61,10 +61,9 @@ def exported(name, *settings):
     """Text of the model, our walk, the law's depth at rest, and whether the ground consists of pads."""
     config = load(Path(name), settings).config
     gait = run_in_memory("fixedpoint", config).summary
-    start = gait["step_length_m"], gait["state"]
-    asymmetry = gait["asymmetry"]["step_length"]
-    export = prepare_export(config, *start, asymmetry)
-    text = next(iter(export_model(config, *start, "mjcf", asymmetry=asymmetry).files.values()))
+    start = GaitStart(gait["step_length_m"], gait["state"], gait["asymmetry"]["step_length"])
+    export = prepare_export(config, start)
+    text = next(iter(export_model(config, start, "mjcf").files.values()))
     return text, export.walk, contact_target(export.scene).penetration, export.scene.ground.terrain.has_pads
 
 

@@ -9,43 +9,33 @@ from adams_dataset import Dataset
 from walkerlab.api.memory import run_in_memory
 from walkerlab.config.loader import load
 from walkerlab.exchange.export import add_stops, export_model
-from walkerlab.exchange.exported import prepare_export
+from walkerlab.exchange.exported import GaitStart, prepare_export
 
 PADS = "contact.terrain=checkerboard"
 
 
 @cache
 def with_gait(name, *sets):
-    """Config, rigid step length and rigid start state."""
-    config, gait = gait_of(name, *sets)
-    return config, gait["step_length_m"], gait["state"]
-
-
-@cache
-def gait_of(name, *sets):
-    """Config and summary of its rigid gait."""
+    """Config, and the start of its rigid gait."""
     config = load(Path(name), sets).config
-    return config, run_in_memory("fixedpoint", config).summary
-
-
-def asymmetry_of(name, *sets):
-    return gait_of(name, *sets)[1]["asymmetry"]["step_length"]
+    gait = run_in_memory("fixedpoint", config).summary
+    return config, GaitStart(gait["step_length_m"], gait["state"], gait["asymmetry"]["step_length"])
 
 
 @cache
 def export_of(name, *sets):
-    return prepare_export(*with_gait(name, *sets), asymmetry_of(name, *sets))
+    return prepare_export(*with_gait(name, *sets))
 
 
 @cache
 def files_of(kind, law, name, *sets):
-    return export_model(*with_gait(name, *sets), kind, law, asymmetry=asymmetry_of(name, *sets))
+    return export_model(*with_gait(name, *sets), kind, law)
 
 
 LIMPING = (
     ("paper", "walker.leg_2={leg_mass_kg: 5.5}", "strides=2"),
     ("round-feet", PADS, "walker.leg_2={leg_length_m: 0.4005, foot_radius_m: 0.102}", "strides=2"),
-    ("level", "walker.leg_2={leg_mass_kg: 5.1}", "strides=2"),
+    ("level", "walker.leg_2={leg_mass_kg: 5.1}", "push_off.leg_2={impulse_N_s: 3.9}", "strides=2"),
     (
         "kneed-round-feet", "walker.leg_2={shank: {mass_kg: 0.052}, foot_radius_m: 0.21}",
         "walker.knee.damping_N_m_s_per_rad=0.004", "strides=1",
@@ -117,12 +107,12 @@ def random_kneed_walker(seed, strides):
 def run_kneed(name, *sets):
     """Run the ADAMS files of a kneed walker; return times of touches and of locks, and our walk."""
     dataset, commands = files_of("adm", "functions", name, *sets).files.values()
-    config, length, state = with_gait(name, *sets)
+    config, start = with_gait(name, *sets)
     events = Dataset(dataset).run(commands)
     touches, locks = (
         np.array([time for sensor, time in events if sensor.endswith(ending)]) for ending in ("touches", "straight")
     )
-    return touches, locks, prepare_export(add_stops(config), length, state, asymmetry_of(name, *sets)).walk
+    return touches, locks, prepare_export(add_stops(config), start).walk
 
 
 def touches_of(dataset, export, count):

@@ -9,7 +9,6 @@ from exported_walkers import (
     LIMPING,
     PADS,
     PARTS,
-    asymmetry_of,
     export_of,
     files_of,
     random_kneed_walker,
@@ -152,7 +151,7 @@ def test_pads_of_legs_that_differ_lie_under_their_footholds():
     lanes = [sorted(x for x, _, z in edges if (z < 0.0) == stands) for stands in (False, True)]
     gaps = [np.diff(lane) for lane in lanes]
     assert np.concatenate(gaps) == pytest.approx(2.0 * MM * pitch)
-    share = asymmetry_of(*LIMPING[0])
+    share = with_gait(*LIMPING[0])[1].asymmetry
     first, second = MM * pitch * np.array([1.0 - 0.5 * share, 1.0 + 0.5 * share])
     ahead = min(x for x in lanes[0] if x > lanes[1][1]) - lanes[1][1]
     assert ahead == pytest.approx(first)

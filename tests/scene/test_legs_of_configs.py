@@ -10,7 +10,7 @@ from walkerlab.config.files import builtin_config
 from walkerlab.config.reads import restrict
 from walkerlab.config.walkers import second_of
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.exported import prepare_export
+from walkerlab.exchange.exported import GaitStart, prepare_export
 from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
 from walkerlab.physics.orbits.contact_map import lengths_between_touches
@@ -242,7 +242,7 @@ def test_an_export_of_one_knee_beside_a_straight_leg_is_refused():
     config = config_of("kneed", f"walker.leg_2={PEG}")
     assert rigid_walker(config).legs_differ
     with pytest.raises(ConfigError, match="both with a knee or both without"):
-        prepare_export(config, 0.4, (0.0,) * 6)
+        prepare_export(config, GaitStart(0.4, (0.0,) * 6))
 
 
 ONE_KNEE_GROUND = (

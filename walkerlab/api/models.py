@@ -128,6 +128,7 @@ def _export_texts(
 ) -> dict[str, str]:
     """Return the files of a model, by name, after finding its gait unless it is passed."""
     from walkerlab.exchange import export
+    from walkerlab.exchange.exported import GaitStart
     from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
     from walkerlab.pipeline.store.provenance import git_commit
 
@@ -139,6 +140,5 @@ def _export_texts(
         inputs["fixedpoint"] = gait.content
     adams_law = export.law_named(law)
     tilted = export.slope_named(slope)
-    start = rigid_start(config, inputs)
-    asymmetry = step_asymmetry(config, inputs)
-    return export.export_model(config, *start, kind, adams_law, git_commit(), stem, tilted, asymmetry).files
+    start = GaitStart(*rigid_start(config, inputs), step_asymmetry(config, inputs))
+    return export.export_model(config, start, kind, adams_law, git_commit(), stem, tilted).files

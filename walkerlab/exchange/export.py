@@ -12,10 +12,9 @@ from walkerlab.exchange import mjcf
 from walkerlab.exchange.adams import command_text, dataset_text
 from walkerlab.exchange.adams_model import adams_model
 from walkerlab.exchange.adams_view import view_text
-from walkerlab.exchange.exported import Exported, prepare_export
+from walkerlab.exchange.exported import Exported, GaitStart, prepare_export
 from walkerlab.exchange.mjcf import Slope
 from walkerlab.exchange.planar import SMALLEST_BALL_M
-from walkerlab.physics.solvers.system import State
 
 if TYPE_CHECKING:
     from walkerlab.config.schema import Config
@@ -38,31 +37,26 @@ class ExportedFiles:
 
 def export_model(
     config: Config,
-    rigid_step_length_m: float,
-    rigid_state: State,
+    start: GaitStart,
     kind: Kind,
     law: Law = "contact",
     commit: str | None = None,
     stem: str | None = None,
     slope: Slope = "gravity",
-    asymmetry: float = 0.0,
 ) -> ExportedFiles:
-    """Export a walker to another program, with the start that `contact-sim` derives from a rigid state.
+    """Export a walker to another program, with the start that `contact-sim` derives from a rigid start.
 
-    rigid_step_length_m  step length of the rigid gait (m), the default distance between pads
-    rigid_state          start of the rigid model: its gait, or another state with both feet on the slope
-    kind                 adm: dataset and commands of ADAMS/Solver; cmd: commands of Adams View; mjcf: MuJoCo model
-    law                  contact law in ADAMS: its own contact between shapes, or walkerlab's law as functions
-    commit               commit of walkerlab, for the header of the file
-    stem                 stem of the file names; by default the config's name
-    slope                in MuJoCo: whether gravity is tilted, or the ground and the walker on it
-    asymmetry            difference between the step lengths of the rigid gait over their mean, for the lanes of pads
+    kind    adm: dataset and commands of ADAMS/Solver; cmd: commands of Adams View; mjcf: MuJoCo model
+    law     contact law in ADAMS: its own contact between shapes, or walkerlab's law as functions
+    commit  commit of walkerlab, for the header of the file
+    stem    stem of the file names; by default the config's name
+    slope   in MuJoCo: whether gravity is tilted, or the ground and the walker on it
 
     Raises ConfigError if the format cannot express something that affects the walk, NoAnswer if the distance between
     pads depends on a contact gait and none is found.
     """
     locked = config if kind == "mjcf" else add_stops(config)
-    export = prepare_export(locked, rigid_step_length_m, rigid_state, asymmetry)
+    export = prepare_export(locked, start)
     stem = stem or export.model_name
     left_out = tuple(parts_left_out(export, config, kind, law, f"{stem}.py"))
     tilted = "gravity" if slope == "gravity" else "ground"

@@ -7,12 +7,12 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 import walkerlab
-from walkerlab.config.drives import Hip
+from walkerlab.config.drives import Hip, push_offs
 from walkerlab.config.walkers import contact_required_error
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.engine_scene import EngineScene, refuse_one_knee, scene_for_engines
@@ -40,6 +40,19 @@ class Pad:
     centre_m: float
     length_m: float
     height_m: float
+
+
+class GaitStart(NamedTuple):
+    """Start of a walk in the rigid model, with the steps of its gait.
+
+    step_length_m  mean step length (m), the default distance between pads
+    state          the gait, or another state with both feet on the slope
+    asymmetry      difference between the gait's step lengths over their mean, for the lanes of pads
+    """
+
+    step_length_m: float
+    state: State
+    asymmetry: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,8 +88,7 @@ class Exported:
     @property
     def impulses_N_s(self) -> tuple[float, float]:
         """Impulse of the push-off of each leg."""
-        impulse = self.config.push_off.impulse_N_s
-        return impulse, impulse
+        return push_offs(self.config.push_off)
 
     @property
     def hip(self) -> Hip:
@@ -169,17 +181,15 @@ def identifier(name: str) -> str:
     return plain if plain[:1].isalpha() else f"m_{plain}"
 
 
-def prepare_export(config: Config, rigid_step_length_m: float, rigid_state: State, asymmetry: float = 0.0) -> Exported:
-    """Place the walker of a config on its ground, with the start that `contact-sim` derives from a rigid state.
-
-    asymmetry  difference between the step lengths of the rigid gait over their mean, for the lanes of pads
+def prepare_export(config: Config, start: GaitStart) -> Exported:
+    """Place the walker of a config on its ground, with the start that `contact-sim` derives from a rigid start.
 
     Raises ConfigError for a walker or a ground that cannot be exported.
     """
     refuse(config)
-    contact_scene = scene_on_pads(config, rigid_step_length_m, rigid_state, asymmetry=asymmetry)
+    contact_scene = scene_on_pads(config, start.step_length_m, start.state, asymmetry=start.asymmetry)
     steps = 2 * config.strides
-    scene = scene_for_engines(contact_scene, rigid_state)
+    scene = scene_for_engines(contact_scene, start.state)
     heights = foothold_heights(config.ground, steps + 1)
     walk = contact_scene.walk(scene.start, steps, tolerances_of(config, steps), None, heights)
     return Exported(config, scene, steps, walk, heights, contact_scene.pinned)

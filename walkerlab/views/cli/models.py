@@ -6,6 +6,7 @@ from pathlib import Path
 
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.export import ENDINGS, export_model, law_named, slope_named
+from walkerlab.exchange.exported import GaitStart
 from walkerlab.pipeline.plan.resolve import resolve, warn_of_edits
 from walkerlab.pipeline.run.runner import Options, execute
 from walkerlab.pipeline.stages.walk import rigid_start, step_asymmetry
@@ -52,10 +53,8 @@ def write_model(
             raise report.no_answer
         assert report.artifact is not None, "a stage with an answer stores it"
         inputs["fixedpoint"] = artifact.read(report.artifact)
-    start = rigid_start(config, inputs)
-    asymmetry = step_asymmetry(config, inputs)
-    tilted = slope_named(slope)
-    exported = export_model(config, *start, kind, adams_law, git_commit(), path.stem, tilted, asymmetry)
+    start = GaitStart(*rigid_start(config, inputs), step_asymmetry(config, inputs))
+    exported = export_model(config, start, kind, adams_law, git_commit(), path.stem, slope_named(slope))
     for omission in exported.left_out:
         console.note(f"left out: {omission}")
     paths = [path, *(path.with_name(name) for name in list(exported.files)[1:])]
