@@ -173,7 +173,7 @@ def test_parameter_without_valid_neighbours_is_reported_with_the_reason():
     found = run("kuo", "robustness.to=[walker.hip.torque_N_m]", "robustness.roughness_m=[]", "robustness.steps=1")
     rows = found.summary["sensitivity"]
     assert {row["of"] for row in rows} >= {"period_s", "spectral_radius"}
-    assert all(row["value"] is None and row["why"] == robustness.NONE_BESIDE.why for row in rows)
+    assert all(row["value"] is None and row["why"] == robustness.NO_NEIGHBOURS.why for row in rows)
 
 
 def test_gradients_do_not_depend_on_the_number_of_processes(rigid):
