@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 Inputs = Callable[["Config"], tuple[str, ...]]
 WALKED = ("fixedpoint", "simulate", "contact-sim")
 DRAWINGS = ("plot", "report")
-FOR_LEGS_THAT_DIFFER = (
-    *WALKED, "compare", "continuation", "robustness", "design", "basin", "accuracy", "stability", "engines", *DRAWINGS,
-)  # fmt: skip
-"""Stages that support legs that differ; all others refuse them."""
 Lacks = Callable[["Config"], tuple[dict[str, str], ...]]
 OptionKind = Literal[
     "word", "int", "float", "switch", "text", "texts", "key", "bounds", "bounds-or-none", "pairs", "numbers", "units"
@@ -118,6 +114,7 @@ class Stage:
     # None for the whole config
     takes: type | Callable[[Config], type] | None
     inputs: Inputs = nothing  # returns the earlier stages whose results this stage needs under a config
+    needs_equal_legs: bool = False
     if_current: tuple[str, ...] = ()  # stages whose results this stage uses only if they are current
     options: tuple[Option, ...] = ()  # options of the stage's command in addition to those of all stages
     requires: tuple[str, ...] = ()  # config blocks that the stage needs; it is left out if one is missing
@@ -158,7 +155,7 @@ class Stage:
         """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
         # walkers made of parts have no key `leg_2`
         one_leg = getattr(config.walker, "leg_2", ...) is None and config.push_off.leg_2 is None
-        if self.name in FOR_LEGS_THAT_DIFFER or one_leg:
+        if one_leg or not self.needs_equal_legs:
             return None
         from walkerlab.scene.rigid import have_different_legs  # imported here: equal legs need no mechanics
 
@@ -172,10 +169,9 @@ class Stage:
                 "Name its file: walkerlab compare --with FILE.",
             )
         if self.why_no_such_legs(config) is not None:
-            known = ", ".join(FOR_LEGS_THAT_DIFFER)
             raise ConfigError(
                 f"{target} needs two equal legs, but those of this walker differ.",
-                f"Leave out walker.leg_2, or ask one of: {known}.",
+                f"Leave out walker.leg_2 and push_off.leg_2, or ask another stage, such as {', '.join(WALKED)}.",
             )
         # Imported here: the command line's help needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add
