@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Protocol
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 import walkerlab
+from walkerlab.config import reads
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Contact
 from walkerlab.physics.ground.friction import friction_coefficient
@@ -108,12 +108,12 @@ def test_example_figure_of_the_docs_is_drawn(tmp_path, monkeypatch):
     assert drawing.caption.endswith("contact model, at most 0.6 mm.")
 
 
-def test_example_stage_of_the_docs_runs():
+def test_example_stage_of_the_docs_runs(monkeypatch):
     type_it_takes, module, entry = (code for code in code_to_add() if "peed" in code)
-    names = {"Protocol": Protocol, "Mapping": dict, "Content": Content, "Group": Group, "Variable": Variable}
-    exec(type_it_takes + module, names | {"Progress": object, "Stage": Stage, "results_of": results_of}, names)
-    reads = SimpleNamespace(SpeedConfig=names["SpeedConfig"])
-    stage = eval(entry, {"Stage": Stage, "results_of": results_of, "reads": reads}, names)
+    exec(type_it_takes, vars(reads), names := {})
+    monkeypatch.setattr(reads, "SpeedConfig", names["SpeedConfig"], raising=False)
+    exec(module, names)
+    stage = eval(entry, {"Stage": Stage, "results_of": results_of, "reads": reads})
     assert stage.reads(load().config) == ("gravity_m_s2",)
     steps = {name: Variable(np.array([0.5]), ("step",), "1", name) for name in ("length_m", "period_s")}
     found = names["run"](SimpleNamespace(gravity_m_s2=10.0), {"simulate": Content({"steps": Group(steps)}, {})}, None)

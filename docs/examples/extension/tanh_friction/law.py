@@ -12,7 +12,7 @@ class Tanh(NamedTuple):
     largest: float  # [mu] coefficient at any slip
     velocity: float  # [v_0] m/s
     rising_until: float  # m/s, slip velocity beyond which friction grows by less than half a per cent
-    sliding_from: float  # m/s, slip velocity beyond which the foot slides
+    sliding_from: float  # m/s, slip velocity above which the coefficient is constant, to half a per cent
 
     @classmethod
     def from_contact(cls, contact):
