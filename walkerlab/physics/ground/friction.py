@@ -1,8 +1,9 @@
 """Friction laws of the ground: ADAMS's Coulomb friction without true stick, or none.
 
 A law is a class that holds the law's parameters and has the members of `FrictionLaw`. It needs a case of
-`friction_coefficient`, a name in `FRICTION_LAWS` and, if its coefficient has several formulas, cases of
-`switching_count` and `sample_switching`. No other file depends on the choice of law.
+`friction_coefficient` and, if its coefficient has several formulas, cases of `switching_count` and `sample_switching`.
+Built-in laws have a name in `FRICTION_LAWS`, and those of a package one in its `Extension`. No other file depends on
+the choice of law.
 """
 
 from __future__ import annotations
