@@ -98,7 +98,7 @@ def test_slope_set_in_both_units_is_rejected(settings) -> None:
         load(None, settings)
 
 
-def test_setting_a_block_replaces_all_of_it() -> None:
+def test_setting_a_block_replaces_the_whole_block() -> None:
     contact = load(None, ["contact.damping=50", "contact={stiffness: 2e5}"]).config.contact
     assert contact == Contact(stiffness=2e5)
 

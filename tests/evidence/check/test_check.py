@@ -66,7 +66,7 @@ def test_bounds_uncertainties_and_complex_values_are_read(text, right, fits):
 
 
 @pytest.mark.parametrize("text", ["0,25", "abc", "0.1 s", "1e9999", "", "1 2", "0x10", "--3", "0.5±", "[1, 2, 3]", "∞"])
-def test_what_is_no_printed_value_is_not_read(text):
+def test_text_that_is_not_a_printed_value_is_not_read(text):
     assert parse_printed(text) is None
 
 
@@ -237,7 +237,7 @@ def test_a_lost_sign_and_transposed_digits_are_misprints():
     assert swapped.explanations[0]["what"] == "two digits of the printed stance rate are transposed"
 
 
-def test_one_value_is_never_explained():
+def test_difference_of_a_single_printed_value_is_not_explained():
     answer = walkerlab.check("paper", {"period_s": "0.7064"})
     assert (answer.finding, answer.explanations) == ("different, unexplained", [])
 
@@ -291,7 +291,7 @@ ODD = {
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_odd_files_are_refused_in_words(name, tmp_path):
+def test_malformed_check_files_are_refused_with_a_reason(name, tmp_path):
     text, words = ODD[name]
     done = run(written(tmp_path, text))
     assert done.exit_code == ConfigError.exit_code

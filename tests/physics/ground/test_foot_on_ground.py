@@ -51,7 +51,7 @@ def test_slip_is_the_velocity_of_the_foot_material_at_the_contact(theta, omega, 
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
-def test_energies_are_those_of_legs_and_hip(theta, omega, slip, vertical_velocity, depth, foot):
+def test_energies_are_sums_over_legs_and_hip(theta, omega, slip, vertical_velocity, depth, foot):
     walker = ground.compass()
     state = ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity)
     bodies = ground.masses_of_the_compass(state)

@@ -544,6 +544,6 @@ def test_loss_of_an_attractor_does_not_depend_on_the_grid(values):
     assert found.reason == "fell"
 
 
-def test_attractor_missing_at_the_first_value_is_lost_there():
+def test_attractor_missing_at_the_first_value_is_reported_as_lost_there():
     found = sweep_attractor(LostBeyond(1.0), np.zeros(1), [2.0, 3.0], 4, 8)
     assert (found.found, found.lost_at) == ((), 2.0)

@@ -68,7 +68,7 @@ def test_touching_zero_without_sign_change_is_not_a_crossing():
     assert crossing(-touching - 1e-12) == NO_CROSSING
 
 
-def test_zero_at_the_start_is_not_found_again():
+def test_crossing_at_the_start_is_not_found_twice():
     # what the event before left behind: zero but for rounding, of either sign
     for rounding in (0.0, 1e-17, -1e-17):
         event = with_roots(0.0, 1.5) + rounding
