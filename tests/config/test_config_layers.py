@@ -46,7 +46,7 @@ def test_null_removes_an_inherited_block(loaded: Loaded) -> None:
     assert loaded("extends: paper\ncontact: null\n").config.contact is None
 
 
-def test_list_is_replaced_whole(loaded: Loaded) -> None:
+def test_list_in_a_config_replaces_the_whole_inherited_list(loaded: Loaded) -> None:
     assert loaded("extends: paper\noutputs: [forces]\n").config.outputs == ("forces",)
 
 

@@ -309,7 +309,7 @@ def test_three_header_rows_and_likelihoods_are_read(tmp_path):
     assert steps_of(path, columns=named, fps=240.0, min_likelihood=0.6)["steps"] == 7
 
 
-def test_a_limit_without_likelihoods_is_refused(tmp_path):
+def test_minimum_likelihood_is_refused_for_data_without_likelihoods(tmp_path):
     with pytest.raises(ConfigError, match="has no likelihoods of markers"):
         read(tmp_path, *sampled(), min_likelihood=0.6)
 

@@ -56,7 +56,7 @@ def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
     assert 0.5 < errors.mean() / corrected.std(ddof=1) < 2.0
 
 
-def test_few_steps_have_no_multiplier_of_their_own():
+def test_multipliers_are_not_measured_from_seven_steps():
     measured, _ = truth().walk(0)
     few = replace(measured, periods_s=measured.periods_s[:7], lengths_m=measured.lengths_m[:7])
     assert identify(few).measured_radius is None

@@ -124,7 +124,7 @@ def test_a_damped_knee_takes_work_that_the_hip_does_not():
     assert not walker.changed(knees=(0.0, 0.0, 0.0)).laws[HIP_ROW + 1 :].any()
 
 
-def test_the_mean_of_two_legs_is_one_walker_of_equal_legs():
+def test_averaging_two_legs_gives_equal_legs_in_either_order():
     walker = model_of(draw_walker("round", 7))
     even = average_legs(walker, 0.0)
     assert not even.legs_differ

@@ -107,7 +107,7 @@ def test_event_function_that_is_always_zero_has_no_crossing():
 
 
 @pytest.mark.parametrize("degree", [3, 5, 7])
-def test_root_finders_of_other_degrees_agree(degree):
+def test_root_finders_of_every_degree_find_the_same_crossing(degree):
     finder = finder_on(with_roots(0.25, 0.5, 0.75), degree=degree)
     assert first_crossing(finder, 0, RISING, 0.3, False) == pytest.approx(0.75, abs=1e-12)
 
@@ -137,5 +137,5 @@ def test_direction_from_zero_follows_the_slope_despite_an_event_residual(left):
     assert way_from_zero(finder_on(left + Polynomial([0.0, 0.0, 1e-2])), 0, 1e-12) > 0.0
 
 
-def test_rounding_gives_no_direction_from_zero():
+def test_values_within_rounding_give_no_direction_from_zero():
     assert way_from_zero(finder_on(Polynomial([0.0, 1e-16, -2e-16])), 0, 1e-12) == 0.0

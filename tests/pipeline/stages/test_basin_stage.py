@@ -95,7 +95,7 @@ def test_walking_share_of_a_cell_is_that_of_a_finer_grid(tmp_path, whole):
     np.testing.assert_allclose(shares[between], blocks[between], atol=1e-12)
 
 
-def test_normal_weights_favour_a_gait_in_the_middle(whole):
+def test_normal_weights_are_largest_at_the_gait_and_sum_to_one(whole):
     window = basin.window_of(load(None, SMALL).config, GAIT["state"][1:])
     weights = basin.gaussian(window)
     assert weights.sum() == pytest.approx(1.0)
