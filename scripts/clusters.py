@@ -173,13 +173,13 @@ def swept(folder: Path, seeds: str, engine: str = "slurm", chunk_s: float = 600.
 
     from walkerlab.config.loader import load
     from walkerlab.pipeline.store.runs import RunFolder
-    from walkerlab.pipeline.sweeps.engines import ENGINES, Order
+    from walkerlab.pipeline.sweeps.engines import ENGINES, EngineOptions
     from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
 
     loaded = load()
     run = SweepRun(build_sweep("deadly", [axis_of_text(f"seed={seeds}")]), loaded, RunFolder(folder, "paper"), GRAPH)
-    given = Order(modules=("toy_sweep.deadly",), folder=run.folder.path, **order)
+    given = EngineOptions(modules=("toy_sweep.deadly",), folder=run.folder.path, **order)
     return run.run(SweepWork(ENGINES[engine], given, chunk_s))
 
 

@@ -299,7 +299,7 @@ def test_picture_is_out_of_date_when_a_label_changes(tmp_path, monkeypatch):
     assert list(MAKER["stale_pictures"](tmp_path / "runs")) == [tmp_path / "images" / "figure-06.png"]
 
 
-def test_words_of_a_drawing_exclude_numbers():
+def test_words_of_a_picture_contain_no_numbers():
     words_of = MAKER["stale_pictures"].__globals__["words_of"]
     svg = "<text x='1'>slope (rad)</text><text>0.25</text><text><tspan>step 12</tspan></text>"
     assert words_of(svg) == "slope (rad)\nstep #\n"

@@ -92,7 +92,7 @@ def test_slice_contains_only_the_keys_that_a_type_names() -> None:
     assert slice_of(CONFIG, ToleranceConfig) == {"solver": {"rigid": {"rtol": 1e-10}, "contact": {"rtol": 1e-7}}}
 
 
-def test_missing_block_is_none() -> None:
+def test_block_that_a_config_lacks_is_none_in_its_slice() -> None:
     assert slice_of(Config(), ContactConfig)["contact"] is None
     assert restrict(Config(), ContactConfig).contact is None
 
@@ -131,7 +131,7 @@ def test_slice_has_the_same_values_as_the_config() -> None:
 
 
 @pytest.mark.parametrize("key", ["strides", "solver.rigid.atol", "solver.model_dump", "model_dump"])
-def test_slice_has_no_other_keys(key: str) -> None:
+def test_slice_has_only_the_keys_of_its_type(key: str) -> None:
     given, (*blocks, name) = restrict(CONFIG, StartThenTolerance), key.split(".")
     for block in blocks:
         given = getattr(given, block)

@@ -46,7 +46,7 @@ def test_null_removes_an_inherited_block(loaded: Loaded) -> None:
     assert loaded("extends: paper\ncontact: null\n").config.contact is None
 
 
-def test_list_is_replaced_whole(loaded: Loaded) -> None:
+def test_list_in_a_config_replaces_the_whole_inherited_list(loaded: Loaded) -> None:
     assert loaded("extends: paper\noutputs: [forces]\n").config.outputs == ("forces",)
 
 
@@ -98,7 +98,7 @@ def test_slope_set_in_both_units_is_rejected(settings) -> None:
         load(None, settings)
 
 
-def test_setting_a_block_replaces_all_of_it() -> None:
+def test_setting_a_block_replaces_the_whole_block() -> None:
     contact = load(None, ["contact.damping=50", "contact={stiffness: 2e5}"]).config.contact
     assert contact == Contact(stiffness=2e5)
 

@@ -222,11 +222,11 @@ def test_no_existing_key_or_config_counts_as_beyond_scope() -> None:
 
 def test_error_in_a_question_block_points_to_its_key(loaded: Loaded) -> None:
     config = loaded("robustness:\n  to: [walker.hip_mass_kg, foo]\n")
-    error = config.placed(ConfigError("robustness.to: foo is no key", "advice", ("robustness", "to", 1)))
+    error = config.add_position(ConfigError("robustness.to: foo is no key", "advice", ("robustness", "to", 1)))
     assert error.message.endswith("mine.yaml:2:28: robustness.to: foo is no key")
     elsewhere = ConfigError("of no key")
-    assert config.placed(elsewhere) is elsewhere
-    assert config.placed(ConfigError("of a default", "", ("design", "over"))).message == "of a default"
+    assert config.add_position(elsewhere) is elsewhere
+    assert config.add_position(ConfigError("of a default", "", ("design", "over"))).message == "of a default"
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_quoted_scalar_is_a_string() -> None:
     assert plain(root) == {"a": "1", "b": "no", "c": "x\n"}
 
 
-def test_every_key_and_value_knows_its_line_and_column() -> None:
+def test_every_key_and_value_has_its_line_and_column() -> None:
     root = read("# c\na:\n  b: [1, no]\n", "f.yaml")
     assert isinstance(root, BlockNode)
     inner = root.entries["a"]

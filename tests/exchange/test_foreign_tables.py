@@ -385,7 +385,7 @@ def test_qualisys_table_with_column_headers_is_read(tmp_path):
     assert holds_the_walk(read(tmp_path, "walk.tsv", text, LINES, {"time": "s"}))
 
 
-def test_table_of_frame_numbers_asks_for_times(tmp_path):
+def test_frame_numbers_without_a_frame_rate_are_refused(tmp_path):
     with pytest.raises(ConfigError, match="no time column") as caught:
         read(tmp_path, "walk.csv", table(header=("frame_idx", *HEADER[1:])))
     assert "--fps" in caught.value.advice
@@ -496,7 +496,7 @@ def test_circular_links_are_rejected(tmp_path):
         read_recording(tmp_path / "walk.csv")
 
 
-def test_file_of_markers_asks_which_ones_form_a_leg(tmp_path):
+def test_file_of_markers_is_refused_unless_the_markers_of_a_leg_are_named(tmp_path):
     path = tmp_path / "markers.csv"
     path.write_text("time (s),PELVIS.x,PELVIS.y,HEEL.x,HEEL.y\n0,0,1,0,0\n0.01,0,1,0,0\n", encoding="utf-8")
     with pytest.raises(ConfigError, match="has no column for 'angle 1', but markers: PELVIS, HEEL") as refused:

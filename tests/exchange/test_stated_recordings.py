@@ -69,7 +69,7 @@ def test_a_constant_without_a_unit_of_angles_is_refused(source, message, tmp_pat
         read(tmp_path, time, angle, columns={"angle 1": source})
 
 
-def test_angles_from_the_horizontal_are_told_how_to_turn_them(tmp_path):
+def test_angles_from_the_horizontal_are_refused_with_the_option_that_turns_them(tmp_path):
     time, angle = sampled()
     with pytest.raises(ConfigError, match=r"lies around -8[89] degrees") as refused:
         read(tmp_path, time, np.degrees(angle) - 90.0, "time (s),right thigh (deg),angle 2 (deg)",
@@ -138,7 +138,7 @@ def test_a_free_tilt_and_a_free_offset_are_one_unknown():
     ],
 )
 @pytest.mark.parametrize("block", ["recording", "identify"])
-def test_impossible_statements_are_refused(block, setting, message):
+def test_impossible_values_of_recording_keys_are_refused(block, setting, message):
     with pytest.raises(ConfigError, match=message):
         load(Path("paper"), (f"{block}.to_s=1", f"{block}.{setting}"))
 
@@ -309,7 +309,7 @@ def test_three_header_rows_and_likelihoods_are_read(tmp_path):
     assert steps_of(path, columns=named, fps=240.0, min_likelihood=0.6)["steps"] == 7
 
 
-def test_a_limit_without_likelihoods_is_refused(tmp_path):
+def test_minimum_likelihood_is_refused_for_data_without_likelihoods(tmp_path):
     with pytest.raises(ConfigError, match="has no likelihoods of markers"):
         read(tmp_path, *sampled(), min_likelihood=0.6)
 

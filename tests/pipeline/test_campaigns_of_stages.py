@@ -52,7 +52,7 @@ def test_page_without_the_campaign_says_how_to_run_it(toy):
     assert actions(toy.execute("page"))["page"] == "run"
 
 
-def test_other_results_are_current_without_it(toy):
+def test_missing_or_outdated_campaign_leaves_other_results_current(toy):
     toy.execute("page")
     assert states(toy)["census"] == "not run"
     toy.execute("survey", full=True)

@@ -148,7 +148,7 @@ def test_drawing_uses_whatever_results_are_current(toy):
     assert toy.execute("picture").reused
 
 
-def test_without_a_contact_block_its_stage_fails_and_drawings_omit_it(toy):
+def test_contact_stage_fails_and_drawings_omit_it_without_a_contact_block(toy):
     with pytest.raises(ConfigError, match="contact block"):
         toy.execute("bounce", config="rigid-only")
     report = toy.execute("page", config="rigid-only")
@@ -178,7 +178,7 @@ def test_missing_answer_is_stored_and_reported_again(toy):
     assert read(first.artifact)["fall"]["height"][0] == 1.0
 
 
-def test_stages_after_a_missing_answer_run_without_it(toy):
+def test_stages_after_one_without_an_answer_still_run(toy):
     report = toy.execute("roll", STEEP)
     assert actions(report) == {"drop": "run", "roll": "leave out"}
     assert report.artifact is None

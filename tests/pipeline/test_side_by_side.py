@@ -119,7 +119,7 @@ def test_killed_process_is_reported(toy):
         toy.execute("page", jobs=2)
 
 
-def test_chain_of_stages_runs_in_one_process(toy):
+def test_stages_that_need_each_other_are_not_run_side_by_side(toy):
     config, _ = toy.loaded()
     chain = [toy.graph[name] for name in ("drop", "roll")]
     assert not any_side_by_side(chain, config)

@@ -57,7 +57,7 @@ def test_point_foot_starts_like_the_pinned_foot():
     assert free == pinned
 
 
-def test_contact_of_the_paper_is_in_adams_units():
+def test_adams_units_of_the_paper_are_converted_to_si():
     walker = scene_of().walker
     assert walker.normal == pytest.approx((1e5 * 1000**2.2, 2.2, 90e3, 1e-4))
     assert walker.friction == pytest.approx((0.9, 0.7, 0.1, 1.0))

@@ -226,7 +226,7 @@ def fitted_with_sensitivities(key):
     return values(result), {entry.estimate: entry for entry in result.sensitivities if entry.to == key}
 
 
-def test_the_size_of_one_percent_of_zero_comes_from_the_leg():
+def test_one_percent_of_a_zero_inertia_is_taken_of_leg_mass_times_length_squared():
     _, entries = fitted_with_sensitivities("walker.leg_inertia_kg_m2")
     assert [entry.change for entry in entries.values()] == pytest.approx([0.01 * 5.0 * 1.0**2] * 2)
     assert fitted_with_sensitivities("walker.hip.torque_N_m")[1] == {}

@@ -56,7 +56,7 @@ def test_multipliers_of_the_steps_alone_are_corrected_for_noise():
     assert 0.5 < errors.mean() / corrected.std(ddof=1) < 2.0
 
 
-def test_few_steps_have_no_multiplier_of_their_own():
+def test_multipliers_are_not_measured_from_seven_steps():
     measured, _ = truth().walk(0)
     few = replace(measured, periods_s=measured.periods_s[:7], lengths_m=measured.lengths_m[:7])
     assert identify(few).measured_radius is None
@@ -100,7 +100,7 @@ def test_rigid_walk_does_not_determine_the_mass_scale():
     assert abs(hip.value - 10.0) < 4.0 * hip.standard_error
 
 
-def test_two_exact_steps_name_every_undetermined_parameter():
+def test_every_parameter_that_two_exact_steps_leave_undetermined_is_named():
     own = truth()
     walk = own.walks.take_disturbed_walk(own.z * 1.01, tuple(own.values), np.zeros(3))
     measured = MeasuredWalk(walk.durations_s, walk.lengths_m)
@@ -170,7 +170,7 @@ def wrong_walks():
 
 
 @pytest.mark.parametrize("name", ["limp", "missed step", "mm for m", "ms for s"])
-def test_wrong_data_do_not_fit(name):
+def test_limping_walks_missed_steps_and_wrong_units_do_not_fit(name):
     try:
         result = identify(wrong_walks()[name])
     except NoAnswer as error:

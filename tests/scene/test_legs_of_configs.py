@@ -51,7 +51,7 @@ def test_leg_2_holds_the_keys_that_differ():
     assert (first.centre_m[1], other.centre_m[1]) == (-0.5, -0.52)
 
 
-def test_parts_of_a_kneed_leg_2_keep_what_it_does_not_say():
+def test_keys_that_a_kneed_leg_2_omits_are_those_of_leg_1():
     walker = config_of("kneed", KNEES).walker
     bodies = {body.name: body for body in assembly_of(walker).bodies}
     assert (bodies["shank 1"].mass_kg, bodies["shank 2"].mass_kg) == (0.05, 0.053)
@@ -80,7 +80,7 @@ def test_two_descriptions_in_parts_make_legs_that_differ(tmp_path):
     (["walker.leg_2={mass: 1}"], "mass"),
     ([HEAVY, "equations=as-printed"], "compass"),
 ])  # fmt: skip
-def test_a_leg_2_that_cannot_be_meant_is_refused(settings, reason):
+def test_invalid_keys_of_leg_2_are_refused_by_name(settings, reason):
     with pytest.raises(ConfigError, match=reason):
         config_of("paper", *settings)
 

@@ -147,7 +147,7 @@ def test_rigid_limit_reduces_the_creep_of_any_law(own):
     assert trial.walker.friction.v_0 == pytest.approx(0.1 * CREEP_FACTOR)
 
 
-def test_any_law_can_be_too_slippery_for_the_slope(own):
+def test_friction_law_too_weak_for_the_slope_explains_the_missing_gait(own):
     assert why_no_gait(own.walker) is None
     weak = own.walker._replace(friction=Regularised(0.01, 0.1))
     assert "0.01 is below the slope's 0.0174" in why_no_gait(weak)[0]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from walkerlab.config.fields import leaves, leaves_of_other_kinds, type_words
+from walkerlab.config.fields import describe_type, leaves, leaves_of_other_kinds
 from walkerlab.config.loader import load
 from walkerlab.config.schema import Config
 from walkerlab.errors import ConfigError
@@ -45,7 +45,7 @@ def numbers_of(config, second_leg=False):
         for name in path:
             if name != "leg_2" or not second_leg:
                 held = getattr(held, name, None)
-        if path[0] in MODEL_KEYS and "number" in type_words(field.annotation) and isinstance(held, int | float):
+        if path[0] in MODEL_KEYS and "number" in describe_type(field.annotation) and isinstance(held, int | float):
             yield ".".join(path)
 
 

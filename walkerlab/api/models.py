@@ -138,7 +138,7 @@ def _export_texts(
         if gait.no_answer is not None:
             raise NoAnswer(gait.no_answer)
         inputs["fixedpoint"] = gait.content
-    adams_law = export.law_named(law)
-    tilted = export.slope_named(slope)
+    adams_law = export.parse_law(law)
+    tilted = export.parse_slope(slope)
     start = GaitStart(*rigid_start(config, inputs), step_asymmetry(config, inputs))
     return export.export_model(config, start, kind, adams_law, git_commit(), stem, tilted).files

@@ -207,7 +207,7 @@ def sweep(
     >>> [round(float(period), 4) for period in gaits.period_s]
     [0.7036, 0.7343]
     """
-    from walkerlab.pipeline.sweeps.engines import Order, engine_named
+    from walkerlab.pipeline.sweeps.engines import EngineOptions, parse_engine
     from walkerlab.pipeline.sweeps.question import build_sweep
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
 
@@ -222,9 +222,11 @@ def sweep(
         raise TypeError(f"sweep has no argument {min(unknown)!r}")
     seed = block.seed if combined.get("seed") is None else combined["seed"]
     question = build_sweep(stage, listed, combined.get("zip") or False, combined.get("sample") or "", seed)
-    chosen, address = engine_named(engine)
-    order = Order(jobs, address, modules_of(stage, resolved.loaded.config, PIPELINE), resolved.folder.path)
-    swept = SweepRun(question, resolved.loaded, resolved.folder).run(SweepWork(chosen, order))
+    chosen, address = parse_engine(engine)
+    engine_options = EngineOptions(
+        jobs, address, modules_of(stage, resolved.loaded.config, PIPELINE), resolved.folder.path
+    )
+    swept = SweepRun(question, resolved.loaded, resolved.folder).run(SweepWork(chosen, engine_options))
     if swept.failed:
         raise swept.error()
     return dataset(swept.content[""])
@@ -264,7 +266,7 @@ def sweep_values(key: str, values: Sequence[Setting] | str) -> str | list[Settin
         return values
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise ConfigError(
-            f"over {key}: {values!r} is not a list of values, nor a range FROM:TO:N.",
+            f"over {key}: {values!r} is neither a list of values nor a range FROM:TO:N.",
             f'For example {{"{key}": [1, 2]}} or {{"{key}": "1:3:5"}}.',
         )
     return list(itertools.islice(values, MAX_POINTS + 1))  # one value too many is enough for the error

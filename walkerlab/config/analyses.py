@@ -154,7 +154,7 @@ class Design(Block):
     over: Bounds = key(
         dict,
         "",
-        "parameters that may vary, with their bounds, in the key's unit",
+        "parameters that may vary, with bounds in the key's unit",
         bounds="[A, B] for each key, A below B",
     )
     keep: Bounds = key(dict, "", "gait quantities to constrain", bounds=f"[A, B] for each of {_QUANTITY_NAMES}")
@@ -272,7 +272,7 @@ class Case(Block):
         gt=0.0,
     )
     compared_steps: int = key(20, "1", "steps whose times are compared; use fewer where small errors grow", ge=1)
-    twin: bool = key(False, "", "whether the same walker in another size must walk alike")
+    twin: bool = key(False, "", "whether the walker scaled to another size must take the same steps")
 
     @field_validator("expected")
     @classmethod
@@ -301,7 +301,7 @@ class Sweep(Block):
     over: dict[str, Values] = key(
         dict,
         "",
-        "keys of a config with their values, in the key's unit; the last key changes fastest",
+        "config keys to sweep, with values in the key's unit; the last key changes fastest",
         bounds="FROM:TO:N, FROM:TO:N:log or a list, for each key",
     )
     zip: bool = key(False, "", "the n-th values of all keys make the n-th point, instead of the full grid")

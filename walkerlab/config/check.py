@@ -12,7 +12,7 @@ from walkerlab.config.fields import Block, Text, key, meaning_error
 
 Body = Literal["swing", "stance", "shank"]
 Instant = Literal["after-strike", "before-strike", "mid-stance"]
-MAX_PRINTED = 64  # characters of a value
+MAX_PRINTED = 64  # maximum number of characters in a printed value
 _NUMBER: Final = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
 _SIGNED: Final = rf"[-+]?{_NUMBER}"
 _WORDS: Final = {

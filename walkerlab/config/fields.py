@@ -135,20 +135,20 @@ _KINDS: Final[dict[Any, str]] = {float: "number", int: "integer", str: "text", b
 _SIGNS: Final = (("ge", "from"), ("gt", "above"), ("le", "up to"), ("lt", "below"))
 
 
-def type_words(annotation: Any) -> str:
+def describe_type(annotation: Any) -> str:
     """Describe a type: number, integer, text, word, list, or a choice of these."""
     if annotation in _KINDS:
         return _KINDS[annotation]
     origin = get_origin(annotation)
     if origin is Annotated:
-        return type_words(get_args(annotation)[0])
+        return describe_type(get_args(annotation)[0])
     if origin is Literal:
         return "word"
     if origin is tuple:
         return "list"
     if origin in (Union, types.UnionType):
         return " or ".join(
-            dict.fromkeys(type_words(part) for part in get_args(annotation) if part is not types.NoneType)
+            dict.fromkeys(describe_type(part) for part in get_args(annotation) if part is not types.NoneType)
         )
     return "block"
 
@@ -164,7 +164,7 @@ def words_of(annotation: Any) -> tuple[str, ...]:
 def bounds_of(field: FieldInfo) -> str:
     """Describe a key's bounds without unit, e.g. `from 0.001 to 1000`, or return '' if it has none."""
     description = annotation_of(field, "bounds")
-    what = type_words(field.annotation)
+    what = describe_type(field.annotation)
     if description:
         return description
     if what in ("word", _KINDS[bool]):
@@ -182,7 +182,7 @@ def describe_allowed(field: FieldInfo) -> str:
         return "a block of keys, or null to leave it out" if optional else "a block of keys"
     bounds = bounds_of(field)
     unit = annotation_of(field, "unit")
-    what = type_words(field.annotation)
+    what = describe_type(field.annotation)
     if what == "word":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():

@@ -37,13 +37,13 @@ from walkerlab.config.validation import Location, align_start, key_at, node_at, 
 from walkerlab.config.walkers import CompassWalker
 from walkerlab.errors import ConfigError
 
-STEEP_RAD: Final = 0.5
+IMPLAUSIBLE_SLOPE_RAD: Final = 0.5
 """Steeper than any slope on which passive walkers are known to walk; a larger value is perhaps in degrees."""
-LONG_M: Final = 20.0
+IMPLAUSIBLE_LENGTH_M: Final = 20.0
 """Longer than the legs of any real walker; a larger value is perhaps in millimetres."""
-STRONG_M_S2: Final = 30.0
+IMPLAUSIBLE_GRAVITY_M_S2: Final = 30.0
 """Stronger than the gravity of any planet in the solar system; a larger value is perhaps in cm/s^2."""
-HEAVY_KG_M3: Final = 1000.0
+WATER_KG_M3: Final = 1000.0
 """Density of water; a mass larger than a water cube as wide as the legs are long is perhaps in grams."""
 
 
@@ -150,11 +150,11 @@ def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
                 f"(from {mass}), so the mass is not in the middle of the leg"
             )
     slope = tree.keys.get("slope_rad")
-    if slope is not None and abs(config.slope_rad) > STEEP_RAD:
+    if slope is not None and abs(config.slope_rad) > IMPLAUSIBLE_SLOPE_RAD:
         degrees = short_number(round(math.degrees(config.slope_rad), 1))
         yield str(Problem(slope, f"slope_rad is in radians, so this is {degrees} degrees; slope_deg takes degrees"))
     gravity = tree.keys.get("gravity_m_s2")
-    if gravity is not None and config.gravity_m_s2 > STRONG_M_S2:
+    if gravity is not None and config.gravity_m_s2 > IMPLAUSIBLE_GRAVITY_M_S2:
         text = f"gravity_m_s2 is {short_number(config.gravity_m_s2)}; it is in m/s^2 (9.81 on earth), not in cm/s^2"
         yield str(Problem(gravity, text))
     contact = config.contact
@@ -164,9 +164,9 @@ def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
     for path, value in numbers_in(("walker",), walker.model_dump(mode="json")):
         key = str(path[-1])
         text = f"{'.'.join(map(str, path))} is {short_number(value)}"
-        if key.endswith("length_m") and value > LONG_M:
+        if key.endswith("length_m") and value > IMPLAUSIBLE_LENGTH_M:
             yield str(Problem(key_at(tree, path), f"{text} m; lengths are in m, not in mm"))
-        if key.endswith("mass_kg") and value > HEAVY_KG_M3 * walker.leg_length_m**3:
+        if key.endswith("mass_kg") and value > WATER_KG_M3 * walker.leg_length_m**3:
             yield str(Problem(key_at(tree, path), f"{text} kg on legs of {length} m; masses are in kg, not in g"))
 
 

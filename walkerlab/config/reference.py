@@ -10,7 +10,7 @@ from typing import Any, Final
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from walkerlab.config.fields import annotation_of, bounds_of, leaves, leaves_of_other_kinds, type_words
+from walkerlab.config.fields import annotation_of, bounds_of, describe_type, leaves, leaves_of_other_kinds
 from walkerlab.config.files import builtin_names
 from walkerlab.config.numbers import short_number
 from walkerlab.config.problems import nearest
@@ -62,7 +62,7 @@ def _reference(path: tuple[str, ...], field: FieldInfo) -> KeyReference:
     default = field.get_default(call_default_factory=True, validated_data={})
     return KeyReference(
         key=".".join(path),
-        type=type_words(field.annotation),
+        type=describe_type(field.annotation),
         unit=annotation_of(field, "unit"),
         bounds=bounds_of(field),
         default=annotation_of(field, "default_in_words") or _format_default(default),

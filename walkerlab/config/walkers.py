@@ -315,7 +315,12 @@ class Kneed(_Legged):
     shank: Shank = Shank()
     hip_mass_kg: float = mass(0.5, "mass at the hip", HSU_CHEN, 0.0)
     foot_radius_m: float = key(
-        0.0, "m", "radius of the sole's arc, 0 is a point", HSU_CHEN, bounds="from 0 to below hip to sole", ge=0.0
+        0.0,
+        "m",
+        "radius of the sole's arc, 0 is a point",
+        HSU_CHEN,
+        bounds="from 0 to less than the length from hip to sole",
+        ge=0.0,
     )
     foot_centre_ahead_m: float = offset(
         0.0, "the arc's centre, or the point, ahead of the shank's line, perpendicular to it", MCGEER

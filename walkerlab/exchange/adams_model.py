@@ -446,7 +446,8 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
             begin = finite(time)
             end = finite(time + duration)
             share = f"(TIME-{begin})*({end}-TIME)/{finite(duration**2)}"
-            # of a unit impulse, because a trailing knee is held during the pulse of a leg without impulse, too
+            # Scaled to a unit impulse: a leg without push-off needs the pulse, too, because its knee is held while it
+            # lasts.
             force = finite(30.0 / duration)
             model.variables[pulse] = f"IF(TIME-{begin}:0,0,IF({end}-TIME:0,0,{force}*({share})**2))"
         marker = f"{{{export.names[0]}.hinge}},{{{foot.marker}}},{{{ORIGIN}}}"

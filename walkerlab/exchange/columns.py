@@ -449,7 +449,7 @@ def find_named(recording: Recording, asked: Recorded) -> dict[str, ColumnSource]
 def parse_source(recording: Recording, text: str, kind: str) -> ColumnSource:
     """Parse a source such as NAME, -NAME or NAME+90deg. An exact or quoted column name takes precedence.
 
-    Raises ConfigError for a constant in an unknown unit, and for a line with a sign.
+    Raises ConfigError for a constant in an unknown unit, and for a sign before a line between two markers.
     """
     name = named_column(recording, text)
     if name in recording.columns:

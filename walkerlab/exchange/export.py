@@ -78,8 +78,8 @@ def export_model(
     return ExportedFiles(files, left_out)
 
 
-def law_named(text: str) -> Law:
-    """Check the name of an ADAMS contact law, and return it.
+def parse_law(text: str) -> Law:
+    """Return the ADAMS contact law that `text` names.
 
     Raises ConfigError for an unknown name.
     """
@@ -89,8 +89,8 @@ def law_named(text: str) -> Law:
     raise ConfigError(f"--law {text}: unknown contact law.", f"Choose from {', '.join(CONTACT_LAWS)}.")
 
 
-def slope_named(text: str) -> Slope:
-    """Check the name of a way to express a slope, and return it.
+def parse_slope(text: str) -> Slope:
+    """Return the way to express a slope that `text` names.
 
     Raises ConfigError for an unknown name.
     """
@@ -101,9 +101,9 @@ def slope_named(text: str) -> Slope:
 
 
 def add_stops(config: Config) -> Config:
-    """Return a config whose knees are caught by a stop before they lock.
+    """Return a config in which a stop brings each knee to rest before it locks.
 
-    When ADAMS activates a joint, it changes velocities by its own rules, so a knee must be at rest when it locks.
+    ADAMS changes velocities by rules of its own when a joint is activated. They change nothing if the knee is at rest.
     """
     walker = config.walker
     if not isinstance(walker, Kneed) or walker.knee.lock == "compliant":

@@ -152,7 +152,7 @@ class Exported:
 
     @property
     def touches_s(self) -> list[float]:
-        """Times (s) at which the legs change roles in walkerlab's walk."""
+        """Times (s) of the touchdowns that end the steps of walkerlab's walk."""
         return [float(time) for time in self.walk.touch_time_s]
 
     @property

@@ -35,8 +35,8 @@ RUNNING: Final = 0.5  # correlation of the hip's height with the distance of the
 FEWEST_SWINGS: Final = 3
 FEWEST_FOR_SWAPS: Final = 4
 FAST_PERCENT: Final = 80  # percentile of the motions between samples above which they count as fast
-EXCHANGE: Final = 0.2  # squared unevenness that an exchange must save, in squares of fast motions
-SCATTER: Final = 40.0  # the same, in medians of the squared unevenness
+EXCHANGE: Final = 0.2  # smallest reduction of the squared unevenness by an exchange of legs, in squared fast motions
+SCATTER: Final = 40.0  # smallest reduction as a multiple of the median squared unevenness
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +147,11 @@ def legs_among(lines: Mapping[str, Line]) -> list[Line]:
 
 
 def find_plane(lines: Mapping[str, Line], walks: str) -> WalkPlane:
-    """Find the plane of a walk from the lines between its markers, by quantity.
+    """Find the plane of a walk from the lines between its markers.
 
-    walks  left, right, away or towards, in the view of the recording. If it is '', the walk runs along the line on
-           which the legs move most relative to each other, the way the upper marker drifts
+    lines  line of each quantity, by name
+    walks  direction in the view of the recording: left, right, away or towards. If it is empty, the direction is that
+           in which the legs move most relative to each other, with the sign of the upper marker's drift
     """
     legs = legs_among(lines)
     upright = np.mean([np.mean(top - bottom, axis=0) for top, bottom in legs], axis=0)

@@ -140,5 +140,8 @@ def lump_bodies(
 
 
 def coupling_rows(assembly: Assembly, model: PlanarModel) -> list[Floats]:
-    """Return, for each body that follows others, weights (links,) with which the relative angles add up to zero."""
+    """Return one row of weights (links,) for each body whose angle follows from others.
+
+    The sum of the links' relative angles, multiplied by these weights, is zero.
+    """
     return [model.chain[body] - row @ model.chain for body, row in followers(assembly).items()]

@@ -259,7 +259,7 @@ class Course:
     guesses: dict[int, float] = field(default_factory=dict, init=False)
 
     def remove_stretches(self, stretches: Sequence[Stretch]) -> Course:
-        """Return the course without the samples of stretches, and with lasting offsets subtracted."""
+        """Return the course without the samples of passing stretches and without the offset of lasting ones."""
         angle = self.angle.copy()
         kept = np.ones(self.rows.size, bool)
         for stretch in stretches:

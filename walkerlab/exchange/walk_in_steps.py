@@ -46,12 +46,11 @@ LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angl
 FEWEST_ALTERNATING: Final = 2  # fewest heel strikes of each leg that show whether lengths alternate
 ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
 SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for one leg and so half of the strikes
-BESIDE_RAD: Final = 0.03  # offset from the likely sum of angles at which the search for a tilt begins
-SAME_WAY: Final = (
-    0.03  # largest relative difference between the distance over a belt and the one that follows from the legs
-)
-FAR_CLOCK: Final = 1.15  # factor between the clock and the swinging legs from which a doubt is raised
-TURN_RAD: Final = 1e-3  # turn with which the direction of gravity is differentiated
+SEARCH_OFFSET_RAD: Final = 0.03  # offset from the likely sum of angles at which the search for the tilt begins
+MAX_BELT_DIFFERENCE: Final = 0.03
+"""Largest relative difference that raises no doubt between the distance over a belt and that from the leg angles."""
+FAR_CLOCK: Final = 1.15  # ratio of the clock's rate to that of the swinging legs from which a doubt is raised
+TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
 COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
@@ -130,8 +129,8 @@ def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
-        # off the likely sum, because a small shift could not be told from its error
-        return np.asarray((total(angles) - sum_rad - BESIDE_RAD) * (angles[:, 0] - angles[:, 1]))
+        # The search begins away from the likely sum, because a small shift is within its error.
+        return np.asarray((total(angles) - sum_rad - SEARCH_OFFSET_RAD) * (angles[:, 0] - angles[:, 1]))
 
     touches = find_touches(walk.time_s, angle, height)
     period = typical_interval([touch.time_s for touch in touches], walk.time_s)
@@ -149,7 +148,7 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
         way += float(np.diff(np.interp(ends, walk.time_s, walk.quantities[HIP_OF_LINES]))[0])
     share = way / float(steps.length_m.sum())
     doubts = steps.doubts
-    if abs(share - 1.0) > SAME_WAY:
+    if abs(share - 1.0) > MAX_BELT_DIFFERENCE:
         doubts = (
             *doubts,
             f"The distance over the belt is {share:.3g} times the one that follows from the leg angles: the speed of "

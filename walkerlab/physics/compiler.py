@@ -136,7 +136,7 @@ def read_code(path: Path) -> Any:
 
 
 def strip_bitcode(path: Path) -> bytes:
-    """Return a file's content without its LLVM bitcode, which is most of the file, except for the symbol names."""
+    """Return the content of a kernel's file with its LLVM bitcode, most of the file, reduced to the symbol names."""
     # Only linking needs the bitcode itself, and stored kernels are never linked.
     (name, kind, (machine_code, bitcode)), *rest = read_code(path)
     module = binding.parse_bitcode(bitcode)

@@ -32,7 +32,7 @@ BUILT = PHYSICS / "machine_code"
 REBUILD = "`pip install --no-build-isolation --no-deps .` in the sources builds them for this environment."
 ABOUT = "about.json"  # in that folder: what its code depends on
 X86_64 = "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.1", "sse4.2")
-# processor that builds compile for and the features that it needs, in LLVM's words, by platform
+# For each platform: LLVM's names for the processor that builds are compiled for, and for the features it must have
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
     "linux-x86_64": X86_64,
     "win32-amd64": X86_64,

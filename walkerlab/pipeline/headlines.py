@@ -55,7 +55,7 @@ HEADLINES: Final[Mapping[str, tuple[str, ...]]] = {
 }  # fmt: skip
 """Headline quantities of each stage; a name that ends in a dot covers all quantities below it."""
 MAX_HEADLINES: Final = 13
-OF_WALKS: Final = (
+WALK_QUANTITIES: Final = (
     "work_per_step_J.", "asymmetry.", "gait_steps.", "step_period_s", "step_length_m", "numerical_error.",
     "end_time_s", "rhs_evaluations", "accepted_steps",
     "rejected_steps", "energy_balance_residual_J", "slope_rad", "repeats_after", "leaves_gait_at",
@@ -66,9 +66,9 @@ QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
         "work_per_step_J.", "asymmetry.", "gait_steps.", "step_period_s", "random_starts", "slope_rad",
         "gaits.", "equation_sets.",
     ),
-    "simulate": (*HEADLINES["simulate"], *OF_WALKS, "lost_in_strikes_J"),
+    "simulate": (*HEADLINES["simulate"], *WALK_QUANTITIES, "lost_in_strikes_J"),
     "contact-sim": (
-        *HEADLINES["contact-sim"], *OF_WALKS, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
+        *HEADLINES["contact-sim"], *WALK_QUANTITIES, "rolling_per_step_m", "dissipated_J.", "jacobians", "pitch_m",
     ),
 }  # fmt: skip
 """All numeric quantities that each of these stages may have at a point of a sweep, in the notation of `HEADLINES`."""

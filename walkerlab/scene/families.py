@@ -66,7 +66,7 @@ def iterate_values(value: Any) -> Iterator[Any]:
 
 
 def model_reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a parameter affects a model. It is True if the config allows no neighbouring value to test with."""
+    """Whether a parameter affects a model. Returns True if the config allows no neighbouring value to test with."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
     neighbours = (value + sign * RELATIVE_CHANGE * (abs(value) or 1.0) for sign in (1.0, -1.0))
@@ -75,13 +75,13 @@ def model_reads(model: str, config: ContactConfig, key: str) -> bool:
 
 
 def refuse_unread(where: str, key: str, config: ContactConfig, models: Sequence[str]) -> None:
-    """Raise ConfigError for the config key `where` if it names a parameter `key` that none of the models reads."""
+    """Raise ConfigError about the config key `where` if no model reads the parameter `key` that it names."""
     if not any(model_reads(model, config, key) for model in models):
         raise unused_key_error(where, key, models)
 
 
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """Build the error for the config key `where`, which names a parameter `key` that none of the models uses."""
+    """Build the error about the config key `where` that names a parameter `key` which affects none of the models."""
     return ConfigError(
         f"{where}: {key} does not affect the {' or the '.join(models)} model",
         "Choose a key that the model uses, or another model (--model).",

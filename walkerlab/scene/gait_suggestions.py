@@ -68,7 +68,7 @@ def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBran
     if walker is None:
         return ()
     gaits = [gait for gait in find_gaits(walker, settings=SUGGESTION_SEARCH).gaits if not gait.objections]
-    follower = BranchFollower(RigidMap(walker_at, span.size, walker), span, most=SUGGESTION_POINTS)
+    follower = BranchFollower(RigidMap(walker_at, span.size, walker), span, max_points=SUGGESTION_POINTS)
     return follower.family([Seed(np.array(gait.z), value) for gait in gaits], 1)
 
 

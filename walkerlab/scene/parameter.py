@@ -8,7 +8,15 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import Block, annotation_of, block_of, leaves, leaves_of_other_kinds, type_words, value_at
+from walkerlab.config.fields import (
+    Block,
+    annotation_of,
+    block_of,
+    describe_type,
+    leaves,
+    leaves_of_other_kinds,
+    value_at,
+)
 from walkerlab.config.problems import nearest, printable
 from walkerlab.config.reads import ContactConfig, keys_of
 from walkerlab.config.schema import Config
@@ -153,7 +161,7 @@ def why_no_parameter(
     path = key.split(".")
     if path[0] not in MODEL_KEYS:
         return "affects no model"
-    if "number" not in type_words(own[key].annotation):
+    if "number" not in describe_type(own[key].annotation):
         return "is not a number"
     for depth in range(1, len(path) + 1):
         value = value_of(config, tuple(path[:depth]))
@@ -169,7 +177,7 @@ def suggest_key(key: str, own: Mapping[str, FieldInfo]) -> str:
     numbers = [
         name
         for name, field in own.items()
-        if name.split(".")[0] in MODEL_KEYS and block_of(field) is None and "number" in type_words(field.annotation)
+        if name.split(".")[0] in MODEL_KEYS and block_of(field) is None and "number" in describe_type(field.annotation)
     ]
     closest = nearest(key, [*numbers, SLOPE_DEG])
     return f"; did you mean {closest}?" if closest else ""

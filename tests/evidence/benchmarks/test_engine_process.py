@@ -26,7 +26,7 @@ def test_engine_results_are_returned_without_its_printed_output(own, capfd):
 def test_crash_is_reported_with_its_code_and_the_next_task_runs(own):
     lost = own.do(Crashes().run, 30.0)
     assert isinstance(lost, TaskLost)
-    assert "-11" in lost.why
+    assert "-11" in lost.reason
     assert own.do(Answers(3).run, 30.0) == 3
 
 

@@ -90,7 +90,7 @@ def test_failed_run_is_a_row_and_a_timed_out_run_is_not_refined(lost, outcome, r
     runs = EngineOnScene(engine, scene, truth(), LosesEverything(lost)).same_law()
     rows = [one for one in runs if one.integrator == "DOPRI5 adaptive"]
     assert len(rows) == min(rungs, len(ADAPTIVE_TOLERANCES))
-    assert {(one.outcome, one.why, one.error) for one in rows} == {(outcome, lost.why, None)}
+    assert {(one.outcome, one.why, one.error) for one in rows} == {(outcome, lost.reason, None)}
 
 
 def test_every_engine_has_an_adapter_with_one_signature():

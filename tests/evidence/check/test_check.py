@@ -66,7 +66,7 @@ def test_bounds_uncertainties_and_complex_values_are_read(text, right, fits):
 
 
 @pytest.mark.parametrize("text", ["0,25", "abc", "0.1 s", "1e9999", "", "1 2", "0x10", "--3", "0.5±", "[1, 2, 3]", "∞"])
-def test_what_is_no_printed_value_is_not_read(text):
+def test_text_that_is_not_a_printed_value_is_not_read(text):
     assert parse_printed(text) is None
 
 
@@ -148,7 +148,7 @@ def test_a_walk_by_eulers_method_comes_closest_to_a_published_gait_with_knees():
         ("compass-speeds", "different, unexplained"),
     ],
 )  # fmt: skip
-def test_published_gaits_have_their_findings(name, finding):
+def test_checks_of_published_gaits_have_the_documented_findings(name, finding):
     answer = check_gait(load(PUBLISHED / f"{name}.yaml").config)
     assert (answer["finding"], answer["routes"]["agree"]) == (finding, True)
 
@@ -202,7 +202,7 @@ def test_conventions_are_found_without_being_stated(convention):
     assert len(answer.explanations) == 1 or answer.undecided
 
 
-def test_gravity_of_one_and_two_steps_are_conventions():
+def test_values_for_gravity_1_or_for_a_stride_are_explained_as_conventions():
     gait = walkerlab.find_gait()
     stride = {"period_s": f"{2 * gait.period_s:.6f}", "step_length_m": f"{2 * gait.step_length_m:.6f}"}
     assert "a stride" in walkerlab.check("paper", stride).explanations[0]["what"]
@@ -237,7 +237,7 @@ def test_a_lost_sign_and_transposed_digits_are_misprints():
     assert swapped.explanations[0]["what"] == "two digits of the printed stance rate are transposed"
 
 
-def test_one_value_is_never_explained():
+def test_difference_of_a_single_printed_value_is_not_explained():
     answer = walkerlab.check("paper", {"period_s": "0.7064"})
     assert (answer.finding, answer.explanations) == ("different, unexplained", [])
 
@@ -291,7 +291,7 @@ ODD = {
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_odd_files_are_refused_in_words(name, tmp_path):
+def test_malformed_check_files_are_refused_with_a_reason(name, tmp_path):
     text, words = ODD[name]
     done = run(written(tmp_path, text))
     assert done.exit_code == ConfigError.exit_code
@@ -308,7 +308,7 @@ def test_a_bad_file_does_not_keep_the_others_from_being_answered(tmp_path):
     assert (bad["error"]["exit_code"], good["finding"]) == (3, "reproduced")
 
 
-def test_a_different_gait_is_an_answer_with_the_promised_keys(tmp_path):
+def test_answer_about_a_different_gait_has_the_documented_keys(tmp_path):
     file = written(tmp_path, "extends: paper\ncheck: {printed: {state: [-0.2, 0.1652, -0.6, -0.85]}}\n")
     done = run(file, "--json")
     answer = json.loads(done.stdout)

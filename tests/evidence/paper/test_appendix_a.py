@@ -134,7 +134,7 @@ def test_accelerations_solve_lagrange_equations(numeric, walker, state):
 
 
 @given(walkers, states)
-def test_energies_are_those_of_the_masses(numeric, walker, state):
+def test_energies_are_sums_over_the_masses(numeric, walker, state):
     kinetic = float(numeric["kinetic"](*arguments(walker, state)))
     potential = float(numeric["potential"](*arguments(walker, state)))
     scale = walker.gravity * walker.leg_length * (walker.hip_mass + 2 * walker.leg_mass)

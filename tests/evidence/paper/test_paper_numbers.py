@@ -203,7 +203,7 @@ def test_contradicted_values_show_the_computation(rows):
     assert found.keys() == {*OWN_CONTRADICTIONS}
     step, adams_step = (2 * np.sin((stance - swing) / 2) for swing, stance in ((-0.2022, 0.1674), (-0.2021, 0.1670)))
     for entry, computed in {
-        TABLE_2[1].percent: "with rounding -0.30 to -0.18%",
+        TABLE_2[1].percent: "a change of -0.30 to -0.18%, given the rounding",
         TABLE_2[2].percent: f"{100 * (1.02 / 0.60 - 1):+.3g}% of the MATLAB value",
         TABLE_2[3].percent: f"{100 * (3.20 / 0.84 - 1):+.3g}% of the MATLAB value",
         LARGEST_ERROR: f"{0.1674 - 0.1670:.4f} rad and {3.20 - 0.84:.2f} rad/s",

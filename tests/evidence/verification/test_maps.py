@@ -69,7 +69,7 @@ def test_small_fixed_step_is_accurate_and_its_error_falls_with_its_size():
     assert numbers[5] == ERROR_MISSING
 
 
-def test_cells_without_a_measured_error_are_missing():
+def test_cells_whose_runs_end_differently_have_no_error():
     """Also where both runs end alike, but after different numbers of steps."""
     walked, slid = float(Outcome.WALKED), float(Outcome.SLID)
     rows = (

@@ -75,7 +75,7 @@ def test_energy_gained_at_a_heel_strike_is_detected(walk):
     assert after[0].kinetic < before[0].kinetic
 
 
-def test_nan_fails_the_check():
+def test_measure_that_is_nan_or_infinite_fails():
     assert not Measure("x", math.nan, 1.0).ok
     assert not Measure("x", finite(math.inf), 1.0).ok
     assert Measure("x", 0.0, 0.0).ok

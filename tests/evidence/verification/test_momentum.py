@@ -48,7 +48,7 @@ def test_slightly_changed_walker_does_not_balance(changed):
     assert not momentum_finding(other, *ready).ok
 
 
-def test_slightly_stronger_ground_does_not_balance():
+def test_momentum_does_not_balance_if_gravity_is_wrong_by_a_thousandth():
     config, *ready = ready_for("paper")
     heavier = config.model_copy(update={"gravity_m_s2": 1.001 * config.gravity_m_s2})
     assert not momentum_finding(heavier, *ready).ok

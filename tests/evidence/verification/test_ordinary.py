@@ -39,7 +39,7 @@ def test_reference_is_accurate_at_any_tolerance_of_the_case():
 @pytest.mark.parametrize(
     ("off", "verdict"), [(1e-3, "fine"), (0.1, "wrong silently"), (100.0, "diverges"), (np.nan, "diverges")]
 )
-def test_verdict_depends_on_the_error(off, verdict):
+def test_verdict_on_an_end_state_follows_its_error(off, verdict):
     assert ARRIVAL.judge_end("m", np.full(8, off), 1, 0.0).verdict == verdict
 
 

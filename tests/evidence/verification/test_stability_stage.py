@@ -204,7 +204,7 @@ def test_verdict_names_what_failed():
     assert (first.tone, first.text) == ("bad", "stability: 1 of 1 did not end as expected: bad.")
 
 
-def test_own_pad_pitch_on_plain_ground_walks_as_in_contact_sim():
+def test_case_ignores_the_pad_pitch_on_plain_ground():
     ground = {"terrain": "after-mid-swing", "pad_pitch": "own"}
     case = Case(name="x", expected=("walked",), reason="r", steps=2, config={"slope_deg": 4.0, "contact": ground})
     plain = case.model_copy(update={"config": {"slope_deg": 4.0, "contact": {"terrain": "after-mid-swing"}}})

@@ -51,7 +51,7 @@ def test_slip_is_the_velocity_of_the_foot_material_at_the_contact(theta, omega, 
 
 
 @given(theta=angles, omega=rates, slip=slips, vertical_velocity=climbs, depth=depths, foot=feet)
-def test_energies_are_those_of_legs_and_hip(theta, omega, slip, vertical_velocity, depth, foot):
+def test_energies_are_sums_over_legs_and_hip(theta, omega, slip, vertical_velocity, depth, foot):
     walker = ground.compass()
     state = ground.placed(walker, foot, depth, theta, omega, slip, vertical_velocity)
     bodies = ground.masses_of_the_compass(state)
@@ -105,7 +105,7 @@ def test_power_balances_and_the_ground_only_dissipates(theta, omega, slip, verti
     assert (after - before) / (2 * h) == pytest.approx(-(damping + friction), abs=1e-5 * size)
 
 
-def test_foot_in_the_air_or_without_ground_feels_nothing():
+def test_foot_in_the_air_or_without_ground_has_no_contact_force():
     walker = ground.compass()
     hovering = ground.placed(walker, 1, -0.3, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)
     inside = ground.placed(walker, 1, 1e-4, (-0.2, 0.2), (1.0, -1.0), 0.1, 0.1)

@@ -90,7 +90,7 @@ def test_levers_of_merged_bodies_are_summed():
     np.testing.assert_allclose(straight.foot_x[0, :3], expected, rtol=1e-14)
 
 
-def test_form_has_no_attributes_it_does_not_use():
+def test_form_of_a_whole_walker_has_no_weight():
     assert not hasattr(walker_of(LEGS).whole, "weight")
 
 

@@ -62,7 +62,9 @@ def check_jacobian(system, state):
     stance=st.sampled_from([-2.0, -0.3, 1.0]),
     foot=st.sampled_from([0, 1]),
 )
-def test_derivatives_are_correct_with_the_other_foot_in_the_ground(angle, depth, swing, stance, foot):
+def test_derivatives_of_a_pinned_stance_are_correct_with_the_other_foot_in_the_ground(
+    angle, depth, swing, stance, foot
+):
     system = pinned(radius=0.01, inertia=0.1, foot=foot, has_ground=True)
     # legs that end at the balls' centres: by as much as the swing leg reaches further down
     other = -math.acos(math.cos(angle) + depth / 0.99)

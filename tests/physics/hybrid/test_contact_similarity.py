@@ -64,7 +64,7 @@ def twin(static, dynamic):
     [(1.0, (0.9, 0.7)), (0.9, (0.9, 0.7)), (0.95, (0.9, 0.7)), (1.0, (0.3, 0.2)), (1.0, (0.05, 0.04))],
     ids=["walks", "falls", "trips", "slips", "slides"],
 )
-def test_walker_and_its_scaled_twin_walk_alike(factor, mu):
+def test_walker_and_its_scaled_twin_take_the_same_steps(factor, mu):
     friction = (f"contact.static_friction={mu[0]}", f"contact.dynamic_friction={mu[1]}")
     walk = walked(*friction, start=faster(factor), tolerance=1e-8)
     start = faster(factor)

@@ -197,7 +197,7 @@ def test_one_compiled_walk_serves_straight_legs_knees_and_a_pinned_step():
     assert set(walk_in_form.signatures) == compiled
 
 
-def test_library_method_walks_with_the_same_reduced_bodies():
+def test_scipy_method_gives_the_same_kneed_contact_walk():
     scene = scene_of()
     start = start_state(scene, (*RIGID_ANGLES, *RIGID_RATES))
     walk = scene.walk(start, 2, Tolerances("scipy-radau", 1e-6, 1e-8, 10**6), 0.01)

@@ -35,7 +35,7 @@ def test_damping_loss_of_a_bounce_equals_the_lost_height(rtol):
     assert run.dissipated[0] == pytest.approx(missing, abs=max(1e3 * rtol, 1e-11))
 
 
-def test_deepest_penetration_is_found_inside_a_step():
+def test_maximum_penetration_is_found_between_samples():
     walk, scene = walked(interval=2e-5, steps=2), scene_of()
     feet = sample_feet(scene.walker, walk.samples)
     seen = np.where(walk.samples.has_ground > 0, -feet[:, :, 1], 0.0).max()

@@ -58,7 +58,7 @@ def test_walk_ends_at_its_last_touch_even_if_the_foot_lifts_later():
 
 
 @pytest.mark.parametrize(("steps", "outcome"), [(1, Outcome.WALKED), (2, Outcome.BUDGET_EXHAUSTED)])
-def test_step_whose_foot_does_not_lift_has_no_slip(steps, outcome):
+def test_slip_of_a_step_is_missing_until_its_foot_lifts(steps, outcome):
     until_touch = int(walked(steps=1).work[0])
     walk = walked(steps=steps, budget=until_touch + 10)
     assert walk.outcome is outcome

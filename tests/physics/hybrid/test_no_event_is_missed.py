@@ -135,7 +135,7 @@ def test_lift_after_an_unresolvable_switching_point_is_detected_at_once():
         assert walk.slip_m == pytest.approx([0.0008590980], abs=2e-9)
 
 
-def test_event_function_starting_at_zero_leaves_it_at_once():
+def test_event_function_rising_from_zero_leaves_the_negative_side_at_once():
     finder = new_crossing_finder(3)
     finder.values[0] = finder.nodes
     assert leaves_side(finder, 0, -1, False) == 0.0

@@ -133,7 +133,7 @@ def test_free_tree_accelerates_the_same_for_any_root_point(state, inertia):
 
 
 @given(state=states, along=st.floats(-1e3, 1e3), depth=st.floats(0.0, 1e-3))
-def test_position_along_the_slope_does_not_matter(state, along, depth):
+def test_equations_do_not_change_with_the_position_along_the_slope(state, along, depth):
     parts = CompassParts(1.0, 0.5, 5.0, 10.0, 0.1, 0.001)
     system = place_on_ground(walker_of(parts, 0.02, 9.81), (True, True))
     height = 0.9 - depth
@@ -142,7 +142,7 @@ def test_position_along_the_slope_does_not_matter(state, along, depth):
 
 
 @given(state=states, turn=angle)
-def test_without_gravity_no_direction_is_preferred(state, turn):
+def test_without_gravity_the_equations_do_not_change_under_rotation(state, turn):
     parts = CompassParts(1.0, 0.5, 5.0, 10.0, 0.1, 0.001)
     turned = (state[0] + turn, state[1] + turn)
     one, other = (

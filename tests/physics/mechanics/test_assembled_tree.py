@@ -99,7 +99,7 @@ def test_motion_of_a_four_body_walker_obeys_lagranges_equations(lagrange, theta,
 
 
 @given(theta=angles, omega=rates, velocity=speeds, foot=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)))
-def test_energies_are_those_of_the_masses(measured, theta, omega, velocity, foot):
+def test_energies_are_sums_over_the_masses(measured, theta, omega, velocity, foot):
     *centre, p_x, p_y, _, kinetic, potential = measured(theta, omega, foot, velocity, GRAVITY)
     mass = total_mass(kneed.KNEED)
     state = (*centre, *theta, p_x / mass, p_y / mass, *omega)

@@ -278,7 +278,7 @@ def between_the_first_flip_and_the_branch_beyond_it():
     one = next(branch for branch in compass_family() if branch.period == 1 and branch.stable_ranges)
     two = next(branch for branch in compass_family() if branch.period == 2)
     slope = 0.5 * (two.ends[0].value + two.points[0].value)
-    follower = BranchFollower(map_of(paper_walker, 0.1 - 1e-4), ValueSpan(1e-4, 0.1), most=12)
+    follower = BranchFollower(map_of(paper_walker, 0.1 - 1e-4), ValueSpan(1e-4, 0.1), max_points=12)
     walked = settle(follower.step_map, one.points[-1].z, slope, 400, 2)
     return follower, Seed(walked.last, slope, 2)
 
@@ -446,7 +446,7 @@ def test_branch_that_ends_in_an_overlong_push_off_says_so():
 
 
 def test_branch_that_exhausts_its_points_says_so():
-    follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), most=5)
+    follower = BranchFollower(map_of(paper_walker, 0.1), ValueSpan(1e-4, 0.1), max_points=5)
     branch = follower.family(seeds_at(paper_walker, 0.05), 1)[0]
     assert all(end.reason == "the limit of 5 points is reached" for end in branch.ends)
 
@@ -544,6 +544,6 @@ def test_loss_of_an_attractor_does_not_depend_on_the_grid(values):
     assert found.reason == "fell"
 
 
-def test_attractor_missing_at_the_first_value_is_lost_there():
+def test_attractor_missing_at_the_first_value_is_reported_as_lost_there():
     found = sweep_attractor(LostBeyond(1.0), np.zeros(1), [2.0, 3.0], 4, 8)
     assert (found.found, found.lost_at) == ((), 2.0)

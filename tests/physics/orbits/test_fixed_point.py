@@ -333,7 +333,7 @@ def test_stable_walkable_gait_is_chosen():
 
 @settings(max_examples=10)
 @given(st.floats(0.05, 20.0), st.floats(0.1, 10.0), st.floats(0.5, 50.0), st.floats(0.2, 4.0))
-def test_scaled_walkers_walk_alike(length, mass, gravity, degrees):
+def test_scaled_walkers_have_the_same_scaled_gait(length, mass, gravity, degrees):
     walker = on_slope(degrees)
     scaled = walker._replace(
         leg_length=length,

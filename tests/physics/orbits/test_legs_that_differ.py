@@ -84,7 +84,7 @@ def test_exchanged_labels_give_the_same_gait_half_a_stride_later(kind):
 
 
 @pytest.mark.parametrize("kind", ["round", "kneed and round"])
-def test_equal_legs_written_as_different_walk_alike_with_squared_multipliers(kind):
+def test_walker_with_a_second_equal_leg_has_the_same_gait_and_squared_multipliers(kind):
     plain = draw_walker(kind, 4)
     walker = model_of(replace(plain, legs=(plain.legs[0],) * 2))
     equal = best(walker)
@@ -124,7 +124,7 @@ def test_a_damped_knee_takes_work_that_the_hip_does_not():
     assert not walker.changed(knees=(0.0, 0.0, 0.0)).laws[HIP_ROW + 1 :].any()
 
 
-def test_the_mean_of_two_legs_is_one_walker_of_equal_legs():
+def test_averaging_two_legs_gives_equal_legs_in_either_order():
     walker = model_of(draw_walker("round", 7))
     even = average_legs(walker, 0.0)
     assert not even.legs_differ
@@ -186,7 +186,7 @@ def test_each_legs_sensitivity_norm_equals_a_brute_force_sum(kind, seed, disturb
 
 
 @pytest.mark.parametrize("kind", ["masses", "kneed"])
-def test_exchanged_labels_exchange_what_each_leg_withstands(kind):
+def test_exchanging_the_legs_exchanges_their_robustness(kind):
     plain = draw_walker(kind, 3)
     gaits = gait_on_map(model_of(plain)).split_by_leg()
     exchanged = gait_on_map(model_of(replace(plain, legs=plain.legs[::-1]))).split_by_leg()

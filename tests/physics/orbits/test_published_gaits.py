@@ -108,7 +108,7 @@ def test_round_footed_gait_is_found_from_small_slopes():
     assert any("seed" in by for by in search.gait.found_by)
 
 
-def test_compass_gait_is_the_linear_limit_of_a_vanishing_torso():
+def test_gait_with_a_light_torso_differs_from_the_compass_gait_in_proportion_to_its_mass():
     compass = find_gaits(rigid_on_slope(straight_legs(Limb(1.0, 5.0, 0.5), 10.0, Arc()), 9.81, 0.0174)).gait
     errors = []
     for mass in (1e-2, 1e-3):

@@ -68,7 +68,7 @@ def test_touching_zero_without_sign_change_is_not_a_crossing():
     assert crossing(-touching - 1e-12) == NO_CROSSING
 
 
-def test_zero_at_the_start_is_not_found_again():
+def test_crossing_at_the_start_is_not_found_twice():
     # what the event before left behind: zero but for rounding, of either sign
     for rounding in (0.0, 1e-17, -1e-17):
         event = with_roots(0.0, 1.5) + rounding
@@ -107,7 +107,7 @@ def test_event_function_that_is_always_zero_has_no_crossing():
 
 
 @pytest.mark.parametrize("degree", [3, 5, 7])
-def test_root_finders_of_other_degrees_agree(degree):
+def test_root_finders_of_every_degree_find_the_same_crossing(degree):
     finder = finder_on(with_roots(0.25, 0.5, 0.75), degree=degree)
     assert first_crossing(finder, 0, RISING, 0.3, False) == pytest.approx(0.75, abs=1e-12)
 
@@ -137,5 +137,5 @@ def test_direction_from_zero_follows_the_slope_despite_an_event_residual(left):
     assert way_from_zero(finder_on(left + Polynomial([0.0, 0.0, 1e-2])), 0, 1e-12) > 0.0
 
 
-def test_rounding_gives_no_direction_from_zero():
+def test_values_within_rounding_give_no_direction_from_zero():
     assert way_from_zero(finder_on(Polynomial([0.0, 1e-16, -2e-16])), 0, 1e-12) == 0.0

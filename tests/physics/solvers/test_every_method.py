@@ -249,7 +249,7 @@ def test_counted_work_rises_with_accuracy(name):
 
 
 @every_method
-def test_budget_ends_the_run(name):
+def test_run_ends_when_its_budget_is_spent(name):
     method, status = driven(name, 1e-8, PERIOD, budget=100)
     assert status == OUT_OF_BUDGET
     assert method.counts[RHS] <= 130  # a step that has begun may be finished
@@ -314,5 +314,5 @@ def test_repeated_run_is_bitwise_equal(name):
 
 
 @every_method
-def test_dense_degree_is_that_of_a_polynomial(name):
+def test_interpolants_of_all_methods_have_a_degree_of_3_to_10(name):
     assert 3 <= dense_degree(method_named(name).new(4, 1e-6, 1e-8, PLENTY)) <= 10

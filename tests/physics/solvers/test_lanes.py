@@ -98,7 +98,7 @@ def test_lane_arithmetic_equals_float_arithmetic():
     np.testing.assert_allclose(out, expected, rtol=1e-15, atol=1e-15)
 
 
-def test_nan_is_not_selected():
+def test_comparisons_with_nan_are_false_in_lanes():
     x = np.full((2, WIDTH), np.nan)
     out = np.zeros((5, WIDTH))
     assert arithmetic(x, out) == (False, False)

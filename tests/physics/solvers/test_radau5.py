@@ -96,7 +96,7 @@ def test_stability_function_is_the_pade_approximation(size, turn):
 
 
 @pytest.mark.parametrize("omega", [0.01, 1.0, 3.0, 30.0, 1e3, 1e6])
-def test_no_undamped_oscillation_grows(omega):
+def test_undamped_oscillations_do_not_grow(omega):
     """A-stable: on the imaginary axis |R| <= 1."""
     assert abs(one_step(1j * omega)) <= 1.0 + 1e-12
 

@@ -32,7 +32,7 @@ def solved(J, left, s, r):
 
 
 @given(motions(), shifts, st.data())
-def test_equations_of_motion_are_solved_at_half_their_size(J, s, data):
+def test_systems_from_equations_of_motion_are_solved_with_half_as_many_unknowns(J, s, data):
     n = J.shape[0]
     matrix = s * np.eye(n) - J
     assume(np.linalg.cond(matrix) < 1e8)
@@ -50,7 +50,7 @@ def test_equations_of_motion_are_solved_at_half_their_size(J, s, data):
     [np.zeros((3, 3)), np.array([[0.0, 2.0], [1.0, 0.0]]), np.array([[1e-9, 1.0], [1.0, 0.0]]), np.ones((1, 1))],
     ids=["odd", "scaled velocity", "not quite", "one equation"],
 )
-def test_general_systems_are_solved_at_full_size(J):
+def test_general_systems_are_solved_with_all_their_unknowns(J):
     assert unknowns(J) == J.shape[0]
 
 

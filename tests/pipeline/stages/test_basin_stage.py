@@ -78,7 +78,7 @@ def test_summary_counts_agree_with_the_grid(whole):
     assert ended == {name: many for name, many in summary["outcomes"].items() if name != "walked"}
 
 
-def test_edge_cells_store_the_share_of_walking_parts(whole):
+def test_edge_cells_store_the_share_of_subcells_that_walk(whole):
     cells = whole.groups["basin"]
     walks = cells["outcome"] == Outcome.WALKED
     between = (cells["walking"] > 0.0) & (cells["walking"] < 1.0)
@@ -87,7 +87,7 @@ def test_edge_cells_store_the_share_of_walking_parts(whole):
     assert (cells["walking"][between] * 9).round(9).tolist() == (cells["walking"][between] * 9).round().tolist()
 
 
-def test_walking_share_equals_that_of_a_finer_grid(tmp_path, whole):
+def test_walking_share_of_a_cell_is_that_of_a_finer_grid(tmp_path, whole):
     finer = run(tmp_path, *SMALL[1:3], "basin.cells=[48,36]", "basin.refine=1")
     shares = whole.groups["basin"]["walking"].ravel()
     between = (shares > 0.0) & (shares < 1.0)
@@ -95,7 +95,7 @@ def test_walking_share_equals_that_of_a_finer_grid(tmp_path, whole):
     np.testing.assert_allclose(shares[between], blocks[between], atol=1e-12)
 
 
-def test_normal_weights_favour_a_gait_in_the_middle(whole):
+def test_normal_weights_are_largest_at_the_gait_and_sum_to_one(whole):
     window = basin.window_of(load(None, SMALL).config, GAIT["state"][1:])
     weights = basin.gaussian(window)
     assert weights.sum() == pytest.approx(1.0)
@@ -183,7 +183,7 @@ def test_invalid_basin_block_is_rejected(setting, said):
         load(None, [setting])
 
 
-def test_other_results_are_current_without_it():
+def test_no_stage_needs_the_basin_and_drawings_use_it_if_current():
     assert PIPELINE["basin"].only_by == "basin"
     assert all("basin" not in stage.inputs(load(None, ()).config) for stage in PIPELINE.stages)
     assert "basin" in PIPELINE["plot"].if_current

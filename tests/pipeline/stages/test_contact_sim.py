@@ -183,7 +183,7 @@ def test_equal_names_mean_the_same_in_both_models(paper):
     assert {"touch_times_s", "step_periods_s", "step_lengths_m"} <= paper.summary.keys() & rigid.summary
 
 
-def test_missing_knee_lock_is_a_gap():
+def test_step_without_a_knee_strike_has_a_missing_strike_time():
     kneed = step_columns([0.7, 1.4], knee_strike_time_s=[0.5, np.nan])
     np.testing.assert_array_equal(kneed["knee_strike_time_s"].values, [0.5, np.nan])
     times, along, strikes = np.array([[0.7, 1.4], [0.3, 0.6], [0.5, np.nan]])

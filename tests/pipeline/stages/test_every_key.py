@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from walkerlab.config.analyses import Design
-from walkerlab.config.fields import leaves, type_words
+from walkerlab.config.fields import describe_type, leaves
 from walkerlab.config.files import builtin_names
 from walkerlab.config.loader import load
 from walkerlab.config.reads import restrict
@@ -81,7 +81,7 @@ def keys(config):
         held = config
         for name in path:
             held = getattr(held, name, None)
-        if path[0] in MODEL_KEYS and "number" in type_words(field.annotation) and isinstance(held, int | float):
+        if path[0] in MODEL_KEYS and "number" in describe_type(field.annotation) and isinstance(held, int | float):
             found.append(".".join(path))
     return found
 

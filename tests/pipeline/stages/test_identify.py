@@ -419,7 +419,7 @@ def test_page_overlays_the_measured_and_the_identified_walk(from_angles):
     assert not player.shows_forces
 
 
-def test_steps_alone_are_not_overlaid(identified):
+def test_identification_from_steps_alone_has_no_player(identified):
     part = section(Results(load(Path("paper"), ()).config, {"identify": identified}))
     assert not any(isinstance(block, Player) for block in part.blocks)
 

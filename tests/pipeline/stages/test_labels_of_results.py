@@ -15,7 +15,7 @@ CLASSES = (engines.EngineRow, engines.SwingRow, engines.TuningRow, accuracy.Meth
 LABELS = {
     **{kind.__qualname__ + kind.__module__: labels_of(kind) for kind in CLASSES},
     "gait": fixedpoint.NUMBERS | fixedpoint.KNEE_LABELS,
-    "walk": walk.OVER_TIME | walk.OF_STEPS,
+    "walk": walk.TIME_LABELS | walk.STEP_LABELS,
     "limit": tune_limit.FACTOR_LABELS | tune_limit.DISTANCE_LABELS | tune_limit.WALK_LABELS,
 }
 

@@ -255,7 +255,7 @@ def limping():
     return run("paper", "walker.leg_2={leg_mass_kg: 5.3}", "robustness.to=[]", *few)
 
 
-def test_each_legs_disturbances_are_reported_and_alike_in_both_models(limping):
+def test_both_models_report_similar_limits_for_each_leg(limping):
     summary = limping.summary
     json.dumps(summary, allow_nan=False)
     for name in ("largest_step", "largest_push"):
@@ -281,7 +281,7 @@ def test_report_says_which_leg_is_disturbed(limping, rigid):
     assert [column.title for column in first.columns][:2] == ["model", "swing leg"]
 
 
-def test_half_of_the_effect_of_both_legs_is_that_of_one():
+def test_changing_one_of_two_equal_legs_has_half_the_effect():
     few = ("robustness.model=rigid", "robustness.roughness_m=[]", "robustness.steps=1")
     keys = "robustness.to=[walker.leg_mass_kg, walker.leg_2.leg_mass_kg]"
     content = run("slope-3deg", *few, keys)

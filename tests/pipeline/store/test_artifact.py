@@ -220,7 +220,7 @@ def test_check_accepts_the_right_key_only(tmp_path, content, identity, origin):
     assert other.reason == "made for another key"
 
 
-def test_writing_again_replaces_and_leaves_nothing_behind(tmp_path, identity, origin):
+def test_second_write_replaces_the_file_and_leaves_no_other(tmp_path, identity, origin):
     path = tmp_path / "a.h5"
     artifact.write(path, Content({}, {"x": 1}), identity, origin)
     artifact.write(path, Content({}, {"x": 2}), identity, origin)

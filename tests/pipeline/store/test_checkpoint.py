@@ -56,7 +56,7 @@ def test_parts_of_another_key_are_kept_until_the_first_new_one(path):
     assert Checkpoint(path, "key").kept == {}
 
 
-def test_forgotten_parts_are_deleted(path):
+def test_forgetting_a_checkpoint_deletes_its_file_and_later_parts_are_kept(path):
     checkpoint = Checkpoint(path, "key")
     checkpoint.forget()
     assert not path.exists()

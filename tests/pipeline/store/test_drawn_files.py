@@ -19,7 +19,7 @@ def drawn(folder):
     return Content({artifact.FILES_GROUP: artifact.index_files(folder.path, [folder.figures / "figure-02.svg"])})
 
 
-def test_unchanged_files_pass(folder):
+def test_unchanged_drawing_has_no_broken_file(folder):
     assert artifact.broken_file(folder.path, drawn(folder)) is None
     assert artifact.broken_file(folder.path, Content()) is None
 

@@ -14,7 +14,7 @@ import walkerlab
 from walkerlab.errors import StorageError
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.files import TEMPORARY, drawing_into, remove_leftovers, write_atomically
+from walkerlab.pipeline.store.files import TEMPORARY, remove_leftovers, storage_errors, write_atomically
 
 ENVIRONMENT = {
     **os.environ,
@@ -101,9 +101,9 @@ def test_missing_folder_is_reported(tmp_path):
 
 
 def test_storage_failures_are_distinguished_from_other_failures(tmp_path):
-    with pytest.raises(StorageError, match="No space left"), drawing_into(tmp_path):
+    with pytest.raises(StorageError, match="No space left"), storage_errors(tmp_path):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    with pytest.raises(FileNotFoundError), drawing_into(tmp_path):
+    with pytest.raises(FileNotFoundError), storage_errors(tmp_path):
         (tmp_path / "template that was not shipped").read_text()
 
 

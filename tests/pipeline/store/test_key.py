@@ -32,7 +32,7 @@ def test_key_does_not_depend_on_the_order_of_entries():
         (Identity("compare", SLICE, INPUTS, "code", 2), "layout of artifacts 1 -> 2"),
     ],
 )
-def test_each_part_changes_the_key_and_is_named(new, change):
+def test_changed_part_of_an_identity_changes_its_key_and_is_named(new, change):
     assert new.key != OLD.key
     assert changed_parts(OLD, new) == [change]
 

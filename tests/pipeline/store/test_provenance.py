@@ -32,7 +32,7 @@ def test_result_records_seed_inputs_and_times():
     assert origin.package_version == walkerlab.__version__
 
 
-def test_commit_is_that_of_the_package_and_marks_changes(tmp_path, monkeypatch):
+def test_recorded_commit_is_that_of_the_package_and_marks_uncommitted_changes(tmp_path, monkeypatch):
     def git(*arguments):
         identity = ["-c", "user.name=n", "-c", "user.email=e@example.org"]
         done = subprocess.run(["git", *identity, *arguments], cwd=tmp_path, check=True, capture_output=True, text=True)

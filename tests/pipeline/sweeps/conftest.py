@@ -10,8 +10,8 @@ import pytest
 import walkerlab
 from walkerlab.config.loader import load
 from walkerlab.pipeline.store.runs import RunFolder
-from walkerlab.pipeline.sweeps.chunk import memory_for
-from walkerlab.pipeline.sweeps.engines import Order, SweepEngine
+from walkerlab.pipeline.sweeps.chunk import input_cache
+from walkerlab.pipeline.sweeps.engines import EngineOptions, SweepEngine
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
 from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
 
@@ -40,8 +40,18 @@ class Toy:
         question = build_sweep(stage, [axis_of_text(text) for text in over], **options)
         return SweepRun(question, read, RunFolder(self.runs, read.run_name), self.graph)
 
-    def run(self, stage, *over, engine=HERE_AND_NOW, order=None, chunk_s=None, reporter=None, force=False, **options):
-        work = SweepWork(engine, order or Order(), chunk_s, force=force)
+    def run(
+        self,
+        stage,
+        *over,
+        engine=HERE_AND_NOW,
+        engine_options=None,
+        chunk_s=None,
+        reporter=None,
+        force=False,
+        **options,
+    ):
+        work = SweepWork(engine, engine_options or EngineOptions(), chunk_s, force=force)
         return self.sweep(stage, *over, **options).run(work, reporter)
 
 
@@ -58,6 +68,6 @@ def marks(tmp_path, monkeypatch):
     """Where points that are computed leave a mark: their number."""
     folder = tmp_path / "marks"
     folder.mkdir()
-    memory_for.cache_clear()  # earlier sweeps in this process leave what they needed
+    input_cache.cache_clear()  # earlier sweeps in this process leave what they needed
     monkeypatch.setenv("TOY_SWEEP_MARKS", str(folder))
     return lambda: len(list(folder.iterdir()))

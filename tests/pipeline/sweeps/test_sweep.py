@@ -100,7 +100,7 @@ def test_evenly_spread_sample_of_walks_is_recomputed(toy):
     ]
 
 
-def test_all_of_few_points_are_recomputed(toy):
+def test_every_point_of_a_small_sweep_is_recomputed_for_its_error(toy):
     swept = toy.run("roll", "strides=[5, 7, 8]", sets=WALKED_AGAIN)
     error = swept.summary["numerical_error"]
     assert (error["walked_again"], error["of"], error["ended_otherwise"]) == (3, 3, 1)

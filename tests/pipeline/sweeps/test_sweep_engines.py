@@ -23,19 +23,19 @@ from walkerlab.pipeline.run.workers import ONE_THREAD, WorkerPool
 from walkerlab.pipeline.sweeps import engines
 from walkerlab.pipeline.sweeps.engines import (
     ENGINES,
+    EngineOptions,
     JobExecutor,
-    Order,
     SlurmQueue,
-    engine_named,
     environment_of_workers,
+    parse_engine,
     run_until_signalled,
 )
 
 LOCAL = ENGINES["local"]
 
 
-def order(workers=2, **more):
-    return Order(workers, modules=("toy_sweep.deadly",), **more)
+def engine_options(workers=2, **more):
+    return EngineOptions(workers, modules=("toy_sweep.deadly",), **more)
 
 
 def seeds(swept):
@@ -43,7 +43,7 @@ def seeds(swept):
 
 
 def test_point_that_kills_its_worker_is_marked_and_the_rest_finishes(toy):
-    swept = toy.run("deadly", "seed=[5, 7, 13, 14]", engine=LOCAL, order=order())
+    swept = toy.run("deadly", "seed=[5, 7, 13, 14]", engine=LOCAL, engine_options=engine_options())
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {7, 13}
     said = dict(zip(swept.content[""]["seed"].tolist(), swept.content[""]["reason"].tolist(), strict=True))
     assert said[7] == "a bug: ZeroDivisionError: a bug"
@@ -58,17 +58,19 @@ def test_point_that_kills_its_worker_is_marked_and_the_rest_finishes(toy):
 
 
 def test_local_workers_can_start_before_points_exist():
-    with LOCAL.start_early(Order(workers=2)) as begun:
+    with LOCAL.start_early(EngineOptions(workers=2)) as begun:
         workers = set(processes_below(os.getpid()))
-        with begun.opened(Order(workers=2)) as pool:
+        with begun.opened(EngineOptions(workers=2)) as pool:
             assert pool.submit(os.getpid).result() in workers
 
 
 def test_only_a_forced_sweep_recomputes_cached_points(toy, marks, tmp_path):
     counts = []
-    with LOCAL.start_early(Order(workers=1)) as begun:
+    with LOCAL.start_early(EngineOptions(workers=1)) as begun:
         for first, force in ((2, False), (4, False), (4, True), (4, True)):
-            toy.run("roll", f"strides={first}:{first + 1}:2", engine=begun, order=Order(1), force=force)
+            toy.run(
+                "roll", f"strides={first}:{first + 1}:2", engine=begun, engine_options=EngineOptions(1), force=force
+            )
             counts.append(marks())
             for mark in (tmp_path / "marks").iterdir():
                 mark.unlink()
@@ -77,7 +79,7 @@ def test_only_a_forced_sweep_recomputes_cached_points(toy, marks, tmp_path):
 
 def test_accidental_death_of_a_worker_loses_nothing(toy, tmp_path, monkeypatch):
     monkeypatch.setenv("TOY_SWEEP_ONCE", str(tmp_path / "died"))
-    swept = toy.run("deadly", "seed=18:24:7", engine=LOCAL, order=order())
+    swept = toy.run("deadly", "seed=18:24:7", engine=LOCAL, engine_options=engine_options())
     assert (tmp_path / "died").exists()
     assert set(seeds(swept).values()) == {"answered"}
 
@@ -85,7 +87,7 @@ def test_accidental_death_of_a_worker_loses_nothing(toy, tmp_path, monkeypatch):
 def test_workers_that_cannot_start_are_reported_after_a_few_tries(toy, monkeypatch):
     monkeypatch.setattr(work, "MAX_DEATHS", 2)  # each takes as long as a worker imports
     with pytest.raises(NoAnswer, match="all worker processes died"):
-        toy.run("deadly", "seed=1:4:4", engine=LOCAL, order=Order(1, modules=("no_such_module",)))
+        toy.run("deadly", "seed=1:4:4", engine=LOCAL, engine_options=EngineOptions(1, modules=("no_such_module",)))
 
 
 SWEEPER = """
@@ -93,15 +95,15 @@ import sys
 from pathlib import Path
 from walkerlab.config.loader import load
 from walkerlab.pipeline.store.runs import RunFolder
-from walkerlab.pipeline.sweeps.engines import Order
+from walkerlab.pipeline.sweeps.engines import EngineOptions
 from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep
 from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork
 from toy_sweep.sweep_pipeline import GRAPH
 read = load()
 question = build_sweep("deadly", [axis_of_text("seed=100:179:80")])
 sweep = SweepRun(question, read, RunFolder(Path(sys.argv[1]), "paper"), GRAPH)
-order = Order(2, modules=("toy_sweep.deadly",))
-swept = sweep.run(SweepWork(order=order, chunk_s=0.05))
+engine_options = EngineOptions(2, modules=("toy_sweep.deadly",))
+swept = sweep.run(SweepWork(engine_options=engine_options, chunk_s=0.05))
 print(swept.content.digest(), swept.failed)
 """
 
@@ -151,9 +153,13 @@ def test_dask_gives_the_same_result_and_survives_dead_workers(toy, monkeypatch):
         pids = list(client.run(os.getpid).values())
         killer = threading.Timer(0.5, lambda: [os.kill(pid, signal.SIGKILL) for pid in pids])
         killer.start()
-        engine, _ = engine_named("dask")
+        engine, _ = parse_engine("dask")
         swept = toy.run(
-            "deadly", "seed=100:179:80", engine=engine, order=order(address=client.scheduler.address), chunk_s=0.2
+            "deadly",
+            "seed=100:179:80",
+            engine=engine,
+            engine_options=engine_options(address=client.scheduler.address),
+            chunk_s=0.2,
         )
         killer.join()
         assert set(client.run(os.getpid).values()).isdisjoint(pids)
@@ -182,10 +188,10 @@ def test_cancelled_or_failed_job_is_reported_and_forgotten():
 @pytest.mark.filterwarnings("ignore")  # of the library's own
 def test_dask_starts_a_local_cluster(toy):
     pytest.importorskip("distributed", reason="the extra `dask` is not installed")
-    engine, address = engine_named("dask")
+    engine, address = parse_engine("dask")
     assert address == ""
     before = [os.environ.get(name) for name in ONE_THREAD]
-    swept = toy.run("deadly", "seed=100:103:4", engine=engine, order=order(1))
+    swept = toy.run("deadly", "seed=100:103:4", engine=engine, engine_options=engine_options(1))
     assert set(seeds(swept).values()) == {"answered"}
     assert [os.environ.get(name) for name in ONE_THREAD] == before
 
@@ -197,7 +203,12 @@ def test_jobs_on_this_machine_give_the_same_result(toy, tmp_path, monkeypatch):
     monkeypatch.setattr(submitit.Job, "_results_timeout_s", 0)
     monkeypatch.setattr(submitit.core.core, "_time", SimpleNamespace(time=time.time, sleep=lambda _: time.sleep(0.05)))
     options = {"cluster": "local", "timeout_min": "5"}
-    swept = toy.run("deadly", "seed=11:13:3", engine=ENGINES["slurm"], order=order(2, folder=tmp_path, options=options))
+    swept = toy.run(
+        "deadly",
+        "seed=11:13:3",
+        engine=ENGINES["slurm"],
+        engine_options=engine_options(2, folder=tmp_path, options=options),
+    )
     assert {seed for seed, status in seeds(swept).items() if status != "answered"} == {13}
     assert "its worker died" in swept.content[""]["reason"][2]
 
@@ -291,7 +302,7 @@ def test_sweep_workers_import_nothing_from_the_current_folder(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cloudpickle.py").write_text("raise SystemExit('imported')")
     for name, options in (("slurm", {"cluster": "local"}), ("dask", {})):
-        with ENGINES[name].opened(Order(1, folder=tmp_path, options=options)) as pool:
+        with ENGINES[name].opened(EngineOptions(1, folder=tmp_path, options=options)) as pool:
             assert pool.submit(os.getpid).result(timeout=60)
 
 
@@ -299,7 +310,7 @@ def test_sweep_workers_import_nothing_from_the_current_folder(tmp_path, monkeypa
 def test_dask_cluster_without_workers_gets_new_ones(monkeypatch):
     monkeypatch.setattr(engines, "RESTART_S", 1.0)
     distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
-    with ENGINES["dask"].opened(Order(1)) as pool:
+    with ENGINES["dask"].opened(EngineOptions(1)) as pool:
         client = distributed.get_client()
         client.retire_workers(list(client.nthreads()), close_workers=True)
         assert pool.submit(os.getpid).result(timeout=60)
@@ -324,7 +335,7 @@ def test_slurm_job_requests_the_stated_resources(tmp_path, monkeypatch):
         program.chmod(program.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
     options = {"slurm_partition": "short", "timeout_min": "30", "python": "/opt/python"}
-    with ENGINES["slurm"].opened(Order(options=options, folder=tmp_path)) as pool:
+    with ENGINES["slurm"].opened(EngineOptions(options=options, folder=tmp_path)) as pool:
         assert pool.size == 16
         pool.submit(os.getpid)
     job = (tmp_path / "submitted.sh").read_text()
@@ -342,25 +353,25 @@ def test_pickled_jobs_are_private(tmp_path):
     for name, mode in (("earlier.pkl", 0o664), ("foreign.pkl", 0o666)):
         (jobs / name).touch()
         (jobs / name).chmod(mode)
-    with ENGINES["slurm"].opened(Order(folder=run, options=local)) as pool:
+    with ENGINES["slurm"].opened(EngineOptions(folder=run, options=local)) as pool:
         assert pool.submit(os.getpid).result(timeout=60)
     assert stat.S_IMODE(jobs.stat().st_mode) == 0o700
     assert stat.S_IMODE((jobs / "earlier.pkl").stat().st_mode) == 0o600
     assert not (jobs / "foreign.pkl").exists()
     run.chmod(0o777)
     with pytest.raises(ConfigError, match="is open to other users") as refused:
-        ENGINES["slurm"].opened(Order(folder=run, options=local)).__enter__()
+        ENGINES["slurm"].opened(EngineOptions(folder=run, options=local)).__enter__()
     assert f"chmod o-w {run}" in refused.value.advice
 
 
 def test_unknown_or_uninstalled_sweep_engine_is_reported(monkeypatch):
     with pytest.raises(ConfigError, match="unknown engine; choose from local, dask, slurm"):
-        engine_named("cloud")
-    assert engine_named("dask=tcp://10.0.0.1:8786")[1] == "tcp://10.0.0.1:8786"
-    with pytest.raises(ConfigError, match="takes no address"), LOCAL.opened(Order(address="x")):
+        parse_engine("cloud")
+    assert parse_engine("dask=tcp://10.0.0.1:8786")[1] == "tcp://10.0.0.1:8786"
+    with pytest.raises(ConfigError, match="takes no address"), LOCAL.opened(EngineOptions(address="x")):
         pass
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ConfigError) as caught, ENGINES["dask"].opened(Order()):
+    with pytest.raises(ConfigError) as caught, ENGINES["dask"].opened(EngineOptions()):
         pass
     assert caught.value.advice == "pip install 'walkerlab[dask]'"
 

@@ -51,7 +51,7 @@ def test_json_is_one_object_with_the_fixed_keys(toy):
     assert one_object(toy("roll", "--json", "--strides", "3"))["reused"] is True
 
 
-def test_quiet_and_verbose(toy):
+def test_quiet_prints_no_messages_and_verbose_prints_details(toy):
     assert toy("roll", "--quiet").stderr == ""
     loud = toy("roll", "--verbose", "--force").stderr
     assert "runs/paper" in loud

@@ -108,7 +108,7 @@ def test_dragging_a_slider_changes_the_walk_and_can_be_undone(whole_page):
     page.until(f"{SHOWN} === 'Shown: paper'")
 
 
-def test_address_alone_restores_a_walk(page, served):
+def test_reloading_the_page_address_restores_the_walk(page, served):
     page.open(Address(f"{served.url}#config=kneed&walker.hip_mass_kg=0.6"))
     page.evaluate("location.reload()")
     page.until(f"typeof rows !== 'undefined' && {SHOWN} === 'Shown: kneed with walker.hip_mass_kg 0.6'")

@@ -203,7 +203,7 @@ def test_impossible_export_is_explained(run, what, kind, error, said):
         export_from(run, what, Target(kind, None), 516.0, "", QUIET)
 
 
-def test_film_has_a_frame_for_every_instant(run, tmp_path):
+def test_number_of_film_frames_follows_from_duration_and_rate(run, tmp_path):
     path = write_film(
         run, Target(str(tmp_path / "walk.gif"), None), Film("contact-sim", steps=1, rate=10, slower=1.0), QUIET
     )

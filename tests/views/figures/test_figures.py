@@ -284,7 +284,7 @@ def test_last_stride_has_the_style_of_its_model_and_the_walk_is_thin():
     assert any(line.get_xdata().size == trajectory["time"].size for line in axes.lines)
 
 
-def test_constant_energy_looks_constant():
+def test_axis_of_a_constant_energy_spans_more_than_half_a_joule():
     axes = plotted(NUMBERED[10], rigid_alone()).axes[2]
     bottom, top = axes.get_ylim()
     assert top - bottom > 0.5

@@ -54,7 +54,7 @@ def test_work_of_drives_is_not_shown_as_a_loss():
     np.testing.assert_allclose([*found.values()], [*passive.values()], atol=1e-12)
 
 
-def test_bars_are_stacked():
+def test_tops_of_stacked_bars_are_the_total_loss():
     (axes,) = plotted(LOST, both_models()).axes
     tops = [bar.get_y() + bar.get_height() for bar in axes.patches]
     assert max(tops) == pytest.approx(1.1)
@@ -66,7 +66,7 @@ def test_step_axis_has_integer_ticks(steps):
     assert all(float(tick).is_integer() for tick in axes.get_xticks())
 
 
-def test_missing_data_is_not_drawn():
+def test_figures_of_missing_data_are_left_out_with_the_reason():
     results = both_models(**{"contact-sim": without(contact(), "trajectory", "normal_force_N", "total_energy_J")})
     assert FORCES.why_left_out(results, {}) == "contact-sim: 'forces' is not among the config's outputs"
     assert LOST.why_left_out(results, {}) == "contact-sim: 'energies' is not among the config's outputs"

@@ -275,7 +275,7 @@ SAYS_MUCH = {
 
 
 @pytest.mark.parametrize("stage", SAYS_MUCH)
-def test_paragraphs_of_every_stage_are_wrapped_alike(stage):
+def test_answers_of_every_stage_are_wrapped_at_the_same_width(stage):
     lines = answer(stage, SAYS_MUCH[stage])
     assert sum(line.count("word") for line in lines) == 60
     assert max(map(len, lines)) <= PARAGRAPH_WIDTH

@@ -17,7 +17,7 @@ from walkerlab.pipeline.sweeps.chunk import flatten_summary
         ("contact-sim", lambda: walkerlab.simulate(strides=1, contact=walkerlab.contact()), set()),
     ],
 )
-def test_headline_values_omit_knees_without_knees(stage, answer, lacking):
+def test_headlines_of_walkers_without_knees_omit_the_knee_strike(stage, answer, lacking):
     summary = answer().summary
     assert set(headline_values(stage, summary)) == set(HEADLINES[stage]) - lacking
     if stage != "fixedpoint":

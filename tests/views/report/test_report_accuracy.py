@@ -82,7 +82,7 @@ def tables(made):
     }
 
 
-def test_section_is_omitted_without_the_result():
+def test_accuracy_section_is_omitted_without_an_accuracy_result():
     assert section(Results(config(), {"fixedpoint": fixedpoint()})) is None
 
 

@@ -140,7 +140,7 @@ def test_player_plays_and_pauses(page):
     assert page.evaluate(TIME) == stopped
 
 
-def test_nothing_moves_by_itself(page):
+def test_player_does_not_start_by_itself(page):
     page.evaluate("new Promise((done) => setTimeout(done, 150))")
     assert page.evaluate(TIME) == 0
 
@@ -280,7 +280,7 @@ def test_diagram_can_be_browsed_with_keys(page):
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_nothing_overflows_the_width(browser, folder, width):
+def test_report_page_fits_every_screen_width(browser, folder, width):
     for file in sorted(folder.glob("report*.html")):
         browser.open(file, width)
         browser.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
@@ -302,7 +302,7 @@ def test_colours_follow_the_dark_mode_of_the_system(browser, folder):
     assert seen[1] != seen[3]
 
 
-def test_less_motion_is_slower_motion(browser, folder):
+def test_player_runs_slower_for_readers_who_prefer_reduced_motion(browser, folder):
     browser.open(folder / "report.html", calm=True)
     assert float(browser.evaluate("document.querySelector('.speed').value")) < 1.0
 

@@ -164,7 +164,7 @@ def test_spring_alone_is_not_a_drive():
     assert "driven" not in plain(sections(sets=sprung)["verdict"].blocks[0].text)
 
 
-def test_work_at_rounding_level_is_not_mentioned():
+def test_columns_of_work_within_rounding_are_omitted():
     record = {"work_per_step_J": {"gravity": -2e-14, "push_off": 1.69, "hip": 0.0}}
     told = [column.title for column in works(str) if column.value(record) is not None]
     assert told == ["work of the push-off per step (J)"]
@@ -331,7 +331,7 @@ def test_equations_without_a_gait_are_omitted():
     assert [column.title for column in table.columns] == ["quantity", "value"]
 
 
-def test_assumptions_are_judged():
+def test_table_says_which_assumptions_of_the_rigid_model_hold():
     good = rows(sections()["assumptions"])
     assert [row[-1] for row in good.values()] == ["holds", "holds", "does not hold (ignored)", "holds"]
     walk = simulate(min_normal_force_N=-1.0, energy_drift_J=0.13, max_friction_ratio=2.0)

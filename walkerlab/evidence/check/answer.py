@@ -22,7 +22,13 @@ from walkerlab.evidence.check.conventions import (
     start_from,
     stated,
 )
-from walkerlab.evidence.check.explanations import Explanation, Question, explain, find_periodic_changes, undecided
+from walkerlab.evidence.check.explanations import (
+    Explanation,
+    Question,
+    advise_on_ambiguity,
+    explain,
+    find_periodic_changes,
+)
 from walkerlab.evidence.check.gaits import PLAIN, CheckedStep, gait_near, plain_walker, scales, why_not_plain
 from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, PlainWalker
 from walkerlab.evidence.check.printed import (
@@ -45,14 +51,14 @@ SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L a
 SAME_GAIT: Final = 1e-6
 CHOSEN: Final = "chosen"
 SMALL_VALUE: Final = 1e-3  # smallest printed value whose differences are relative to it, not absolute
-OF_GAITS: Final = (
+GAIT_VALUES: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
     "energy_J", "energy_drift_J", "cost_of_transport", "min_normal_force_N", "max_friction_ratio", "max_scuff_depth_m",
     "min_normal_impulse_N_s", "max_impulse_ratio", "work_per_step_J.gravity", "work_per_step_J.push_off",
     "work_per_step_J.hip",
 )  # fmt: skip
 """Values of `fixedpoint` that may be printed."""
-OF_WALKS: Final = {
+WALK_VALUES: Final = {
     "mean_energy_J": "energy_J",
     "last_step_period_s": "period_s",
     "last_step_length_m": "step_length_m",
@@ -69,7 +75,7 @@ def refuse_unknown(config: CheckConfig) -> None:
     check = config.check
     if check is None:
         return
-    known = (*OF_GAITS, *OF_WALKS)
+    known = (*GAIT_VALUES, *WALK_VALUES)
     for name in check.printed:
         if name not in known:
             hint = suggestion(name, known)
@@ -225,7 +231,7 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, Any]:
     values: dict[str, Any] = {name: value for name, value in summary.items() if isinstance(value, int | float)}
     values |= {f"work_per_step_J.{source}": work for source, work in summary["work_per_step_J"].items()}
     values["multipliers"] = tuple(complex(*pair) for pair in summary["multipliers"])
-    for name, same in OF_WALKS.items():
+    for name, same in WALK_VALUES.items():
         values[name] = [values[same]] * 1000 if name.startswith("step_") else values[same]
     return values
 
@@ -264,7 +270,7 @@ def check_gait(config: CheckConfig, explains: bool = True) -> dict[str, Any]:
         **energy_drift(checked),
         "explanations": [asdict(each) for each in explanations],
         "closest": closest,
-        "undecided": undecided(explanations),
+        "undecided": advise_on_ambiguity(explanations),
         "searched": searched,
         "nearest_gait": nearest_gait(checked, right),
         "routes": routes(right),

@@ -48,7 +48,7 @@ class MistakeFamily(NamedTuple):
     of_size: Callable[[float], PlainWalker]
 
 
-def mistakes_of(right: PlainWalker) -> Iterator[Candidate]:
+def generate_mistakes(right: PlainWalker) -> Iterator[Candidate]:
     """Yield walkers with mistakes that have no parameter."""
 
     def mistake(what: str, **changes: object) -> Candidate:
@@ -89,7 +89,7 @@ def wrong_signs(kneed: bool) -> Iterator[tuple[str, dict[tuple[str, int, int], f
         yield f"all velocity terms have the wrong sign{when}", everything
 
 
-def families_of(right: PlainWalker) -> Iterator[MistakeFamily]:
+def generate_families(right: PlainWalker) -> Iterator[MistakeFamily]:
     """Yield the mistakes that have a size."""
     early = "a touch counts already when the sum of the legs' angles is within {} rad of a touch"
     angles = (1e-5, 0.3)
@@ -104,8 +104,8 @@ def families_of(right: PlainWalker) -> Iterator[MistakeFamily]:
     yield MistakeFamily(late, times, first, lambda size: replace(right, euler_step=size, interpolates=False))
 
 
-def misprints_of(config: RigidConfig) -> Iterator[Candidate]:
-    """Yield walkers of which one parameter is misprinted."""
+def generate_misprints(config: RigidConfig) -> Iterator[Candidate]:
+    """Yield walkers with one parameter changed as a misprint could change it."""
     values = parameters(config)
     for key, value in values.items():
         for other, how in misprinted(key, value, values):

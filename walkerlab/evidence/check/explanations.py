@@ -221,7 +221,9 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
     """Yield the gaits of the most promising candidates, then those of mistakes whose size is fitted."""
     right = question.guess(question.walker)
     guesses = []
-    for place, candidate in enumerate((*causes.mistakes_of(question.walker), *causes.misprints_of(question.config))):
+    for place, candidate in enumerate(
+        (*causes.generate_mistakes(question.walker), *causes.generate_misprints(question.config))
+    ):
         guess = question.guess(candidate.walker)
         if guess is not None and (right is None or not same(guess, right)):
             guesses.append((question.miss(guess, question.quick_items), place, candidate, guess))
@@ -229,7 +231,7 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
         yield from question.attempt(candidate, guess)
     if len(question.items) < FEW:
         return
-    for family in causes.families_of(question.walker):
+    for family in causes.generate_families(question.walker):
         for size in sizes_to_try(fitted_size(question, family)):
             candidate = Candidate("mistake", family.what.format(f"{size:.4g}"), family.of_size(size), family.what)
             guess = question.guess(candidate.walker, EXACT)
@@ -369,7 +371,7 @@ def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
     return found
 
 
-def undecided(explanations: Sequence[Explanation]) -> str:
+def advise_on_ambiguity(explanations: Sequence[Explanation]) -> str:
     """Return a sentence on how to decide between several explanations, or '' if there is at most one."""
     if len(explanations) < 2:
         return ""

@@ -29,8 +29,8 @@ from walkerlab.evidence.check.printed import Item, match_multipliers
 BEFORE: Instant = "before-strike"
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Power of rates in which a quantity scales with the unit of time."""
-ADD_UP = ("period_s", "step_length_m")
-"""Quantities of a stride that are sums of those of its steps."""
+SUMMED_OVER_STEPS = ("period_s", "step_length_m")
+"""Quantities whose value for a stride is the sum of the values of its steps."""
 PLAIN = (
     "state", "state_before", "multipliers", "spectral_radius", "period_s", "step_length_m", "speed_m_s", "froude",
     "knee_strike_s",
@@ -211,7 +211,7 @@ class CheckedStep:
                 value = value[item.place] if item.place < len(value) else None
             if isinstance(value, int | float | complex):
                 scale = factor ** POWERS_OF_TIME.get(item.quantity, 0)
-                scale *= convention.steps if item.quantity in ADD_UP else 1
+                scale *= convention.steps if item.quantity in SUMMED_OVER_STEPS else 1
                 power = convention.steps if item.quantity == "spectral_radius" else 1
                 values[item.name] = complex((value * scale) ** power)
             else:

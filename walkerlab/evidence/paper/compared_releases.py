@@ -21,7 +21,7 @@ from walkerlab.scene.parts import assembly_of
 from walkerlab.scene.rigid import add_drives, have_different_legs
 
 RELEASES = {"compression": False, "touch": True}
-"""Whether the knee is released at the leading foot's first touch, by the config's name for the release."""
+"""Values of the config's `release`, and whether each releases the knee at the leading foot's first touch."""
 CONTACT_STEPS = 20  # enough to settle on another gait, or to fall
 RIGID_STEPS = 200
 RIGID_TOLERANCES = Tolerances("dop853", 1e-8, 1e-10, 2_000_000)

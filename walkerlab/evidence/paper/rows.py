@@ -281,7 +281,7 @@ def table_1(measured: Measured, study: PaperStudy) -> Table:
 
 
 def table_2(measured: Measured) -> Table:
-    """Return the initial values, with their differences as percentages of either column."""
+    """Return the initial values, and their differences in percent of the MATLAB and of the ADAMS value."""
     table = {}
     start = measured.contact.start
     for place, (coordinate, row) in enumerate(zip(printed.STATE_NAMES, printed.TABLE_2, strict=True)):

@@ -80,7 +80,7 @@ def name_with_unit(name: str, unit: str | None) -> str:
 
 
 def compared(results: Results, key: str) -> Sequence[Row]:
-    """Return rows of the summary of `compare`, or nothing if it did not run, or if the walker is not the paper's."""
+    """Return rows of the summary of `compare`, or no rows if it did not run or the walker is not the paper's."""
     rows: Sequence[Row] = results.summary("compare").get(key, ())
     return rows
 
@@ -92,7 +92,7 @@ def tables(results: Results) -> Section | None:
 
 
 def table_of(key: str, rows: Any) -> Table:
-    """Build the table of the paper's numbers, or one of its tables, by its key in the summary of `compare`."""
+    """Build the table for a key of the summary of `compare`: one of the paper's tables, or all its numbers."""
     captions = words.terms("paper.tables")
     if key not in captions:
         return numbers_table(rows)

@@ -29,7 +29,7 @@ def paper_walks(_config: object) -> dict[str, Any]:
 
 
 def known_problems_and_start(config: SceneConfig) -> tuple[str, ...]:
-    """Require stage `known-problems` and, unless the walker is a study's, what `gait_for_start_or_pads` requires."""
+    """Require stage `known-problems` and, for a walker outside the studies, the stages of `gait_for_start_or_pads`."""
     return ("known-problems", *(() if is_studied(config) else gait_for_start_or_pads(config)))
 
 

@@ -67,7 +67,7 @@ class FitProblem:
 
     @cached_property
     def floors(self) -> Floats:
-        """Smallest noise (quantities,) of each quantity: rounding of its values, or a fraction of its size."""
+        """Lower bound (quantities,) on each quantity's noise: rounding of its values, or a fraction of its size."""
         sizes = typical_sizes(self.forecast)
         resolution = self.forecast.measured.resolution
         rounding = [resolution.get(name, 0.0) / math.sqrt(12.0) for name in self.forecast.quantities]
@@ -177,7 +177,7 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
         earlier = noise
         noise = estimate_noise(rows, problem.floors, problem.leg_length_m, noise)
         if done >= FREE_ROUNDS and gain_of(rows, earlier, noise) < MIN_LIKELIHOOD_GAIN:
-            noise = halfway(earlier, noise) if done == FREE_ROUNDS else earlier
+            noise = average_noise(earlier, noise) if done == FREE_ROUNDS else earlier
         evaluation = evaluate(rows, noise)
         robust = robust_at(rows, noise)
         disturbances = most_probable_disturbances(rows, noise, evaluation.move)
@@ -227,14 +227,14 @@ def reduce_heights(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
     return next(shares, 0.0) * heights
 
 
-def halfway(before: Noise, after: Noise) -> Noise:
-    """Return standard deviations halfway between two."""
-    middle = np.sqrt(before.measurement * after.measurement)
-    return Noise(middle, *(0.5 * (before.process + after.process)).tolist())
+def average_noise(before: Noise, after: Noise) -> Noise:
+    """Return the geometric mean of two measurement noises and the arithmetic mean of two process noises."""
+    measurement = np.sqrt(before.measurement * after.measurement)
+    return Noise(measurement, *(0.5 * (before.process + after.process)).tolist())
 
 
 def noise_has_converged(rows: Reduced, before: Noise, after: Noise, leg_length_m: float) -> bool:
-    """Whether standard deviations have stopped changing, or change without becoming likelier."""
+    """Whether the standard deviations have stopped changing, or still change but hardly raise the likelihood."""
     same = np.all(np.abs(np.log(after.measurement / before.measurement)) < NOISE_TOLERANCE)
     change = np.abs(after.process - before.process)
     negligible = 1e-7 * np.array((leg_length_m, 1.0))

@@ -53,7 +53,9 @@ class WalkState(NamedTuple):
     # not lifted yet
     slip: Any
     rolling: Any  # (steps,) m, rolling distance of each step's stance foot
-    lift_time: Any  # (steps,) s, when each step's stance foot lifted, or when the other touched if it has not yet
+    lift_time: (
+        Any  # (steps,) s, time at which each step's stance foot lifted or, while it is down, the other foot's touch
+    )
     has_ground: Any  # (2,) whether there is ground under a foot
     level: Any  # (2,) m, height of the ground above the slope, for each foot
     cells: Any  # (2,) number of the cell below each foot, in the foot's lane of pads

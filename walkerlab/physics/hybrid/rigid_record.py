@@ -61,8 +61,8 @@ class Observer(NamedTuple):
 
     watching: bool
     times: Any  # (samples,) s, rising
-    states: Any  # (samples, 2 n), then any tangent columns, which compare walks at equal times since the heel strike
-    steps: Any  # (samples,) number of the step of each sample
+    states: Any  # (samples, 2 n) and any tangent columns: derivatives at a fixed time since the last heel strike
+    steps: Any  # (samples,) index of the step in which each sample lies
     tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
 
 
@@ -161,10 +161,13 @@ def vertex(before: float, middle: float, after: float) -> float:
 
 
 @kernel_part
-def ascend_to_worst(
+def refine_maximum(
     tally: Any, method: Any, mode: Mode, measure: int, middle: float, spacing: float, last: float
 ) -> None:
-    """Record a measure's maximum near fraction `middle` of the solver step, up to `last`, by narrowing parabolas."""
+    """Refine the maximum of a measure near fraction `middle` of the solver step, up to `last`, and record it.
+
+    The maximum of a parabola through three points is the middle of three points that are closer together.
+    """
     for _ in range(PEAK_REFINEMENTS):
         before = assumptions_at(method, mode, middle - spacing)
         centre = assumptions_at(method, mode, middle)
@@ -202,7 +205,7 @@ def observe(
         mean_energy += SIMPSON[eighth] * tally.energy
         for measure in range(3):
             if eighth > 1 and abs(vertex(before[measure], middle[measure], after[measure])) <= 1.0:
-                ascend_to_worst(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
+                refine_maximum(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before = middle
         middle = after
     tally.energy_integral += mean_energy * fraction * h

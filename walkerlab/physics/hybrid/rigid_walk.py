@@ -111,7 +111,8 @@ def foot_function(system: Mode, y: Any, turn: Any) -> tuple[float, float, float,
 
     For straight legs that are alike, on even ground, both functions are linear in the angles, so scuffing near
     mid-swing is not a zero. Otherwise they are the foot's height above its next foothold and its distance ahead.
-    `turn` (n,) holds rates or a column.
+
+    turn  (n,) angular velocities, for rates of change, or a change of the angles, for directional derivatives
     """
     model = system.model
     swing = turn[SWING]
@@ -132,10 +133,10 @@ def hull(start: float, start_rate: float, end: float, end_rate: float, zero_at_s
     second = start + start_rate / 3.0
     third = end - end_rate / 3.0
     first = second if zero_at_start else start
-    least = min(first, second, third, end)
-    most = max(first, second, third, end)
-    room = HULL_ROOM * (most - least)
-    return least - room, most + room
+    low = min(first, second, third, end)
+    high = max(first, second, third, end)
+    room = HULL_ROOM * (high - low)
+    return low - room, high + room
 
 
 @kernel_part

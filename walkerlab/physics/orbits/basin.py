@@ -44,12 +44,12 @@ Walker = TwoLegs | RigidModel
 
 
 class Capture(NamedTuple):
-    """Observer that ends a walk near an attractor or after `most` steps."""
+    """Observer that ends a walk near an attractor or after `max_steps` steps."""
 
     points: Any  # (m, 3) points of attractors
     owner: Any  # (m,) index of the attractor of each point
     reach: Any  # (m,) squared capture distance of each point
-    most: int  # maximum number of steps
+    max_steps: int
     attractor: Any  # (n,) output: index of the attractor reached, or UNREACHED
     last: Any  # (n, 3) output: last section point of each walk
 
@@ -63,7 +63,7 @@ def check_capture(observer: Capture, walk: int, step: int, t: float, y: Any) -> 
         if a * a + b * b + c * c < observer.reach[k]:
             observer.attractor[walk] = observer.owner[k]
             return WALKED
-    return WALKED if step + 1 >= observer.most else GOES_ON
+    return WALKED if step + 1 >= observer.max_steps else GOES_ON
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +83,12 @@ class Attractors:
     cycles: tuple[PeriodicAttractor, ...] = ()  # ordered by period
     aperiodic: bool = False  # whether some walks continue without repeating
 
-    def capture(self, n: int, most: int, share: float = 1.0) -> Capture:
-        """Return an observer for n walks of at most `most` steps. `share` scales the capture distances."""
+    def capture(self, n: int, max_steps: int, share: float = 1.0) -> Capture:
+        """Return an observer for n walks of at most `max_steps` steps. `share` scales the capture distances."""
         points = np.concatenate([np.zeros((0, SECTION_SIZE)), *(cycle.points for cycle in self.cycles)])
         owner = np.repeat(np.arange(len(self.cycles)), [cycle.period for cycle in self.cycles])
         reach = np.array([(share * self.cycles[index].reach) ** 2 for index in owner])
-        return Capture(points, owner, reach, most, np.full(n, UNREACHED, np.int64), np.zeros((n, SECTION_SIZE)))
+        return Capture(points, owner, reach, max_steps, np.full(n, UNREACHED, np.int64), np.zeros((n, SECTION_SIZE)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +109,13 @@ def walk_to_attractor(
     walker: Walker,
     attractors: Attractors,
     z: Floats,
-    most: int,
+    max_steps: int,
     share: float = 1.0,
     tolerances: tuple[float, float] = (RTOL, ATOL),
 ) -> Arrivals:
-    """Walk from section coordinates z (n, 3) until each walk reaches an attractor, fails, or has taken `most` steps."""
+    """Walk from section coordinates z (n, 3) until each reaches an attractor, fails, or has taken `max_steps` steps."""
     fates: Fates = new_fates(len(z))
-    capture = attractors.capture(len(z), most, share)
+    capture = attractors.capture(len(z), max_steps, share)
     if isinstance(walker, RigidModel):
         walk_one_by_one(walker, capture, z, fates, tolerances)
     else:
@@ -134,8 +134,8 @@ def walk_one_by_one(
         z = start
         steps = 0
         outcome = REJECTED if hip_above_fall(walker, state_on_section(walker, start)) < 0.0 else WALKED
-        while outcome == WALKED and steps < capture.most:
-            part = shooting.walk(section, z, min(STEPS_PER_LOOK, capture.most - steps), derived=False)
+        while outcome == WALKED and steps < capture.max_steps:
+            part = shooting.walk(section, z, min(STEPS_PER_LOOK, capture.max_steps - steps), derived=False)
             outcome = int(part.outcome)
             points = part.z
             steps_taken = part.time.size

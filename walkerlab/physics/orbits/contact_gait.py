@@ -25,7 +25,7 @@ from walkerlab.physics.solvers.system import Floats, State
 
 WARM_UP_STEPS = (4, 2, 0)  # numbers of steps to walk before Newton's method, tried in turn
 SEARCH_STEP_BUDGET = 40_000  # right-hand-side evaluations per step
-CONTACT_EFFORT = Effort(1e-10, most=10, shortest=1e-3, growth=2.0, rounding=1.0)
+CONTACT_EFFORT = Effort(1e-10, max_evaluations=10, shortest=1e-3, growth=2.0, rounding=1.0)
 # factors from actual to nearly rigid ground, by which the stiffness rises and the friction velocities fall
 MAX_STIFFENING = 100.0
 MAX_CREEP_FACTOR = 30.0

@@ -105,7 +105,11 @@ class CurvePoint(Solution[Data]):
 
 
 def correct(
-    equations: Equations[Data], guess: Floats, normal: Floats, tolerance: float, most: int = MAX_NEWTON_EVALUATIONS
+    equations: Equations[Data],
+    guess: Floats,
+    normal: Floats,
+    tolerance: float,
+    max_evaluations: int = MAX_NEWTON_EVALUATIONS,
 ) -> CurvePoint[Data] | NotConverged:
     """Solve for the point of a curve on the plane through `guess` with this `normal`."""
 
@@ -114,7 +118,7 @@ def correct(
         value = np.append(evaluated.value, normal @ (x - guess))
         return evaluated._replace(value=value, jacobian=np.vstack((evaluated.jacobian, normal)))
 
-    solution = newton(evaluate_on_plane, guess, Effort(tolerance, most))
+    solution = newton(evaluate_on_plane, guess, Effort(tolerance, max_evaluations))
     if isinstance(solution, NotConverged):
         return solution
     try:

@@ -148,7 +148,7 @@ class BranchTracer:
     step_map: StepMap
     span: ValueSpan
     control: StepControl = field(default_factory=StepControl)
-    most: int = MAX_BRANCH_POINTS  # maximum number of points on a branch
+    max_points: int = MAX_BRANCH_POINTS  # on a branch
     advance: Callable[[], None] = lambda: None  # called after each point
 
     def equations(self, period: int) -> GaitEquations:
@@ -172,8 +172,8 @@ class BranchTracer:
         if period > self.step_map.stride:
             step = min(step, 0.5 * float(np.linalg.norm(half_cycle_difference(start.evaluated.data))))
         while end is None:
-            if len(points) >= self.most:
-                end = BranchEnd(points[-1].value, f"the limit of {self.most} points is reached")
+            if len(points) >= self.max_points:
+                end = BranchEnd(points[-1].value, f"the limit of {self.max_points} points is reached")
                 break
             following = self.next_point(equations, last, step, before)
             if isinstance(following, BranchEnd):

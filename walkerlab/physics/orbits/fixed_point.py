@@ -436,7 +436,7 @@ class Search:
             passive.follow_seeds()
             passive.draw(generator, starts)
             family = RigidMap(partial(scale_drive, goal, slope), 1.0, goal)
-            follower = BranchFollower(family, ValueSpan(0.0, 1.0), most=MAX_DRIVE_POINTS)
+            follower = BranchFollower(family, ValueSpan(0.0, 1.0), max_points=MAX_DRIVE_POINTS)
             name = f"passive gait at {slope:.3g} rad"
             lost = "is lost at {:.0%} of the way to this slope and drive"
             followed = follower.family([Seed(record.cycle.z, 0.0) for record in passive.records], 1)

@@ -151,7 +151,7 @@ class Derivatives(NamedTuple):
 
 
 def family_direction(gait: GaitOnMap, h: float, guess: Floats) -> Floats | None:
-    """Improve a guess of dz/dp (d,) along the family, using steps in its direction, or None if that fails."""
+    """Improve a guess of dz/dp (d,) along the family by difference quotients, or return None if that fails."""
     # On compliant ground a step from z itself fails if the parameter changes the walker's dimensions: its foot would be
     # in the air or deep in the ground.
 

@@ -48,7 +48,7 @@ class Effort(NamedTuple):
     """Required accuracy of a solution, and limits of the search for it."""
 
     tolerance: float  # largest residual of a solution
-    most: int = MAX_NEWTON_EVALUATIONS  # maximum number of evaluations
+    max_evaluations: int = MAX_NEWTON_EVALUATIONS
     shortest: float = 1.0  # fraction of a move at which it is no longer halved
     growth: float = 1.0  # a move is halved if it multiplies the residual by this or more
     rounding: float = ROUNDING_FACTOR  # see ROUNDING_FACTOR
@@ -56,7 +56,7 @@ class Effort(NamedTuple):
 
 def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solution[Data] | NotConverged:
     """Solve m equations from a guess (m,). On failure, return NotConverged with the outcome of the walk."""
-    tolerance, most, shortest, growth, rounding = effort
+    tolerance, max_evaluations, shortest, growth, rounding = effort
     x = guess
     current = equations(guess)
     corrections = 0
@@ -69,7 +69,7 @@ def newton(equations: Equations[Data], guess: Floats, effort: Effort) -> Solutio
             return NotConverged(Outcome.WALKED, singular=True)
         share = 1.0
         while True:
-            if evaluations >= most:
+            if evaluations >= max_evaluations:
                 return NotConverged(Outcome.WALKED)
             ahead = equations(x + share * move)
             evaluations += 1

@@ -39,7 +39,7 @@ WALK_TOLERANCE = 1e-8
 WALK_CHECK = 1e-10
 ABSOLUTE_FACTOR = 0.01  # ratio of absolute to relative tolerance
 TIMED_WALKS = 3
-SERIES_EFFORT = CONTACT_EFFORT._replace(most=30)
+SERIES_EFFORT = CONTACT_EFFORT._replace(max_evaluations=30)
 # duration of a push-off divided by sqrt(d / g), where d is the static penetration: so short a push-off ends while the
 # other foot is still landing
 PUSH_OFF_FACTOR = 0.1

@@ -457,7 +457,7 @@ class RigidMap(StepMap):
         times_s: Floats = NO_TIMES,
         kicked: bool = False,
     ) -> VariedWalk | None:
-        """Differentiate a walk by the chain rule over its steps, each by its whole start and its rise."""
+        """Differentiate a walk by the chain rule, from derivatives of each step with respect to its start and rise."""
         unit = self._unit_at(p)
         if unit is None:
             return None

@@ -183,9 +183,9 @@ def largest_disturbance(
     return largest_survived(stands, gait.unit_of(disturbance), width)
 
 
-def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], most: int) -> int:
-    """Count the steps of a walk from the gait over normally distributed heights, stopping at `most` steps."""
-    heights = rough_heights(roughness_m, seed, most)
+def steps_on_rough_ground(gait: GaitOnMap, roughness_m: float, seed: tuple[int, ...], max_steps: int) -> int:
+    """Count the steps of a walk from the gait over normally distributed heights, stopping at `max_steps` steps."""
+    heights = rough_heights(roughness_m, seed, max_steps)
     return int(gait.step_map.take_disturbed_walk(gait.z, gait.p, heights, swing=gait.swing).durations_s.size)
 
 
@@ -199,9 +199,9 @@ class RoughWalks:
     method: Literal["all-failed", "censored", "lower-bound"]
 
 
-def rough_walks(steps: Floats, most: int) -> RoughWalks:
-    """Estimate the mean number of steps from walks (walks,) that were stopped at `most` steps."""
-    capped = int(np.count_nonzero(steps >= most))
+def rough_walks(steps: Floats, max_steps: int) -> RoughWalks:
+    """Estimate the mean number of steps from walks (walks,) that were stopped at `max_steps` steps."""
+    capped = int(np.count_nonzero(steps >= max_steps))
     failed = steps.size - capped
     total = float(steps.sum())
     if failed == 0:

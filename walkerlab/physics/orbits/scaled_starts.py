@@ -167,8 +167,10 @@ def smallest_change(
 ) -> Adjustment | None:
     """Find the start nearest to (1, 1) that walks, on successively finer grids around the nearest walking candidate.
 
-    candidates  (n, 2) factors of a map's cells that lead to walking; `cell` is the spacing of the map
-    quick       starts with the map's tolerances; `starts` have the config's, and the result walks with both
+    starts      starts with the config's solver tolerances
+    quick       the same starts with the map's tolerances; the result walks with both
+    candidates  (n, 2) factors of a map's cells that lead to walking
+    cell        spacing of the map's cells
     """
     order = np.argsort(np.hypot(*(candidates - 1.0).T), kind="stable")
     for swing, stance in candidates[order]:

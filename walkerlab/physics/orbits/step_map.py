@@ -76,7 +76,10 @@ class DisturbedWalk:
 
 @dataclass(frozen=True, eq=False)
 class VariedWalk:
-    """Derivatives of a walk from the section along columns of start and heights. Times of samples are fixed."""
+    """Derivatives of a walk from the section with respect to changes of its start and of the heights, one per column.
+
+    The times of the samples stay fixed.
+    """
 
     durations_s: Floats  # (steps, columns)
     lengths_m: Floats  # (steps, columns)
@@ -135,13 +138,14 @@ class StepMap(Stepper, Protocol):
         times_s: Floats = NO_TIMES,
         kicked: bool = False,  # noqa: ARG002
     ) -> VariedWalk | None:
-        """Differentiate a disturbed walk and its samples along columns (d + steps + 1, columns) of z and heights (m).
+        """Differentiate a disturbed walk and its samples in the direction of each column of `along`.
 
-        kicked  whether columns for changes of the rates at heel strikes follow, for each strike between two steps as
-                many as rates are free there
+        along   (d + steps + 1, columns), changes of z and of the heights (m)
+        kicked  whether to append columns for sudden changes of the rates at the heel strikes between steps: one column
+                for each rate that is free at the strike
 
-        Takes difference quotients unless overridden, and knows no kicks. Returns None if the walk, or a slightly
-        changed one, ends early.
+        This default takes difference quotients and ignores `kicked`. Returns None if the walk, or a slightly changed
+        one, ends early.
         """
         columns = [differentiate_along(self, z, p, heights_m, column, times_s) for column in along.T]
         if not columns or any(column is None for column in columns):

@@ -46,7 +46,7 @@ class Plane(NamedTuple):
 
     map_at: MapAt
     span: ValueSpan
-    own: float
+    value: float
 
 
 def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, float]) -> Equations[Cycle | None]:
@@ -94,7 +94,7 @@ def follow_curve(
     spans = (first, plane.span)
     scales = (spans[0].size, spans[1].size)
     equations = critical_gaits(plane.map_at, bifurcation.kind, period, scales)
-    x = np.append(bifurcation.point.x, plane.own / scales[1])
+    x = np.append(bifurcation.point.x, plane.value / scales[1])
     x[-2] = bifurcation.value / scales[0]
     start = correct(equations, x, np.eye(x.size)[-1], control.tolerance)
     if isinstance(start, NotConverged):
@@ -160,7 +160,7 @@ def find_regions(branches: Sequence[GaitBranch], span: ValueSpan, plane: Plane, 
     sides = zip((span, plane.span), PLANE_CELLS, strict=True)
     first, second = (side.least + side.size * (np.arange(cells) + 0.5) / cells for side, cells in sides)
     period = np.full(PLANE_CELLS, ALL_FAILED, np.int64)
-    begin = int(np.argmin(np.abs(second - plane.own)))
+    begin = int(np.argmin(np.abs(second - plane.value)))
     interpolated = interpolate_gaits(branches, first)
     for order in (range(begin, PLANE_CELLS[1]), range(begin - 1, -1, -1)):
         guesses = interpolated

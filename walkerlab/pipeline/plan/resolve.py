@@ -117,8 +117,8 @@ def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str]
     if edits:
         more = ", ..." if len(edits) > SHOWN_CHANGES else ""
         warn(
-            f"{file} has changed since {folder.path} was computed ({', '.join(edits[:SHOWN_CHANGES])}{more}); what is "
-            "exported is the run as it was. Give the file itself to compute it again."
+            f"{file} has changed since {folder.path} was computed ({', '.join(edits[:SHOWN_CHANGES])}{more}). The "
+            "run is exported as it was computed. Give the file itself to compute the edited config."
         )
 
 

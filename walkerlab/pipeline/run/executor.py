@@ -22,7 +22,7 @@ from walkerlab.pipeline.progress import Reporter, Silent, StageReporter
 from walkerlab.pipeline.run.workers import WorkerPool, tell
 from walkerlab.pipeline.store.artifact import NOT_THERE, Stored
 from walkerlab.pipeline.store.content import Content
-from walkerlab.pipeline.store.files import drawing_into
+from walkerlab.pipeline.store.files import storage_errors
 from walkerlab.scene.omissions import STILL_COMPUTED, STOPPED, LeftOut
 
 Task = Callable[[StageReporter], Content]
@@ -53,7 +53,7 @@ def call_stage(
     run = importlib.import_module(module).run
     arguments = {name: offered[name] for name in offered.keys() & signature(run).parameters.keys()}
     folder = arguments.get("folder")
-    drawing = contextlib.nullcontext() if folder is None else drawing_into(folder)
+    drawing = contextlib.nullcontext() if folder is None else storage_errors(folder)
     try:
         with kernel_cache.watch_compilation(partial(note_compilation, reporter)), drawing:
             content = run(config, inputs, reporter, **arguments)

@@ -81,7 +81,7 @@ class Spread:
     """Distributes work units over an executor's workers and retries the units of a worker that died."""
 
     todo: Iterator[WorkUnit]  # units that are not handed out yet
-    left: int  # number of these units
+    left: int  # number of units left in `todo`
     keep: Callable[[Batch, Sequence[Timed]], None]  # called with units and their results as they arrive
     give_up: Callable[[WorkUnit, BaseException], None]  # called with a unit that failed repeatedly, and its last error
     batch_s: float  # target duration of a batch, s; 0: one unit at a time
@@ -98,8 +98,8 @@ class Spread:
         """
         while self.left or self._again or self._running:
             # One batch more than there are workers is queued, so that no worker waits.
-            most = 1 if self.unit_s is None else executor.size + 1
-            while len(self._running) < most and (self._again or self.left):
+            max_running = 1 if self.unit_s is None else executor.size + 1
+            while len(self._running) < max_running and (self._again or self.left):
                 batch, failures = self._again.popleft() if self._again else (self._next_batch(executor.size), 0)
                 self._running[executor.submit(compute, batch)] = batch, failures
             ended, _ = wait(self._running, return_when=FIRST_COMPLETED)

@@ -21,8 +21,8 @@ from walkerlab.pipeline.stages.walk import (
     asymmetry_of,
     content_of_walk,
     legs,
+    measure_pace,
     numbers_of,
-    pace_of,
     rigid_start,
     step_asymmetry,
     steps_of,
@@ -103,7 +103,7 @@ def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResu
     return {
         **numbers,
         **add_stance_time(numbers, walk),
-        **pace_of(config, walk),
+        **measure_pace(config, walk),
         "advice": SCUFFED if scuffed else walk.advice,
         "max_penetration_m": walk.max_penetration_m,
         "slip_per_step_m": mean_of(walk.slip_m),

@@ -40,7 +40,7 @@ PERIOD = Label("1", "steps of the gait")
 STANCE = Label("rad", "angle of the stance leg just after each heel strike", name="stance_angle")
 CURVES = {"model": MODEL, "kind": Label("", "fold or flip"), "period": PERIOD}
 BIFURCATIONS = {"kind": KIND, "period": PERIOD, "branch": Label("1", "number of the branch")}
-EXPONENTS = {"exponent": Label("1", "largest exponent per step"), "uncertainty": Label("1", "standard error")}
+EXPONENTS = {"exponent": Label("1", "largest Lyapunov exponent per step"), "uncertainty": Label("1", "standard error")}
 POINTS = {
     "stable": Label("1", "whether disturbances die out"),
     "periods_s": Label("s", "durations of the steps", ("step",), name="step_period"),

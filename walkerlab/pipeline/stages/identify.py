@@ -85,7 +85,7 @@ def refuse(config: IdentifyConfig) -> None:
     refuse_model(config, block)
     if block.sensors and block.level == "steps":
         raise ConfigError(
-            f"identify.nuisance: {', '.join(block.sensors)}: only sampled angles have these.",
+            f"identify.nuisance: {', '.join(block.sensors)}: only sampled angles have these sensor properties.",
             "Leave out --nuisance and --camera-tilt free, or give angles over time (--level angles).",
             ("identify", "nuisance"),
         )
@@ -102,7 +102,7 @@ def refuse(config: IdentifyConfig) -> None:
 def identify_divided(
     config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification]
 ) -> Identification:
-    """Try divisions of the walk into steps, and return the first that fits, or else the best, the earlier of equals."""
+    """Try divisions of the walk into steps, and return the first that fits or, if none does, the most usable one."""
     answers = list[Identification]()
     problems = list[NoAnswer]()
     for measured in read_divisions(block, config):
@@ -201,7 +201,8 @@ def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
 def worst_moves(known: Information) -> Floats | None:
     """Return one-sigma changes (2, parameters) along the two parameter combinations that the walk determines worst.
 
-    The changes are independent and in the keys' units, the worst first; None if fewer than two are determined.
+    The changes are independent and in the keys' units, the worst first. Returns None if the walk determines fewer than
+    two combinations.
     """
     worst = known.directions[~is_open(known.singular_values)][-2:]
     if len(worst) < 2:

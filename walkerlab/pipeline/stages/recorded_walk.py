@@ -20,7 +20,7 @@ from walkerlab.exchange.walk_in_steps import RecordedSteps, divide_into_steps, f
 from walkerlab.outcome import Outcome
 from walkerlab.physics.mechanics.rigid_model import RigidModel
 from walkerlab.pipeline.progress import Progress
-from walkerlab.pipeline.stages.walk import OVER_TIME, legs, step_columns, variables_over_time
+from walkerlab.pipeline.stages.walk import TIME_LABELS, legs, step_columns, variables_over_time
 from walkerlab.pipeline.store import artifact
 from walkerlab.pipeline.store.artifact import Damaged
 from walkerlab.pipeline.store.content import Content, Group
@@ -168,7 +168,7 @@ def resample_others(walk: RecordedWalk, steps: RecordedSteps) -> dict[str, Any]:
     """Interpolate the other recorded quantities, (samples,) or (samples, 2), at the times of the samples."""
     time = walk.time_s - steps.origin_s
     besides = {}
-    for name in OVER_TIME:
+    for name in TIME_LABELS:
         if name in ("time", "angle", "velocity"):
             continue
         both = walk.both_legs(name)

@@ -29,28 +29,32 @@ from walkerlab.pipeline.store.footholds import UNEVEN
 from walkerlab.scene.rigid import first_step_length, have_different_legs
 
 FIRST_STEPS = 200
+"""Every sample is stored in this many steps at the start of a walk."""
 LAST_STEPS = 20
-"""Numbers of first and last steps of a walk for which every sample is stored."""
+"""Every sample is stored in this many steps at the end of a walk."""
 MAX_BETWEEN = 50_000
 """Maximum number of stored samples of all other steps, in addition to both sides of every heel strike."""
 MIN_REPEATED = 4
+"""Walks with fewer steps are not tested for repetition."""
 MAX_REPEATED = 32
-"""Minimum and maximum number of last steps tested for repetition, or a quarter of the walk if that is more."""
+"""Number of steps at the end of a walk that are tested for repetition, or a quarter of all steps if that is more."""
 FEWEST_SETTLED = 8
-"""Fewest last steps in which a walk that has just settled may repeat."""
+"""Smallest number of last steps in which repetition is looked for."""
 REPEATED = 1e-5
+"""Steps repeat if they differ by less than this, relative to the first step."""
 REPEATED_AFTER_SETTLING = 1e-2
-"""Largest difference between steps that repeat, relative to the first step, and relative to the spread of the steps."""
+"""Steps that repeat after two or more also differ by less than this, relative to the spread of the last steps."""
 ON_GAIT = 1e-6
+"""A walk starts on a gait if its second step differs from the first by less than this (relative)."""
 OFF_GAIT = 1e-2
-"""Relative differences from the first step, in period or length, of steps on the same gait and of steps off it."""
+"""A walk has left its gait at the first step that differs from the first one by more than this (relative)."""
 STRIDE: Final = 2
-"""Steps of a stride."""
+"""Number of steps in a stride."""
 STEP = "step"
 TIME = "time"
 LEG = "leg"
 COORDINATE = "coordinate"
-OF_STEPS: Final = {
+STEP_LABELS: Final = {
     "touch_time_s": Label("s", "time of the touch that ends the step"),
     "period_s": Label("s", "time from touch to touch"),
     "length_m": Label("m", "distance along the slope from touch to touch"),
@@ -64,7 +68,7 @@ OF_STEPS: Final = {
 }
 # a knee may not lock, and the last stance foot may not lift
 WITH_GAPS: Final = ("knee_strike_time_s", "slip_m", "rolling_m")
-OVER_TIME: Final = {
+TIME_LABELS: Final = {
     "time": Label("s", "time"),
     "step": Label("1", "step number"),
     "stance_leg": Label("1", "leg whose touch began the step"),
@@ -81,7 +85,7 @@ OVER_TIME: Final = {
     "penetration_m": Label("m", "depth of the foot in the ground that carries it"),
     "slip_velocity_m_s": Label("m/s", "velocity of the foot's lowest material point"),
     "kinetic_J": Label("J", "kinetic energy"),
-    "potential_J": Label("J", "potential energy, zero at the step's foothold"),
+    "potential_J": Label("J", "potential energy, which is zero at the step's foothold"),
     "mechanical_J": Label("J", "kinetic, potential (zero at the step's foothold) and elastic energy"),
     "total_energy_J": Label("J", "kinetic, potential from a fixed origin, and elastic energy"),
     **{loss.variable: Label("J", loss.meaning) for loss in SAMPLED.values()},
@@ -178,8 +182,10 @@ def select_samples(samples: Any, mask: NDArray[Any]) -> Any:
 
 
 def variables_over_time(**values: ArrayLike) -> dict[str, Variable]:
-    """Build variables over time from values (samples,), or (samples, 2) by leg. Their names are keys of `OVER_TIME`."""
-    return {name: labelled(column, OVER_TIME[name], *(TIME, LEG)[: np.ndim(column)]) for name, column in values.items()}
+    """Build variables over time from values (samples,), or (samples, 2) by leg, named by the keys of `TIME_LABELS`."""
+    return {
+        name: labelled(column, TIME_LABELS[name], *(TIME, LEG)[: np.ndim(column)]) for name, column in values.items()
+    }
 
 
 def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
@@ -198,7 +204,7 @@ def legs() -> dict[str, Variable]:
 
 
 def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[str, Variable]:
-    """Build variables over steps, named as in `OF_STEPS`. NaN and missing values of the last steps become gaps."""
+    """Build variables over steps, named as in `STEP_LABELS`. NaN and missing values of the last steps become gaps."""
     count = np.size(touch_time_s)
     if count == 0:
         return {}
@@ -207,7 +213,7 @@ def step_columns(touch_time_s: ArrayLike, **values: ArrayLike | None) -> dict[st
         if column is not None:
             gaps = name in WITH_GAPS
             rows = np.append(column, np.full(count - np.size(column), np.nan)) if gaps else column
-            columns[name] = labelled(rows, OF_STEPS[name], STEP, gaps=gaps)
+            columns[name] = labelled(rows, STEP_LABELS[name], STEP, gaps=gaps)
     return columns
 
 
@@ -223,7 +229,7 @@ def steps_of(walk: WalkRecord, **values: ArrayLike | None) -> dict[str, Variable
     return step_columns(walk.touch_time_s, **common, **values)
 
 
-def pace_of(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
+def measure_pace(config: SceneConfig | SimulateConfig, walk: WalkRecord) -> dict[str, float]:
     """Return the mean speed (m/s) up to the last touch, and its Froude number, or nothing if no step was completed."""
     if not walk.steps:
         return {}

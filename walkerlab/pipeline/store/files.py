@@ -39,8 +39,11 @@ def storing(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def drawing_into(folder: Path) -> Iterator[None]:
-    """Convert errors of storing files in `folder` to StorageError. Other errors of the `with` block pass."""
+def storage_errors(folder: Path) -> Iterator[None]:
+    """Convert an OSError for which `ADVICE` exists, such as a full disk, to a StorageError about `folder`.
+
+    Other errors of the `with` block are raised unchanged.
+    """
     try:
         yield
     except OSError as error:

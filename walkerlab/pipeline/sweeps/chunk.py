@@ -29,7 +29,7 @@ Labels = Mapping[str, tuple[str, str]]
 
 OMITTED_KEYS: Final = ("left_out", "no_answer")
 MEMORIES: Final = 2
-"""Number of caches of stage inputs (see `memory_for`) that a process keeps."""
+"""Number of caches of stage inputs (see `input_cache`) that a process keeps."""
 UNFIT: Final = re.compile(r"[^A-Za-z0-9_.+-]")
 
 
@@ -57,7 +57,7 @@ class Chunk:
 
 
 @lru_cache(maxsize=MEMORIES)
-def memory_for(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
+def input_cache(graph: Graph, forced: str) -> MemoryResults:  # noqa: ARG001 - one cache for each forced sweep
     """Return the cache of stage inputs of this process, which is kept between chunks. Arguments are as in
     `compute_point`.
     """
@@ -74,7 +74,7 @@ def compute_point(
     forced    identifies a sweep that reuses no earlier result; empty for other sweeps
     expected  the caller's `versions` of extensions, which must be those of this process; None not to compare them
     """
-    memory = memory_for(graph, forced)
+    memory = input_cache(graph, forced)
     try:
         if expected is not None:
             refuse_other_versions(expected)

@@ -41,8 +41,8 @@ GUARD = 'From Python, call it under `if __name__ == "__main__":` in a file. The 
 
 
 @dataclass(frozen=True)
-class Order:
-    """Options of an engine."""
+class EngineOptions:
+    """Options with which an engine opens its pool of workers."""
 
     workers: int = 0  # number of processes; 0 for the engine's default
     address: str = ""  # address of a running scheduler; empty to start one
@@ -56,25 +56,25 @@ class SweepEngine:
     """Engine that computes the chunks of a sweep."""
 
     # opens a pool, whose `size` is the number of chunks that it computes at the same time, and closes it afterwards
-    opened: Callable[[Order], contextlib.AbstractContextManager[SizedExecutor]]
+    opened: Callable[[EngineOptions], contextlib.AbstractContextManager[SizedExecutor]]
     chunk_s: float  # target duration of a chunk, s: long compared with the engine's overhead
 
     @contextlib.contextmanager
-    def start_early(self, order: Order) -> Iterator["SweepEngine"]:
+    def start_early(self, options: EngineOptions) -> Iterator["SweepEngine"]:
         """Yield the engine for one sweep. Local workers start now and import modules while the points are prepared."""
         if self.opened is not local:
             yield self
             return
-        with local(order) as pool:
+        with local(options) as pool:
             pool.start_all()
             yield replace(self, opened=lambda _order: contextlib.nullcontext(pool))
 
 
-def local(order: Order) -> WorkerPool:
+def local(options: EngineOptions) -> WorkerPool:
     """Run workers on this machine, one thread each."""
-    refuse_address("local", order)
-    modules = ("walkerlab.pipeline.sweeps.chunk", *order.modules)
-    return WorkerPool(order.workers or os.cpu_count() or 1, modules, dict.fromkeys(ONE_THREAD, "1"))
+    refuse_address("local", options)
+    modules = ("walkerlab.pipeline.sweeps.chunk", *options.modules)
+    return WorkerPool(options.workers or os.cpu_count() or 1, modules, dict.fromkeys(ONE_THREAD, "1"))
 
 
 @contextlib.contextmanager
@@ -94,16 +94,16 @@ def environment_of_workers() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def dask(order: Order) -> Iterator["JobExecutor"]:
+def dask(options: EngineOptions) -> Iterator["JobExecutor"]:
     """Use a Dask cluster at an address, or start one on this machine."""
     distributed = extra("distributed", "dask")
     # Dask copies these variables into this process's environment whenever it starts or replaces a worker.
     with environment_of_workers(), contextlib.ExitStack() as stack:
         workers: DaskWorkers | None = None
-        if order.address:
-            client = stack.enter_context(distributed.Client(order.address))
+        if options.address:
+            client = stack.enter_context(distributed.Client(options.address))
         else:
-            count = order.workers or os.cpu_count() or 1
+            count = options.workers or os.cpu_count() or 1
             try:
                 cluster = distributed.LocalCluster(
                     n_workers=count, threads_per_worker=1, dashboard_address=None, processes=True
@@ -115,7 +115,7 @@ def dask(order: Order) -> Iterator["JobExecutor"]:
             workers = DaskWorkers(cluster, client, count)
         # Worker deaths are handled chunk by chunk, as in every engine; Dask's own executor reports an error for a
         # result whose worker dies before handing it over.
-        size = order.workers or max(1, len(client.nthreads()))
+        size = options.workers or max(1, len(client.nthreads()))
         executor = JobExecutor(
             functools.partial(client.submit, retries=0, pure=False), size, None if workers is None else workers.wait
         )
@@ -151,23 +151,23 @@ class DaskWorkers:
 
 
 @contextlib.contextmanager
-def slurm(order: Order) -> Iterator["JobExecutor"]:
+def slurm(options: EngineOptions) -> Iterator["JobExecutor"]:
     """Submit a Slurm job for each chunk. `cluster=local` runs the jobs on this machine, for trials."""
     submitit = extra("submitit", "slurm")
-    refuse_address("slurm", order)
-    options: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in order.options.items()}
-    cluster = str(options.pop("cluster", "slurm"))
-    python = options.pop("python", None)
+    refuse_address("slurm", options)
+    parameters: dict[str, Any] = {name: int(text) if text.isdigit() else text for name, text in options.options.items()}
+    cluster = str(parameters.pop("cluster", "slurm"))
+    python = parameters.pop("python", None)
     try:
         job_runner = submitit.AutoExecutor(
-            private_jobs_folder(order.folder), cluster=cluster, **({"slurm_python": python} if python else {})
+            private_jobs_folder(options.folder), cluster=cluster, **({"slurm_python": python} if python else {})
         )
-        job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | options)
+        job_runner.update_parameters(**{"name": "walkerlab", "timeout_min": 60, "cpus_per_task": 1} | parameters)
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:
         raise ConfigError(f"--engine slurm: {error}", "--engine-option cluster=local tries it out here.") from error
     queue = SlurmQueue(str(job_runner.parameters["time"])) if cluster == "slurm" else None
     submit = functools.partial(job_runner.submit, run_until_signalled)
-    executor = JobExecutor(submit, order.workers or 16, None if queue is None else queue.wait)
+    executor = JobExecutor(submit, options.workers or 16, None if queue is None else queue.wait)
     with environment_of_workers():
         try:
             yield executor
@@ -303,10 +303,10 @@ class JobExecutor(SizedExecutor):
         return future
 
 
-def refuse_address(name: str, order: Order) -> None:
+def refuse_address(name: str, options: EngineOptions) -> None:
     """Raise ConfigError if an address is given for an engine that takes none."""
-    if order.address:
-        raise ConfigError(f"--engine {name}={order.address}: {name} takes no address.", "Only dask does.")
+    if options.address:
+        raise ConfigError(f"--engine {name}={options.address}: {name} takes no address.", "Only dask does.")
 
 
 def extra(module: str, name: str) -> Any:
@@ -329,7 +329,7 @@ ENGINES: dict[str, SweepEngine] = {
 }
 
 
-def engine_named(text: str) -> tuple[SweepEngine, str]:
+def parse_engine(text: str) -> tuple[SweepEngine, str]:
     """Return the engine and the address of NAME or NAME=ADDRESS.
 
     Raises ConfigError for an unknown name.

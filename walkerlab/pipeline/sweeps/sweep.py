@@ -30,7 +30,7 @@ from walkerlab.pipeline.store.files import make_folder
 from walkerlab.pipeline.store.hdf5 import GroupOnDisk
 from walkerlab.pipeline.store.runs import RunFolder, claim, refuse_another_config
 from walkerlab.pipeline.sweeps.chunk import Chunk, PointResult, compute_point, join_points, store, stored_chunks
-from walkerlab.pipeline.sweeps.engines import ENGINES, Order, SweepEngine
+from walkerlab.pipeline.sweeps.engines import ENGINES, EngineOptions, SweepEngine
 from walkerlab.pipeline.sweeps.question import SweptStage
 from walkerlab.pipeline.sweeps.result import Merge
 
@@ -40,7 +40,7 @@ class SweepWork:
     """Options for computing a sweep."""
 
     engine: SweepEngine = ENGINES["local"]  # engine that computes the points
-    order: Order = field(default_factory=Order)  # options of the engine
+    engine_options: EngineOptions = field(default_factory=EngineOptions)
     chunk_s: float | None = None  # target duration of a chunk, s; None for the engine's default
     wait: bool = True  # wait for another process that works in the folder
     force: bool = False  # compute every point, stored or not
@@ -243,7 +243,7 @@ class SweepRun:
         todo = self._units(missing.tolist(), work)
         chunk_s = work.chunk_s or work.engine.chunk_s
         spread = Spread(todo, int(missing.size), lambda _units, points: keep(join_points(points)), give_up, chunk_s)
-        with work.engine.opened(work.order) as pool:
+        with work.engine.opened(work.engine_options) as pool:
             spread.run(pool)
         return tuple(bugs.values())
 

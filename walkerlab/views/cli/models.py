@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.export import ENDINGS, export_model, law_named, slope_named
+from walkerlab.exchange.export import ENDINGS, export_model, parse_law, parse_slope
 from walkerlab.exchange.exported import GaitStart
 from walkerlab.pipeline.plan.resolve import resolve, warn_of_edits
 from walkerlab.pipeline.run.runner import Options, execute
@@ -43,7 +43,7 @@ def write_model(
     to = "xml" if target.to == "mjcf" and not named_mjcf else target.to
     path, ending = replace(target, to=to).choose_file("a model", folder.name, list(ENDINGS))
     kind = ENDINGS[ending]
-    adams_law = law_named(law or "contact")
+    adams_law = parse_law(law or "contact")
     if law is not None and kind == "mjcf":
         raise ConfigError("--law chooses between contact laws of ADAMS.", "Leave it out for MuJoCo.")
     inputs = {}
@@ -54,7 +54,7 @@ def write_model(
         assert report.artifact is not None, "a stage with an answer stores it"
         inputs["fixedpoint"] = artifact.read(report.artifact)
     start = GaitStart(*rigid_start(config, inputs), step_asymmetry(config, inputs))
-    exported = export_model(config, start, kind, adams_law, git_commit(), path.stem, slope_named(slope))
+    exported = export_model(config, start, kind, adams_law, git_commit(), path.stem, parse_slope(slope))
     for omission in exported.left_out:
         console.note(f"left out: {omission}")
     paths = [path, *(path.with_name(name) for name in list(exported.files)[1:])]

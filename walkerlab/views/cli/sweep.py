@@ -64,14 +64,14 @@ SWEEP_FIELDS = [one.name for one in fields(SweepRequest) if one not in fields(Re
 def sweep(request: SweepRequest) -> None:
     """Run a stage over a range of parameters, reusing results that exist."""
     from walkerlab.config.analyses import Sweep
-    from walkerlab.pipeline.sweeps.engines import Order, engine_named
+    from walkerlab.pipeline.sweeps.engines import EngineOptions, parse_engine
     from walkerlab.pipeline.sweeps.question import axis_of_text, build_sweep, refuse_unrecorded
     from walkerlab.pipeline.sweeps.sweep import SweepRun, SweepWork, modules_of
 
     options = dict(text.split("=", 1) for text in request.engine_option or () if "=" in text)
     if bad := [text for text in request.engine_option or () if "=" not in text]:
         raise typer.BadParameter(f"{bad[0]!r} is not NAME=VALUE", param_hint="--engine-option")
-    chosen, address = engine_named(request.engine)
+    chosen, address = parse_engine(request.engine)
     loaded = request.loaded
     over = request.over or ()
     block = loaded.config.sweep or Sweep()  # used where no option is given
@@ -86,7 +86,7 @@ def sweep(request: SweepRequest) -> None:
     quantities = {f"--show {name}": name for name in request.show or ()}
     quantities |= {f"--against {request.against}": request.against} if request.against is not None else {}
     refuse_unrecorded(question, quantities)
-    order = Order(
+    engine_options = EngineOptions(
         workers=request.at_once,
         address=address,
         modules=modules_of(question.stage, loaded.config, request.graph),
@@ -97,7 +97,7 @@ def sweep(request: SweepRequest) -> None:
         foreseen = SweepRun(question, loaded, request.folder, request.graph)
         show_plan(request, foreseen.foresee(request.at_once or os.cpu_count() or 1, LISTED_POINTS))
         return
-    with chosen.start_early(order) as engine:
+    with chosen.start_early(engine_options) as engine:
         run = SweepRun(question, loaded, request.folder, request.graph)
         # Modules needed at the end are loaded while the workers compute.
         threading.Thread(target=importlib.import_module, args=("walkerlab.views.report.sweep_page",)).start()
@@ -110,7 +110,7 @@ def sweep(request: SweepRequest) -> None:
 
         seconds = request.chunk_seconds
         waits = not request.no_wait
-        work = SweepWork(engine, order, seconds, waits, request.force, check)
+        work = SweepWork(engine, engine_options, seconds, waits, request.force, check)
         swept = run.run(work, request.console)
     show_result(request, swept)
 

@@ -349,7 +349,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             address = urlsplit(self.path)
             url_token = parse_qs(address.query).get("token", [""])[0]
-            if not self.local() or not self.allowed(url_token or self.cookie() or self.bearer()):
+            if not self.check_origin() or not self.check_token(url_token or self.cookie() or self.bearer()):
                 return None
             if address.path == "/":
                 html, policy = render_page(self.server.base)
@@ -365,7 +365,7 @@ class Handler(BaseHTTPRequestHandler):
         return self.answer(*failure(404, f"not found: {self.path}"))
 
     def do_POST(self) -> None:
-        if not self.local() or not self.allowed(self.bearer()):
+        if not self.check_origin() or not self.check_token(self.bearer()):
             return None
         try:
             length = int(self.headers.get("Content-Length", 0))
@@ -376,8 +376,8 @@ class Handler(BaseHTTPRequestHandler):
             form = '{"set": {KEY: VALUE}, "models": ["rigid", "contact"]}'
             self.answer(*failure(400, f"a request is JSON: {form}; `config`, if given, must be one of the page's"))
 
-    def local(self) -> bool:
-        """Whether the request comes from this server's own page. Otherwise send status 403."""
+    def check_origin(self) -> bool:
+        """Check that this server's page sent the request, and answer with status 403 if not. Return whether it did."""
         own = f"http://{self.server.host}"
         if self.headers.get("Host") == self.server.host and self.headers.get("Origin", own) == own:
             return True
@@ -392,8 +392,8 @@ class Handler(BaseHTTPRequestHandler):
     def bearer(self) -> str:
         return self.headers.get("Authorization", "").removeprefix("Bearer ")
 
-    def allowed(self, token: str) -> bool:
-        """Whether the token is right. If it is wrong, send status 401."""
+    def check_token(self, token: str) -> bool:
+        """Check the token, and answer with status 401 if it is wrong. Return whether it is right."""
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self.answer(*failure(401, "the token is missing", "Open the address as it was printed."))

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from pydantic.fields import FieldInfo
 
-from walkerlab.config.fields import bounds_of, leaves, type_words, value_at, words_of
+from walkerlab.config.fields import bounds_of, describe_type, leaves, value_at, words_of
 from walkerlab.config.files import config_to_extend
 from walkerlab.config.loader import LoadedConfig, load
 from walkerlab.config.schema import Config
@@ -87,7 +87,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
     if isinstance(first, bool):
         return {"words": [True, False]}
     words = words_of(field.annotation)
-    if type_words(field.annotation) == "word" and len(words) > 1:
+    if describe_type(field.annotation) == "word" and len(words) > 1:
         return {"words": words}
     if not isinstance(first, int | float):
         return {}

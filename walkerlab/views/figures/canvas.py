@@ -23,15 +23,15 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from walkerlab.labels import add_unit
 from walkerlab.views.figures.style import FIGURE_WIDTH, NARROW, NARROW_BELOW, PNG_DPI, RC
 
-FILLS = 0.95
+MAX_FILL = 0.95
 """Maximum fraction of the available width that a legend, title or label fills."""
 ROWS = 3
 """Legend rows that fit in a figure's nominal height; longer legends make the figure taller."""
-SHRINKS = 0.7
-"""Exponent that relates a figure's height to its width; below 1, since text shrinks less than the figure."""
+HEIGHT_EXPONENT = 0.7
+"""Height of a figure is proportional to its width raised to this power. It is below 1 because text hardly shrinks."""
 
 BETWEEN_DECADES: Final = ((6.0, (2.0, 3.0, 5.0)), (15.0, (2.0, 5.0)), (100.0, (3.0,)))
-"""Ratio of an axis's limits, and the multiples of powers of ten that are labelled if the ratio is smaller."""
+"""Largest ratio of an axis's limits, and the multiples of powers of ten that are labelled up to it."""
 RAISED: Final = str.maketrans("0123456789-.e", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·ᵉ")
 MAX_MINOR_SPAN: Final = 1e4
 """Largest number written without an exponent."""
@@ -61,7 +61,7 @@ class ShownFigure(Figure):
 def blank(height: float) -> Figure:
     """Create a figure of the style's width. `height` (in) is for the default width and shrinks less than the width."""
     width = matplotlib.rcParams["figure.figsize"][0]
-    figure = ShownFigure(figsize=(width, height * (width / FIGURE_WIDTH) ** SHRINKS), layout="constrained")
+    figure = ShownFigure(figsize=(width, height * (width / FIGURE_WIDTH) ** HEIGHT_EXPONENT), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -114,7 +114,7 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str | None = No
     for rows in range(1, len(handles) + 1):
         legend = figure.legend(handles=list(handles), ncols=-(-len(handles) // rows), **where)
         box = legend.get_window_extent()
-        if rows == len(handles) or box.width < FILLS * figure.bbox.width:
+        if rows == len(handles) or box.width < MAX_FILL * figure.bbox.width:
             break
         legend.remove()
     figure.set_figheight(figure.get_figheight() + max(0.0, 1.0 - ROWS / rows) * box.height / figure.dpi)
@@ -139,8 +139,8 @@ def break_lines(figure: Figure) -> None:
         for text, room in ((title, box.width), (axes.xaxis.label, box.width), (axes.yaxis.label, box.height)):
             extent = text.get_window_extent()
             longest = max(extent.width, extent.height)
-            if longest > FILLS * room:
-                letters = int(len(text.get_text()) * FILLS * room / longest)
+            if longest > MAX_FILL * room:
+                letters = int(len(text.get_text()) * MAX_FILL * room / longest)
                 text.set_text(textwrap.fill(text.get_text(), letters, break_long_words=False, break_on_hyphens=False))
 
 

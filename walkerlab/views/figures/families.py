@@ -346,7 +346,7 @@ CURVE_STYLES: Final[dict[str, LineStyleType]] = {"flip": "-", "fold": (0.0, (3.0
 WIDTHS: Final = {1: 1.4, 2: 1.0}
 FINEST: Final = 0.6
 DOUBLED: Final = {1: "#DCE9F5", 2: "#A9CCE8", 4: "#6CA6D4", 8: "#3B7DB5", 16: "#1F5488"}
-OTHER_PERIOD, APERIODIC, NOTHING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
+OTHER_PERIOD, APERIODIC, NO_WALKING = "#B5DDC0", "#F2C7A0", "#F4F4F4"
 
 
 def draw_plane(results: Results) -> Drawn:
@@ -382,7 +382,7 @@ def region_kinds(regions: Group) -> list[Kind]:
     kinds += [
         (OTHER_PERIOD, "other number of steps", other),
         (APERIODIC, "aperiodic", period == 0),
-        (NOTHING, "no walking", period < 0),
+        (NO_WALKING, "no walking", period < 0),
     ]
     return [kind for kind in kinds if kind[2].any()]
 

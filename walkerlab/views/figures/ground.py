@@ -23,11 +23,12 @@ DRIVE_LOSSES: Final = ("push_off_J", "hip_J")
 KNEES: Final = (LOSSES[KNEE_STRIKES].cause, LOSSES[KNEE_STRIKES].colour)
 ENERGY = Need(CONTACT_STAGE, TRAJECTORY, (*LOSS_STYLES, TOTAL), NO_ENERGIES)
 SHOWN_STRIDES = 2
+"""Number of strides in the force figure, few enough to tell impacts apart."""
 SHOWN_STEPS = 40
-"""Number of strides in the force figure, few enough to tell impacts apart, and of steps in the loss figure."""
-OF_SAMPLES: Final = 0.99
-"""Fraction of the loaded samples that the axis shows; impact forces, many times the weight, lie beyond it."""
-NOTHING: Final = 1e-3
+"""Number of steps in the loss figure."""
+SHOWN_LOADS: Final = 0.99
+"""Fraction of the loaded samples that the force axis shows. Impact forces of many times the weight lie beyond it."""
+NEGLIGIBLE_LOSS: Final = 1e-3
 """Fraction of the energy lost below which a cause is not drawn."""
 
 
@@ -40,7 +41,7 @@ def draw_forces(results: Results) -> Drawn:
     loads = walk[NORMAL_FORCE]
     pulls = walk[FRICTION]
     # upper limit of the normal-force axis (N)
-    top = 1.1 * float(np.quantile(loads[loads > 0.0], OF_SAMPLES)) if (loads > 0.0).any() else 1.0
+    top = 1.1 * float(np.quantile(loads[loads > 0.0], SHOWN_LOADS)) if (loads > 0.0).any() else 1.0
     figure = blank(4.4)
     parts = figure.subplot_mosaic([["normal", "cone"], ["friction", "cone"]])
     normal = parts["normal"]
@@ -90,7 +91,9 @@ def losses(walk: DrawnWalk) -> dict[tuple[str, str], Array]:
     given = np.sum([walk[name] for name in DRIVE_LOSSES if name in walk.samples.variables], axis=0)
     total = np.diff((given - walk[TOTAL])[rows])
     by_cause[KNEES] = total - np.sum(list(by_cause.values()), axis=0)
-    return {cause: lost for cause, lost in by_cause.items() if np.abs(lost).max() >= NOTHING * np.abs(total).max()}
+    return {
+        cause: lost for cause, lost in by_cause.items() if np.abs(lost).max() >= NEGLIGIBLE_LOSS * np.abs(total).max()
+    }
 
 
 def draw_losses(results: Results) -> Drawn:

@@ -19,22 +19,26 @@ AnyWalker = CompassWalker | StraightLegs | Kneed | AssembledWalker
 Point = tuple[float, float]
 
 FIGURE_HEIGHT = 4.6
+"""Nominal height of the figure (in)."""
 SMALL = 7.5
-"""Nominal height of the figure (in) and font size of its labels (pt)."""
+"""Font size of the labels (pt)."""
 SMALL_ARC = 0.02
 """Length (leg lengths) up to which a dimension has a label but no arrow, and a sole has no mark at its centre."""
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)
 SECOND_LEG_ANGLE = -0.3
+"""Angle (rad) at which the second leg, or its thigh if it has a knee, is drawn."""
 BENT_ANGLE = -0.75
-"""Angles (rad) at which the second leg is drawn: of the whole leg or, with knees, its thigh; and of the shank."""
+"""Angle (rad) at which the shank of the second leg is drawn."""
 LEFT_OF_LEG = 0.62
+"""Distance (leg lengths) of the labels behind the leg from it."""
 FIRST_LANE = 0.24
-"""Distances from the leg (leg lengths): of the labels behind it, and of the first dimension line ahead of it."""
+"""Distance (leg lengths) of the first dimension line ahead of the leg from it."""
 LETTER = 0.0088
+"""Width of a character as a fraction of the picture's width."""
 LINE_SPACING = 0.0195
-"""Width of a character and height of a line of text, as fractions of the picture's width."""
+"""Height of a line of text as a fraction of the picture's width."""
 CLEAR = 0.05
 """Minimum distance between the centres of labels in a lane, in leg lengths."""
 TITLE = 0.4

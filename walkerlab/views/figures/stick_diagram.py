@@ -333,7 +333,7 @@ FILM_DPI = 100
 """
 STEPS_SHOWN = 4
 RELIEF = 0.04
-RELIEF_UNDER = 0.075
+RELIEF_DEPTH = 0.075
 """Maximum height of the magnified ground profile, and its distance below the ground (leg lengths)."""
 
 
@@ -361,7 +361,7 @@ def draw_relief(axes: Axes, sticks: Sticks) -> None:
     times = ten * next(digit for digit in (5.0, 2.0, 1.0) if digit * ten <= room)
     if times <= 1.0:
         return
-    relief = sticks.ground * [1.0, times] - [0.0, RELIEF_UNDER * sticks.leg_length]
+    relief = sticks.ground * [1.0, times] - [0.0, RELIEF_DEPTH * sticks.leg_length]
     axes.plot(*sticks.project(relief).T, color=VERMILLION, linewidth=0.9)
     corner: dict[str, Any] = {"transform": axes.transAxes, "va": "top", "ha": "right"}
     axes.text(0.99, 0.97, f"below: ground heights × {times:g}", color=VERMILLION, **corner)

@@ -113,7 +113,7 @@ class EngineExperiment:
         if isinstance(answer, TaskLost):
             outcome = Outcome.BUDGET_EXHAUSTED if answer.timed_out else Outcome.SOLVER_FAILED
             nothing = (None, None, None, None, None, None)
-            return EngineRow(*head, step_s, tolerance, *nothing, 0, outcome.label, answer.why)
+            return EngineRow(*head, step_s, tolerance, *nothing, 0, outcome.label, answer.reason)
         period_s = length_m = slip_m = error = touch_error = None
         touches = answer.touches_s
         truth = self.truth
@@ -185,17 +185,20 @@ class EngineOnScene:
     process: OwnProcess
 
     def walk(
-        self, called: str, stepping: Stepping, most: int, own: OwnContact | None = None, start: float = 1.0
+        self, label: str, stepping: Stepping, max_steps: int, native: OwnContact | None = None, start: float = 1.0
     ) -> tuple[EngineRow, runs.WalkAnswer | TaskLost]:
-        """Simulate a walk of at most `most` engine steps: on the engine's contact `own` or, if it is None, under our
-        law.
+        """Simulate a walk of at most `max_steps` engine steps.
+
+        label   name of the integrator or contact model in the row
+        native  the engine's native contact; None for our law
+        start   factor on the gait's initial velocities
         """
-        law, until_s = (SAME_LAW, self.truth.until_s) if own is None else (OWN_LAW, UNLIMITED_S)
+        law, until_s = (SAME_LAW, self.truth.until_s) if native is None else (OWN_LAW, UNLIMITED_S)
         scene = self.scene.scale_start(start)
-        task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, own, most)
+        task = runs.WalkTask(self.engine.name, stepping, scene, OWN_TOUCHES, until_s, native, max_steps)
         answer = self.process.do(task.run, RUN_TIMEOUT_S)
         experiment = EngineExperiment(self.scene, self.engine.name, self.engine.version, law, self.truth)
-        return experiment.row(called, stepping, answer, start), answer
+        return experiment.row(label, stepping, answer, start), answer
 
     def same_law(self) -> Iterator[EngineRow]:
         """Yield runs of each integrator under our law, from coarse to fine."""
@@ -227,31 +230,30 @@ class EngineOnScene:
         about = self.scene.name, name, contact, dict(answer.own.settings)
         return answer.own, [TuningRow(*about, *numbers) for numbers in measured]
 
-    def own_law(self, contact: str, own: OwnContact) -> Iterator[EngineRow]:
-        """Yield walks on the engine's own contact: from the gait, coarse to fine, then from other starts."""
-        # other starts are simulated at the second finest step
-        # Adaptive walks from the gait share one step budget. The next walk is assumed to take as many steps as the
-        # last.
+    def own_law(self, contact: str, native: OwnContact) -> Iterator[EngineRow]:
+        """Yield walks on the engine's native contact: from the gait with ever finer steps, then from other starts."""
+        # Walks from other starts use the second finest step. Adaptive walks from the gait share one step budget, and
+        # each is expected to take as many steps as the one before.
         name = self.engine.adapter().CONTACTS[contact]
         integrator = self.engine.adapter().INTEGRATORS[name]
-        most = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps
+        max_steps = integrator.most_steps if integrator.adapts else STEP_ALLOWANCE * integrator.most_steps
         before = None
         completed = []
         spent = 0
         usual_s = float(self.truth.walk.touch_time_s[-1])
         for stepping in steppings(name, integrator, [h for h in OWN_LAW_STEPS if usual_s / h <= integrator.most_steps]):
-            row, answer = self.walk(contact, stepping, most, own)
+            row, answer = self.walk(contact, stepping, max_steps, native)
             yield row
             completed.append(stepping)
-            steps = answer.steps if not isinstance(answer, TaskLost) else most if answer.timed_out else 0
+            steps = answer.steps if not isinstance(answer, TaskLost) else max_steps if answer.timed_out else 0
             spent += steps
-            if steps >= most or (integrator.adapts and spent + steps > most):
+            if steps >= max_steps or (integrator.adapts and spent + steps > max_steps):
                 return
             if before is not None and has_settled(before, row):
                 break
             before = row
         for stepping in completed[-2:][:1]:
-            yield from (self.walk(contact, stepping, most, own, factor)[0] for factor in START_FACTORS)
+            yield from (self.walk(contact, stepping, max_steps, native, factor)[0] for factor in START_FACTORS)
 
     def swings(self) -> tuple[list[SwingRow], list[TaskLost]]:
         """Simulate the passive swing of the pinned walker with each integrator. Return results and lost runs."""

@@ -19,7 +19,7 @@ R = TypeVar("R")
 class TaskLost:
     """Record of a task without a result."""
 
-    why: str  # reason for the missing result
+    reason: str
     timed_out: bool = False
 
 

@@ -48,7 +48,7 @@ class WalkTask:
     touches: int  # number of touches after which the walk ends
     until_s: float  # latest end
     own: OwnContact | None  # the engine's tuned contact; None for our law
-    most: int  # step budget of the engine
+    max_steps: int  # step budget of the engine
 
     def run(self) -> WalkAnswer:
         walk = EngineWalk(self)
@@ -85,7 +85,7 @@ class EngineWalk:
     def go(self) -> None:
         """Walk to the end. A step in which a knee locks or is released is repeated up to that instant."""
         rules = self.rules
-        while rules.outcome is None and not self.is_over and self.steps < self.task.most:
+        while rules.outcome is None and not self.is_over and self.steps < self.task.max_steps:
             self._simulate(self.task.until_s)
             if rules.turn is not None:
                 rules.watches = False
@@ -132,7 +132,7 @@ class EngineWalk:
 
         hand_over_ground()
         start_s = time.process_time()
-        engine.run(task.most - self.steps, span, monitor)
+        engine.run(task.max_steps - self.steps, span, monitor)
         self.wall_s += time.process_time() - start_s
 
 
@@ -152,7 +152,7 @@ class SwingTask:
     slope: float
     start: Floats  # (2 n) absolute angles (rad) and velocities (rad/s)
     until_s: float
-    most: int
+    max_steps: int
 
     def run(self) -> SwingAnswer:
         chain = self.model.chain
@@ -160,7 +160,7 @@ class SwingTask:
         q, v = np.linalg.lstsq(chain, absolute, rcond=None)[0].T
         engine = PHYSICS_ENGINES[self.engine].simulation(self.model, self.stepping, q, v)
         start_s = time.process_time()
-        motion = record_motion(engine, self.most, self.until_s)
+        motion = record_motion(engine, self.max_steps, self.until_s)
         wall = time.process_time() - start_s
         end = np.concatenate((chain @ motion.q[-1] - self.slope, chain @ motion.v[-1]))
         return SwingAnswer(end, wall)

@@ -98,7 +98,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
     target = contact_target(pair.scene)
     with pair.process:
         findings.swings, lost = pair.swings()
-        findings.left_out += [{"what": f"a swing in {name}", "why": failure.why} for failure in lost]
+        findings.left_out += [{"what": f"a swing in {name}", "why": failure.reason} for failure in lost]
         findings.rows += pair.same_law()
         if target is None:
             findings.left_out.append({"what": f"own contact of {name}", "why": "the ground has no friction"})
@@ -106,7 +106,7 @@ def measure(pair: EngineOnScene) -> EngineFindings:
         for contact in pair.engine.adapter().CONTACTS:
             tuned = pair.tune(contact, target)
             if isinstance(tuned, TaskLost):
-                findings.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.why})
+                findings.left_out.append({"what": f"contact {contact} of {name}", "why": tuned.reason})
                 continue
             own, rows = tuned
             findings.tuning += rows
