@@ -172,19 +172,20 @@ def paper_and_ours(results: Results) -> str:
     return table(head, rows)
 
 
-def study_in_four_rows(results: Results) -> str:
-    """Step period, step length, stability and energy of the paper and of both models."""
+def study_in_five_rows(results: Results) -> str:
+    """Start, step period, step length, stability and energy of the paper and of both models."""
     compared = results.summary("compare")
     single = {entry["quantity"]: entry for entry in compared["paper_numbers"]}
     cells = [
-        beside("step period (s)", compared["table3"]["t_left"], 2),
+        beside("stance angle at the start (rad)", compared["table2"]["theta_2"], PRINTED_DIGITS["theta_2"]),
+        beside("left step period (s)", compared["table3"]["t_left"], 2),
         printed_once("step length (m)", single["length of one complete step"]),
         printed_once("largest multiplier", single["largest eigenvalue of P of a stable gait"]),
         beside("mean energy (J)", compared["table3"]["E_avg"], 2),
     ]
     rows = [[title, paper, printed, corrected, contact] for title, paper, printed, corrected, _, contact in cells]
-    head = ["", "printed (MATLAB)", "our rigid model, as printed", "corrected", "our contact model"]
-    return table(head, rows)
+    head = ["", "paper (MATLAB)", "rigid model, equations as printed", "sign corrected", "contact model"]
+    return re.sub(r" *\| *", "|", table(head, rows))
 
 
 def printed_once(title: str, entry: dict[str, Any]) -> list[str]:
@@ -218,7 +219,7 @@ PARTS: dict[str, Callable[[Results], str]] = {
     "config-keys": config_keys,
     "gaits": gaits,
     "paper-and-ours": paper_and_ours,
-    "study-in-four-rows": study_in_four_rows,
+    "study-in-five-rows": study_in_five_rows,
     "errata": errata,
 }
 
