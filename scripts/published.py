@@ -16,7 +16,7 @@ from walkerlab.evidence.check.answer import Checked, check_gait
 from walkerlab.evidence.check.causes import generate_families, generate_mistakes
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
 from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker
-from walkerlab.evidence.check.section import COLUMNS, headline, remarks, source_of
+from walkerlab.evidence.check.section import COLUMNS, headline, is_short, remarks, source_of
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
 
@@ -40,10 +40,11 @@ at most the first four are right:
 
 {story}
 
-The cause is one term. The heel strike of the script subtracts the inertia of a leg times the rate between the legs,
-where nothing should be subtracted. With this mistake all digits follow. A later script of the same hand has the
-right strike ([passivewalker-sim](published-right.md#passivewalker-sim)). Type this to see it for yourself, or any
-other name from the table below:
+The cause is one term. In the heel strike of the script, the balance of the trailing leg about the hip subtracts a
+term that should not be there: the leg's moment of inertia about its centre of mass, I, times the rate at which the
+angle between the legs changes. With this mistake all digits follow. A later script of the same hand has the right
+strike ([passivewalker-sim](published-right.md#passivewalker-sim)). Type this to see it for yourself, or any other
+name from the table below:
 
 ```
 walkerlab check published/passivewalker-2009.yaml
@@ -64,13 +65,16 @@ digit is right](check.md).
 *Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
 one that shares no equations with it. For each value there is a verdict:
 
-- *Reproduced*: the right value, rounded or cut off, has the printed digits: all of them, or at least three that are
-  also at least half. Otherwise the value is *different*.
+- *Reproduced*: the printed and the right value are equal after both are rounded, or cut off, to all printed digits,
+  or to at least three that are at least half of them. If not all digits agree, the table shows how many do, and how
+  far off the printed value is, in units of its last digit. Otherwise the value is *different*.
 - If values differ, the program looks for one cause that gives all of them: a convention, a mistake that is known
   from programs, or a misprint. The gait is *explained* if there is one, and *partly explained* if a cause gives
   some of the values to their last digit.
 
-Values have the names that they have in the block `check` of a config.
+The signs and angles of each source are kept, and the right values are written in its convention. *One exact step* is a
+step of the right equations from the printed state, without a noticeable numerical error. If the state is periodic,
+the step leads back to it.
 """
 TAIL = """## The longest case
 
@@ -105,7 +109,8 @@ The compass at 3 degrees (config `slope-3deg`), in order of the change of the pe
 
 ## Round feet
 
-The walker `published/passivewalker-2009.yaml`, whose legs have inertia. `I` is the inertia of a leg.
+The walker `published/passivewalker-2009.yaml`, whose legs have inertia. *I* is the moment of inertia of a leg
+about its centre of mass.
 
 {round}
 """
@@ -141,13 +146,15 @@ def entry_of(file: Path) -> Entry:
     table = table_of(
         [column.title for column in COLUMNS], [[column.cell(row).text for column in COLUMNS] for row in rows]
     )
-    reproduced = sum(row["verdict"] == REPRODUCED for row in rows)
+    reproduced = [row for row in rows if row["verdict"] == REPRODUCED]
+    short = sum(map(is_short, rows))
+    note = f" ({short} not to the last digit)" if short else ""
     in_the_table = ("The right gait", "Two independent")
     return Entry(
         name=file.stem,
         source=", ".join(str(source[key]) for key in ("authors", "year") if source[key]) or source["title"],
         finding=finding_of(summary),
-        reproduced=f"{reproduced} of {len(rows)}",
+        reproduced=f"{len(reproduced)} of {len(rows)}{note}",
         table=table,
         paragraphs=(
             comment_of(file),

@@ -20,8 +20,8 @@ from walkerlab.scene.rigid import rigid_walker
 UNITS = np.eye(4)
 FALLEN = 1.2  # rad, of the stance leg
 STRIKE_MISTAKES = {
-    "also subtracts I times the rate between the legs": {"extra": (1.0, -1.0)},
-    "also subtracts I times the trailing leg's rate": {"extra": (1.0, 0.0)},
+    "also subtracts the leg's inertia I times the rate between the legs": {"extra": (1.0, -1.0)},
+    "also subtracts the leg's inertia I times the trailing leg's rate": {"extra": (1.0, 0.0)},
     "trailing leg keeps its rate": {"keeps_rate": True},
     "leaves out the foot's rolling": {"strike_radius": 0.0},
     "inertia is left out of the strike": {"strike_inertia": 0.0},

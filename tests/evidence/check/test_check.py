@@ -119,7 +119,7 @@ def test_a_state_of_a_script_is_explained_by_its_strike():
     answer = check_gait(load(PUBLISHED / "passivewalker-2009.yaml").config)
     (explanation,) = answer["explanations"]
     assert (answer["finding"], explanation["kind"], explanation["digits"]) == ("explained", "mistake", 14)
-    assert "also subtracts I times the rate between the legs" in explanation["what"]
+    assert "also subtracts the leg's inertia I times the rate between the legs" in explanation["what"]
     whole, hip = answer["momenta"]
     assert (whole["conserved"], hip["conserved"]) == (True, False)
     # the extra term is the inertia times the rate between the legs before the strike
@@ -317,6 +317,14 @@ def test_answer_about_a_different_gait_has_the_documented_keys(tmp_path):
     assert {"name", "printed", "right", "digits", "verdict", "evidence"} <= answer["values"][0].keys()
     assert {"residual", "digits"} <= answer["periodic"].keys()
     assert {"about", "residual", "unit"} <= answer["momenta"][0].keys()
+
+
+def test_an_answer_says_which_values_follow_and_how_far_off_a_short_one_is():
+    words = " ".join(run("published/adams-compass.yaml").output.split())
+    assert "partly explained: the 4 angles and rates and the spectral radius follow to the last digit if" in words
+    assert "; the mean energy, step period 1, step period 2, the speed and the step length do not." in words
+    assert "mean energy (J) 150.13 150.2413 3 of 5, off by 11 units reproduced to 3 digits" in words
+    assert "After one exact step it has changed by 0.0045 (angles in rad, rates times sqrt(L/g)), 45 units" in words
 
 
 def test_a_state_is_typed_on_the_command_line():

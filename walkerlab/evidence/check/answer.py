@@ -42,6 +42,7 @@ from walkerlab.evidence.check.printed import (
     Judgement,
     items_of,
     judge,
+    spell_name,
 )
 from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
@@ -210,7 +211,7 @@ class Checked:
         values = {} if self.right is None else self.right.values(self.items, self.convention)
         for item in self.items:
             right = values.get(item.name)
-            why = self.search.reason if self.right is None else f"this gait has no {item.name}"
+            why = self.search.reason if self.right is None else f"this gait has no {spell_name(item.name)}"
             yield item, right, judge(item, right, why)
 
     @cached_property
@@ -350,7 +351,7 @@ def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
     before = float((np.abs(start - right.start) / unit).max())
     answer = {
         "residual": largest,
-        "unit": "rad, rad/s times sqrt(L/g)",
+        "unit": "angles in rad, rates times sqrt(L/g)",
         "digits": max(0, math.floor(-math.log10(max(largest, EXACT)))),
         "in_units_of_last_digit": float((residual / np.maximum(rounding, EXACT_ERROR * unit)).max()),
         "is_periodic": bool(np.all(residual <= left)),

@@ -60,7 +60,8 @@ def generate_mistakes(right: PlainWalker) -> Iterator[Candidate]:
     if right.leg_inertia:
         for weights, rate in EXTRA_TERMS.items():
             for sign, verb in ((1.0, "subtracts"), (-1.0, "adds")):
-                what = f"the strike, in the balance of the trailing leg about the hip, also {verb} I times {rate}"
+                term = f"the leg's inertia I times {rate}"
+                what = f"the strike, in the balance of the trailing leg about the hip, also {verb} {term}"
                 yield mistake(what, extra_inertia=(sign * weights[0], sign * weights[1]))
         massless = tuple(part._replace(inertia=0.0) for part in right.parts)
         yield mistake("the legs' inertia is left out", parts=massless)

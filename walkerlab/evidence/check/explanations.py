@@ -22,7 +22,7 @@ from walkerlab.evidence.check.causes import Candidate, MistakeFamily
 from walkerlab.evidence.check.conventions import Convention, alternatives, full_state, start_from
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
 from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
-from walkerlab.evidence.check.printed import Item
+from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
 REFINED: Final = 5  # candidates that are solved
@@ -348,7 +348,7 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     if right is None:
         return
     item = wrong[0]
-    name = item.name.removeprefix("state.").replace("_", " ").replace(".", ", ")
+    name = spell_name(item.name)
     printed = item.printed.real.value
     reproduced = [item, *question.reproduced(question.right, question.items)]
     if item.fits(-right):

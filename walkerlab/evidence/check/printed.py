@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from walkerlab.config.check import Digits, PrintedValue, agreement, parse_printed
+from walkerlab.labels import axis_label
 
 REPRODUCED = "reproduced"
 DIFFERENT = "different"
@@ -84,6 +85,16 @@ def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
     while agreeing > 0 and difference > 0.5 * printed.unit * 10.0 ** (printed.count - agreeing):
         agreeing -= 1
     return agreeing
+
+
+def spell_name(name: str) -> str:
+    """Spell the name of a printed number, such as 'stance rate' or 'step period 1', without its unit."""
+    quantity, _, part = name.partition(".")
+    if quantity == "state":
+        return part.replace("_", " ")
+    if quantity == "state_before":
+        return f"{part.replace('_', ' ')} before"
+    return f"{axis_label(quantity).removesuffix('s')} {part}" if part else axis_label(quantity)
 
 
 class Judgement(NamedTuple):

@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from walkerlab.evidence.check.printed import DIFFERENT, EXPLAINED, NOT_COMPARABLE, REPRODUCED, UNEXPLAINED
-from walkerlab.labels import join_words
+from walkerlab.evidence.check.printed import (
+    DIFFERENT,
+    EXPLAINED,
+    NOT_COMPARABLE,
+    REPRODUCED,
+    UNEXPLAINED,
+    format_units,
+    spell_name,
+)
+from walkerlab.labels import add_unit, join_words, unit_by_name
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section, stage_section
 from walkerlab.views.report.numbers import count, number
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, table
@@ -14,23 +22,28 @@ from walkerlab.views.report.tables import Cell, Column, Table, Tone, table
 Row = Mapping[str, Any]
 TONES: Mapping[str, Tone] = {REPRODUCED: "good", DIFFERENT: "bad", NOT_COMPARABLE: "plain"}
 MANY_UNITS = 1e5
+LONGEST_LIST = 2  # angles and rates that are listed one by one
 COLUMNS = (
-    Column("value", lambda row: spell_name(row["name"])),
+    Column("value", lambda row: add_unit(spell_name(row["name"]), unit_by_name(row["name"]))),
     Column("printed", "printed", numeric=True),
     Column("right", "right_text", numeric=True),
-    Column("digits that agree", lambda row: f"{row['digits']} of {row['of_digits']}" if row["right_text"] else ""),
-    Column("verdict", lambda row: Cell(row["verdict"], TONES[row["verdict"]])),
+    Column("digits that agree", lambda row: digits_of(row) if row["right_text"] else ""),
+    Column("verdict", lambda row: Cell(verdict_of(row), TONES[row["verdict"]])),
 )
 
 
-def spell_name(name: str) -> str:
-    """Spell the name of a printed number, such as 'stance rate' or 'period_s'."""
-    quantity, _, part = name.partition(".")
-    if quantity == "state":
-        return part.replace("_", " ")
-    if quantity == "state_before":
-        return f"{part.replace('_', ' ')} before"
-    return f"{quantity} {part}" if part else quantity
+def is_short(row: Row) -> bool:
+    """Whether a value is reproduced, but not in all of its digits."""
+    return bool(row["verdict"] == REPRODUCED and row["digits"] < row["of_digits"])
+
+
+def digits_of(row: Row) -> str:
+    agreeing = f"{row['digits']} of {row['of_digits']}"
+    return f"{agreeing}, off by {format_units(row['difference_in_units'])} units" if is_short(row) else agreeing
+
+
+def verdict_of(row: Row) -> str:
+    return f"{REPRODUCED} to {row['digits']} digits" if is_short(row) else row["verdict"]
 
 
 def answer(summary: Row) -> list[str | Table]:
@@ -63,33 +76,45 @@ def headline(summary: Row) -> str:
         return f"Nothing can be compared: {summary.get('reason') or 'the file prints no values'}."
     if finding == REPRODUCED:
         compared = [row for row in rows if row["verdict"] == REPRODUCED]
-        short = [row for row in compared if row["digits"] < row["of_digits"]]
+        short = [row for row in compared if is_short(row)]
         if not short:
             return f"Right: {count(len(compared), 'printed value')} reproduced to the last digit."
         some = f"{len(short)} of {count(len(compared), 'printed value')}"
-        return f"Reproduced, but not to the last digit: {some} agree in fewer digits than are printed."
+        verb = "agrees" if len(short) == 1 else "agree"
+        return f"Reproduced, but not to the last digit: {some} {verb} in fewer digits than are printed."
     if finding == EXPLAINED and len(explanations) == 1:
-        return f"Explained: {follow(explanations[0], rows)} if {explanations[0]['what']}."
+        return f"Explained: {follow(explanations[0], rows)}."
     if finding == EXPLAINED:
         return f"Explained, but by more than one cause: each of {len(explanations)} fits the printed digits."
     assert finding == UNEXPLAINED
     if len(rows) == 1:
-        return "Different, unexplained: the printed value differs, and one value does not tell why."
+        return "Different, unexplained: the printed value differs, and one value is too little to find the cause."
     what = f"{len(wrong)} of {len(rows)} printed values differ"
     if len(explanations) == 1:
-        return f"Different, partly explained: {follow(explanations[0], rows)} if {explanations[0]['what']}."
+        return f"Different, partly explained: {follow(explanations[0], rows)}."
     if explanations:
         return f"Different, partly explained: {what}, and no cause found reproduces more than some of them."
     return f"Different, unexplained: {what}, and no known convention, mistake or misprint reproduces them all."
 
 
 def follow(explanation: Row, rows: Sequence[Row]) -> str:
-    """Describe the printed values that an explanation reproduces."""
+    """Describe the printed values that follow from an explanation, and those that do not."""
     names = explanation["reproduces"]
+    cause = f"to the last digit if {explanation['what']}"
     if len(names) == len(rows):
-        return f"all {count(len(names), 'printed value')} follow to the last digit"
-    others = join_words([spell_name(row["name"]) for row in rows if row["name"] not in names])
-    return f"{len(names)} of {count(len(rows), 'printed value')} follow to the last digit (not {others})"
+        return f"all {count(len(names), 'printed value')} follow {cause}"
+    others = [row["name"] for row in rows if row["name"] not in names]
+    verbs = ("follows" if len(names) == 1 else "follow", "does" if len(others) == 1 else "do")
+    return f"{enumerate_names(names, rows)} {verbs[0]} {cause}; {enumerate_names(others, rows)} {verbs[1]} not"
+
+
+def enumerate_names(names: Sequence[str], rows: Sequence[Row]) -> str:
+    """Enumerate printed values; a long state that is complete is mentioned as a whole."""
+    state = [row["name"] for row in rows if row["name"].startswith("state.")]
+    whole = len(state) > LONGEST_LIST and set(state).issubset(names)
+    words = [spell_name(name) for name in names if not (whole and name in state)]
+    articles = [word if word[-1].isdigit() else f"the {word}" for word in words]
+    return join_words([*([f"the {len(state)} angles and rates"] if whole else []), *articles])
 
 
 def remarks(summary: Row) -> Iterator[str]:
@@ -98,7 +123,7 @@ def remarks(summary: Row) -> Iterator[str]:
     explanations = summary["explanations"]
     if len(explanations) > 1:
         for place, each in enumerate(explanations, 1):
-            yield f"{place}. {each['kind'].capitalize()}: {follow(each, rows)} if {each['what']}."
+            yield f"{place}. {each['kind'].capitalize()}: {follow(each, rows)}."
     if summary["undecided"]:
         yield summary["undecided"]
     if near := summary["closest"]:
@@ -129,12 +154,12 @@ def state_remarks(summary: Row) -> Iterator[str]:
         yield "From the printed state, the walker does not complete a step."
     elif periodic:
         nearer = periodic["distance_after_a_step"] < periodic["distance_from_gait"]
-        moves = "nearer to" if nearer else "away from"
+        moves = "nearer to" if nearer else "farther from"
         units = periodic["in_units_of_last_digit"]
         last = f", {number(units, 2)} units of its last digit" if units < MANY_UNITS else ""
         yield (
-            f"The printed state is not periodic: one right step changes it by {number(periodic['residual'], 2)} "
-            f"({periodic['unit']}){last}, {moves} the right gait."
+            "The printed state is not periodic. After one exact step it has changed by "
+            f"{number(periodic['residual'], 2)} ({periodic['unit']}){last}, and is {moves} the right gait."
         )
         changes = [f"{each['key']} = {number(each['value'], 6)}" for each in periodic.get("periodic_with", ())]
         if changes:
