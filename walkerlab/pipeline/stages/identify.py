@@ -131,10 +131,10 @@ def divide_again(
     if abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
         return before
     try:
-        again = ask(divide_at(block, config, touch_sum))
+        refit = ask(divide_at(block, config, touch_sum))
     except (ConfigError, NoAnswer):
         return before
-    return again if again.verdict.usable else before
+    return refit if refit.verdict.usable else before
 
 
 def content_of(config: IdentifyConfig, result: Identification) -> Content:
