@@ -41,7 +41,7 @@ STORING_PATIENCE_S = 1.0
 
 
 def raise_on(number: int, error: type[BaseException]) -> None:
-    """Make a signal raise an error. Inside an LLVM callback, send the signal pending shortly afterwards."""
+    """Make a signal raise an error. Inside an LLVM callback, send the signal again shortly afterwards."""
     pending: list[threading.Timer] = []
 
     def arrived(number: int, frame: FrameType | None) -> None:
