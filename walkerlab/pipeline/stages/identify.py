@@ -40,8 +40,9 @@ LABELS: Final = {
     "start": Label("SI", "value in the config"),
 }
 SHOWN_STEPS = 10
+"""Number of steps that the motion player shows."""
 SHOWN_SAMPLES = 800
-"""Number of steps, and approximate number of samples, that the motion player shows."""
+"""Approximate number of samples that the motion player shows."""
 FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
 
 
