@@ -23,7 +23,7 @@ def test_each_failure_has_the_exit_code_of_the_command_line(kind: type[errors.Wa
     assert kind.exit_code == exit_code
 
 
-def test_failure_says_what_happened_and_what_to_do() -> None:
+def test_failure_message_states_what_happened_and_what_to_do() -> None:
     error = errors.NoAnswer("no gait at 10 deg", "try a slope below 5 deg", partial={"states": 3})
     assert (str(error), error.advice, error.partial) == ("no gait at 10 deg", "try a slope below 5 deg", {"states": 3})
 

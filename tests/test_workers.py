@@ -203,7 +203,7 @@ def test_script_without_a_main_guard_runs_once_with_workers(tmp_path, how):
     assert done.stdout.splitlines() == ["the script runs", "[0, 1, 4, 9]"], done.stderr
 
 
-def test_modules_beside_the_script_are_found_from_any_folder(tmp_path):
+def test_modules_next_to_the_script_are_found_from_any_folder(tmp_path):
     (tmp_path / "beside.py").write_text("def answer():\n    return 42\n")
     script = tmp_path / "script.py"
     script.write_text(

@@ -275,7 +275,7 @@ def scan(folder: str) -> list[list[str]]:
 
 
 def read_scans(file: Path) -> dict[str, Any]:
-    """Read earlier scans by folder. Return nothing if there are none, or if another user may have written them."""
+    """Read earlier scans by folder. Return nothing if the file is missing or another user may have written it."""
     with contextlib.suppress(OSError, ValueError):
         if not may_be_foreign(file):
             stored: dict[str, Any] = json.loads(file.read_text())

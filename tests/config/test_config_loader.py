@@ -361,7 +361,9 @@ def test_config_error_exits_3_and_suggests_a_command(write: Write) -> None:
     assert "walkerlab schema" in caught.value.advice
 
 
-def test_method_of_a_missing_extra_says_what_to_install(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_method_of_a_missing_extra_names_the_package_to_install(
+    refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(schema, "find_spec", lambda name: None)
     message = refused("solver: {contact: {method: cvode-bdf}}\n")
     assert message.startswith("mine.yaml:1:")

@@ -175,7 +175,7 @@ def test_a_film_in_slow_motion_gets_its_true_times(tmp_path):
     time, angle = sampled(fps=240.0)
     path = table(tmp_path, "time (s),angle 1 (rad),angle 2 (rad)", zip(8.0 * time, *angle.T, strict=True))
     doubts = steps_of(path)["doubts"]
-    assert any("would swing 8 times as fast as the recording's" in doubt for doubt in doubts)
+    assert any("would swing 8 times as fast as those in the recording" in doubt for doubt in doubts)
     summary = steps_of(path, fps=240.0)
     assert all_steps_are_right(summary)
     assert summary["doubts"] == ["The file's times, 30 frames/s, are replaced by 240 frames/s."]
@@ -247,7 +247,7 @@ def test_the_belts_speed_gives_lengths(tmp_path):
     speed = 0.9 * LENGTH_M / PERIOD_S
     summary = read(tmp_path, *sampled(), belt_speed_m_s=speed)
     assert summary["step_lengths_m"] == pytest.approx([0.9 * LENGTH_M] * 7, abs=1e-5)
-    assert any("0.9 times that of the legs' angles" in doubt for doubt in summary["doubts"])
+    assert any("0.9 times the one that follows from the leg angles" in doubt for doubt in summary["doubts"])
     drift = 0.1 * LENGTH_M / PERIOD_S
     on_belt = read_places(tmp_path, places_of(sampled()[1], speed), belt_speed_m_s=speed)
     assert drift > 0.0

@@ -42,7 +42,7 @@ def test_existing_campaign_is_kept(toy):
     assert "census" in (toy.runs / "paper" / "report.html").read_text().partition("]")[0]
 
 
-def test_page_without_the_campaign_says_how_to_run_it(toy):
+def test_page_without_the_campaign_shows_the_command_that_runs_it(toy):
     toy.execute("page")
     assert (
         "<p>census: it was not requested; `walkerlab survey --full` computes it</p>"

@@ -242,7 +242,7 @@ def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     assert content.summary["bifurcations"] == []
 
 
-def test_an_export_of_one_knee_beside_a_straight_leg_is_refused():
+def test_walker_with_one_knee_and_a_straight_leg_cannot_be_exported():
     config = config_of("kneed", f"walker.leg_2={PEG}")
     assert rigid_walker(config).legs_differ
     with pytest.raises(ConfigError, match="both with a knee or both without"):
@@ -254,7 +254,7 @@ ONE_KNEE_GROUND = (
 )
 
 
-def test_one_knee_beside_a_straight_leg_walks_on_compliant_ground_into_its_gait():
+def test_walker_with_one_knee_and_a_straight_leg_settles_on_its_gait_on_compliant_ground():
     config = config_of("one-knee", ONE_KNEE_GROUND)
     rigid = gait_of(config)
     gait = contact_gait(config, rigid.step_length, rigid.state).gait

@@ -43,8 +43,9 @@ IMPRATIO = 10.0  # large, so that sliding feet are not pushed off the ground
 JOINT_AXES = {"along": ("slide", "1 0 0"), "height": ("slide", "0 0 1"), "turn": ("hinge", "0 -1 0")}
 PAD_M = 0.05
 STEP_S = 2.5e-5
+"""Time step unless a damper requires a shorter one."""
 DAMPED_STEP = 0.33
-"""Time step, and its maximum as a multiple of the time constant with which a damper stops a foot or a shank."""
+"""Maximum time step as a multiple of the time constant with which a damper stops a foot or a shank."""
 HIP = "hip"
 COUPLING_SETTINGS = 'solref="0.0005 1" solimp="0.9999 0.9999 0.001 0.5 2"'
 """Settings that make couplings and locks as stiff as MuJoCo's constraints can be with time steps of STEP_S."""

@@ -148,7 +148,7 @@ def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
 def read_file(path: Path, reader: Callable[[Path], Recording], key: tuple[str, ...] = ()) -> Recording:
     """Read a regular file.
 
-    Raises ConfigError if there is none, and for a pipe or a device, which might never end.
+    Raises ConfigError if it does not exist, and for a pipe or a device, which might never end.
     """
     shown = str(path) if len(str(path)) <= LONGEST_PATH else f"{str(path)[:LONGEST_PATH]}..."
     name = f"{'.'.join(key)}: {shown}" if key else shown

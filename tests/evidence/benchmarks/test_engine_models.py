@@ -74,7 +74,7 @@ def test_feet_ahead_of_the_shanks_keep_their_offset_in_an_engine():
     assert {ball.radius_m for ball in (bent, straight)} == {0.2}
 
 
-def test_a_point_foot_beside_a_round_one_is_refused_with_a_radius_that_works():
+def test_point_foot_next_to_a_round_one_is_refused_with_a_radius_that_works():
     """The engines have one floor, and a point foot needs a lower one."""
     point = load(None, ("walker.foot_radius_m=0.02", "walker.leg_2={foot_radius_m: 0}")).config
     with pytest.raises(ConfigError, match="the other foot is round") as caught:
@@ -85,7 +85,7 @@ def test_a_point_foot_beside_a_round_one_is_refused_with_a_radius_that_works():
     assert [ball.ground_m for ball in scene.model.balls] == [0.0, 0.0]
 
 
-def test_one_knee_beside_a_straight_leg_is_refused():
+def test_engines_refuse_a_walker_with_one_knee_and_a_straight_leg():
     with pytest.raises(ConfigError, match="both with a knee or both without"):
         supported_scene(load(Path("one-knee"), ("contact={terrain: plane}",)).config, 0.3, (0.0,) * 6)
 

@@ -30,7 +30,7 @@ def test_unknown_method_is_an_error_that_lists_the_known_ones():
         method_named("euler")
 
 
-def test_method_that_is_not_installed_says_what_to_install(monkeypatch):
+def test_method_that_is_not_installed_names_the_package_to_install(monkeypatch):
     monkeypatch.setattr(registry_module, "METHODS", {})
     with pytest.raises(KeyError, match="pip install scikit-sundae"):
         method_named("cvode-bdf")

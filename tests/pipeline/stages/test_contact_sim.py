@@ -247,7 +247,7 @@ def test_contact_walk_needs_a_gait_or_a_start():
         run(inputs=())
 
 
-def test_exhausted_budget_is_no_answer_but_keeps_the_partial_walk(monkeypatch):
+def test_exhausted_budget_gives_no_answer_but_keeps_the_partial_walk(monkeypatch):
     monkeypatch.setattr(contact, "BUDGET_PER_STEP", 1000)
     with pytest.raises(NoAnswer) as caught:
         run()
@@ -295,7 +295,7 @@ def test_tolerance_too_loose_for_friction_is_reported(atol, told):
     assert any("stiction_velocity" in note and "lower solver.contact.atol" in note for note in notes) is told
 
 
-def test_budget_exhausted_before_the_first_sample_is_no_answer(monkeypatch):
+def test_budget_exhausted_before_the_first_sample_gives_no_answer(monkeypatch):
     monkeypatch.setattr(contact, "BUDGET_PER_STEP", 0)
     with pytest.raises(NoAnswer) as caught:
         run()

@@ -469,7 +469,7 @@ def test_each_fit_lists_its_rounds(table, gait):
     assert all(0 < done <= total for _, total, done in progress.phases)
 
 
-def test_exhausted_fit_budget_is_no_answer_but_keeps_the_best_fit(table, gait):
+def test_exhausted_fit_budget_gives_no_answer_but_keeps_the_best_fit(table, gait):
     changes = ask(table, "identify.fit={slope_deg: null}", "slope_deg=1.3", "identify.max_walks=1")
     with pytest.raises(NoAnswer) as caught:
         identify.run(taken(*changes), gait, Silent())

@@ -196,7 +196,7 @@ def test_friction_ratio_is_missing_if_the_ground_always_pulls():
     json.dumps(summary, allow_nan=False)
 
 
-def test_exhausted_budget_is_no_answer_but_keeps_the_partial_walk(monkeypatch):
+def test_exhausted_budget_gives_no_answer_but_keeps_the_partial_walk(monkeypatch):
     monkeypatch.setattr(recorded_walk, "BUDGET_OF_A_STEP", 100)
     with pytest.raises(NoAnswer, match=r"budget-exhausted after [1-9] steps") as caught:
         run(start=GIVEN)

@@ -182,7 +182,7 @@ class Checked:
 
     @cached_property
     def right(self) -> CheckedStep | None:
-        """The right gait nearest to the printed one, or None if there is none."""
+        """The right gait nearest to the printed one, or None if no gait was found."""
         if not self.walks:
             return None
         if not self.items:

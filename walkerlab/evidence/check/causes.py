@@ -77,7 +77,7 @@ def generate_mistakes(right: PlainWalker) -> Iterator[Candidate]:
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, dict[tuple[str, int, int], float]]]:
-    """Yield wrong signs of the velocity terms of the equations of motion, in words and as factors."""
+    """Yield wrong signs of velocity terms in the equations of motion: their description and the factors."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
         bodies = (SWING, STANCE, SHANK) if phase == BENT else (SWING, STANCE)
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]

@@ -97,7 +97,7 @@ class Convention:
         return math.sqrt(float(self.time) / walker.gravity)
 
     def differences(self, other: Convention) -> Iterator[str]:
-        """Describe in words how this convention differs from another."""
+        """Describe each difference of this convention from another."""
         if self.origin != other.origin:
             yield f"angles are measured from {'the vertical' if self.origin == 'vertical' else 'the slope’s normal'}"
         if self.second != other.second:

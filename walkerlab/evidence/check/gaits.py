@@ -119,9 +119,9 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
 
 
 def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, PlainStep] | None:
-    """Return start and step of the gait near a start, by Newton's method, or None if there is none.
+    """Find the gait near a start by Newton's method. Return its start and step, or None if it is not found.
 
-    A  derivative of a similar walker's step map, used at first
+    A  derivative of the step map of a similar walker, with which the search begins
     """
     unit = scales(walker, len(start))
     identity = np.eye(len(start))
@@ -183,7 +183,7 @@ class CheckedStep:
         return tuple(values[:-1])
 
     def quantity(self, name: str) -> Any:
-        """Return a value of the compiled model, or else of the plain one, or None if there is none."""
+        """Return a value from the compiled model or, if it lacks it, the plain one. Return None if both lack it."""
         if name in self.measured:
             return self.measured[name]
         if name == "multipliers":
@@ -201,7 +201,7 @@ class CheckedStep:
         }.get(name)
 
     def values(self, items: Sequence[Item], convention: Convention) -> dict[str, complex | None]:
-        """Return the value of each printed number, in the printed conventions, or None where there is none."""
+        """Return the right value of each printed number in the printed conventions, or None if the models lack it."""
         values: dict[str, complex | None] = {}
         factor = convention.rate_factor(self.walker)
         written = self.written(items, convention)

@@ -229,7 +229,7 @@ class PlainWalker:
         return float(kinetic - self.masses @ (places * np.conj(self.down)).real)
 
     def balances(self) -> tuple[str, ...]:
-        """Return the points about which angular momentum is conserved in a heel strike, in words."""
+        """Describe the bodies and points about which a heel strike conserves angular momentum."""
         names = ("the whole walker about the new foot", "the trailing leg about the hip")
         return (*names, "the trailing shank about its knee") if self.kneed and self.free_at_strike else names
 
@@ -300,7 +300,7 @@ class PlainWalker:
         return PlainStep(period, length, before, self.after_strike(before), pieces)
 
     def land(self, state: Floats, tolerance: float = EXACT) -> tuple[Piece, ...] | None:
-        """Return the parts of the swing from a state of all bodies to the heel strike, or None if there is none."""
+        """Return the parts of the swing from a state of all bodies to the heel strike, or None if no foot lands."""
         pieces: tuple[Piece, ...] = ()
         # A straight leg whose foot is behind the stance foot has just been released.
         if self.kneed and (self.knee_bend(state) != 0.0 or self.swing_foot(state).real < 0.0):

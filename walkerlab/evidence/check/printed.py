@@ -106,7 +106,7 @@ class Judgement(NamedTuple):
 
 
 def judge(item: Item, right: complex | None, reason: str = "") -> Judgement:
-    """Compare a printed value with the right one. If there is none, `reason` explains why."""
+    """Compare a printed value with the right one. If `right` is None, `reason` explains why."""
     if right is None:
         return Judgement(NOT_COMPARABLE, 0, reason)
     agreeing = item.agreement(right)

@@ -45,8 +45,10 @@ def percentages() -> Iterator[tuple[Printed, str]]:
         # the signs of the column follow no rule, so magnitudes are compared
         smallest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
         if are_disjoint((smallest, max(abs(low), abs(high))), row.percent.rounding):
-            change = f"{row.matlab.text} to {row.adams.text} {row.matlab.unit} is {row.percent_of_matlab:+.3g}%"
-            yield row.percent, f"{change} of the MATLAB value, with rounding {low:+.2f} to {high:+.2f}%"
+            change = (
+                f"{row.matlab.text} to {row.adams.text} {row.matlab.unit} is a change of {row.percent_of_matlab:+.3g}%"
+            )
+            yield row.percent, f"{change} of the MATLAB value ({low:+.2f} to {high:+.2f}%, given the rounding)"
 
 
 def percent_left_open(row: StartRow) -> Interval:
@@ -66,8 +68,8 @@ def steps_of_a_cycle() -> Iterator[tuple[Printed, str]]:
         low, high = interval(float.__add__, *steps)
         if are_disjoint(cycle.rounding, (low, high)):
             total = f"{steps[0].text} + {steps[1].text} s is {sum(step.value for step in steps):.2f} s"
-            open_to = f"with rounding {low:.2f} to {high:.2f} s"
-            yield cycle, f"{total}, {open_to}, and not {cycle.text} s: one of the three is wrong"
+            open_to = f"({low:.2f} to {high:.2f} s, given the rounding)"
+            yield cycle, f"{total} {open_to}, and not {cycle.text} s: one of the three is wrong"
 
 
 def lengths_and_speeds() -> Iterator[tuple[Printed, str]]:

@@ -47,16 +47,16 @@ def read_catalogue(path: Path) -> Any:
     return plain(root)
 
 
-def all_cases(own: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
+def all_cases(user_cases: Sequence[Case], catalogue: Sequence[Case] | None = None) -> tuple[Case, ...]:
     """Return a catalogue's cases (default: the package's), then a config's.
 
     Raises ConfigError if two share a name.
     """
     catalogue = package_cases() if catalogue is None else catalogue
-    shared = {case.name for case in catalogue} & {case.name for case in own}
+    shared = {case.name for case in catalogue} & {case.name for case in user_cases}
     if shared:
         raise ConfigError(f"The catalogue already has cases named {', '.join(sorted(shared))}.", UNIQUE_NAME_ADVICE)
-    return (*catalogue, *check_unique_names(own))
+    return (*catalogue, *check_unique_names(user_cases))
 
 
 def check_unique_names(cases: Sequence[Case]) -> tuple[Case, ...]:

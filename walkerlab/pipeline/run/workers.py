@@ -42,15 +42,15 @@ STORING_PATIENCE_S = 1.0
 
 def raise_on(number: int, error: type[BaseException]) -> None:
     """Make a signal raise an error. Inside an LLVM callback, send the signal again shortly afterwards."""
-    again: list[threading.Timer] = []
+    pending: list[threading.Timer] = []
 
     def arrived(number: int, frame: FrameType | None) -> None:
-        while again:
-            again.pop().cancel()
+        while pending:
+            pending.pop().cancel()
         if not is_called_back(frame):
             raise error
-        again.append(threading.Timer(SOON_S, _thread.interrupt_main, (number,)))
-        again[0].start()
+        pending.append(threading.Timer(SOON_S, _thread.interrupt_main, (number,)))
+        pending[0].start()
 
     signal.signal(number, arrived)
 

@@ -115,8 +115,8 @@ def run(
 def sample_again(question: Question, window: Window, ends: WalkEnds) -> dict[str, int]:
     """Repeat the walks of evenly spread cells at tighter tolerances, and count those that end differently."""
     cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
-    again = question.tightened().walk_to_ends(window.starts(cells))
-    otherwise = (again.outcome != ends.outcome[cells]) | (again.attractor != ends.attractor[cells])
+    tighter = question.tightened().walk_to_ends(window.starts(cells))
+    otherwise = (tighter.outcome != ends.outcome[cells]) | (tighter.attractor != ends.attractor[cells])
     return {"walked_again": int(cells.size), "of": window.size, "ended_otherwise": int(np.count_nonzero(otherwise))}
 
 

@@ -318,16 +318,16 @@ def sample_again(family: Family) -> dict[str, Any] | None:
         return None
     tighter, by = tightened(step_map.tolerances)
     otherwise = step_map.replace_tolerances(tighter)
-    again = [
+    repeated = [
         (point, gait_near(otherwise, point.z, point.value, TIGHTEST, branch.period))
         for branch, point in (every[place] for place in evenly_spread(len(every), SAMPLE))
     ]
     changes = [
         (np.max(np.abs(gait.periods_s - point.periods_s)), np.max(np.abs(gait.lengths_m - point.lengths_m)))
-        for point, gait in again
+        for point, gait in repeated
         if isinstance(gait, Cycle)
     ]
-    counts = {"walked_again": len(again), "of": len(every), "ended_otherwise": len(again) - len(changes)}
+    counts = {"walked_again": len(repeated), "of": len(every), "ended_otherwise": len(repeated) - len(changes)}
     largest = dict(zip(GAIT_QUANTITIES, np.max(changes, axis=0).tolist(), strict=True)) if changes else {}
     return {**counts, **largest, **({} if by == DEFAULT_TIGHTENING else {"by": by})}
 

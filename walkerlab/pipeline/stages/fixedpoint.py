@@ -22,7 +22,7 @@ NUMBERS = {
     "spectral_radius": Label("1", "largest magnitude of a multiplier"),
     "stable": Label("1", "whether small disturbances die out"),
     "residual": Label("rad", "residual P(x) - x, velocities times sqrt(L/g)"),
-    "energy": Label("J", "mean energy over time, heights from the stance foothold", name="energy_J"),
+    "energy": Label("J", "time-averaged energy, with heights from the stance foothold", name="energy_J"),
     "energy_drift": Label("J", "range of the energy within the swing", name="energy_drift_J"),
     "speed": Label("m/s", "step length over period", name="speed_m_s"),
     "froude": Label("1", "speed over sqrt(g L), L the leg length"),

@@ -40,8 +40,9 @@ LABELS: Final = {
     "start": Label("SI", "value in the config"),
 }
 SHOWN_STEPS = 10
+"""Number of steps that the motion player shows."""
 SHOWN_SAMPLES = 800
-"""Number of steps, and approximate number of samples, that the motion player shows."""
+"""Approximate number of samples that the motion player shows."""
 FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), or start closer to the walk (--set)."
 
 
@@ -131,10 +132,10 @@ def divide_again(
     if abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
         return before
     try:
-        again = ask(divide_at(block, config, touch_sum))
+        refit = ask(divide_at(block, config, touch_sum))
     except (ConfigError, NoAnswer):
         return before
-    return again if again.verdict.usable else before
+    return refit if refit.verdict.usable else before
 
 
 def content_of(config: IdentifyConfig, result: Identification) -> Content:

@@ -49,37 +49,37 @@ def tightened(tolerances: Tolerances) -> tuple[Tolerances, str]:
     return replace(tolerances, method=method), f"another method, {method}"
 
 
-def change(first: Summary, again: Summary, by: str = DEFAULT_TIGHTENING) -> dict[str, Any]:
+def change(first: Summary, second: Summary, by: str = DEFAULT_TIGHTENING) -> dict[str, Any]:
     """Return the largest changes between two summaries of a walk, in the form that `numerical_error` returns."""
-    if (first["outcome"], first["steps"]) != (again["outcome"], again["steps"]):
-        steps = f"{again['steps']} step{'' if again['steps'] == 1 else 's'}"
-        return {"reason": f"with {by} the walk ends differently: {again['outcome']} after {steps}"}
+    if (first["outcome"], first["steps"]) != (second["outcome"], second["steps"]):
+        steps = f"{second['steps']} step{'' if second['steps'] == 1 else 's'}"
+        return {"reason": f"with {by} the walk ends differently: {second['outcome']} after {steps}"}
     changes: dict[str, Any] = {}
     of_steps = dict[str, list[float | None]]()
-    later = steps_later(first, again)
+    later = steps_later(first, second)
     for key, name in ERROR_OF_EACH_STEP.items():
-        apart = step_changes(first.get(key) or (), again.get(key) or (), first.get("repeats_after") or 0, later)
+        apart = step_changes(first.get(key) or (), second.get(key) or (), first.get("repeats_after") or 0, later)
         if np.isfinite(apart).any() and any(first[key]):  # skip a list of zeros, such as the rolling of point feet
             changes[name] = float(np.nanmax(apart))
             of_steps[name] = [None if math.isnan(error) else float(f"{error:.2g}") for error in apart.tolist()]
-    changes["end_time_s"] = abs(first["end_time_s"] - again["end_time_s"])
+    changes["end_time_s"] = abs(first["end_time_s"] - second["end_time_s"])
     # A passive walk's cost of transport is always the sine of the slope, so its change does not measure the error.
     if any(work for giver, work in first.get("work_per_step_J", {}).items() if giver != "gravity"):
-        changes["cost_of_transport"] = abs(first["cost_of_transport"] - again["cost_of_transport"])
+        changes["cost_of_transport"] = abs(first["cost_of_transport"] - second["cost_of_transport"])
     changes |= {"of_steps": of_steps} if of_steps else {}
     return changes if by == DEFAULT_TIGHTENING else {**changes, "by": by}
 
 
-def steps_later(first: Summary, again: Summary) -> int | None:
+def steps_later(first: Summary, second: Summary) -> int | None:
     """Return the delay (steps) until a repeated walk repeats its steps like the first, or None if either never does."""
     period = first.get("repeats_after") or 0
-    if not period or again.get("repeats_after") != period:
+    if not period or second.get("repeats_after") != period:
         return None
-    cycle, other = (np.array(walk["step_periods_s"][-period:]) for walk in (first, again))
+    cycle, other = (np.array(walk["step_periods_s"][-period:]) for walk in (first, second))
     return min(range(period), key=lambda steps: float(np.abs(np.roll(other, -steps) - cycle).max()))
 
 
-def step_changes(first: Values, again: Values, period: int, later: int | None) -> Floats:
+def step_changes(first: Values, second: Values, period: int, later: int | None) -> Floats:
     """Return the largest change of the values (steps,) up to each step, or NaN where a walk has no value.
 
     period  steps after which the first walk repeats in the end, or 0
@@ -89,8 +89,8 @@ def step_changes(first: Values, again: Values, period: int, later: int | None) -
     same step of the cycle, however many steps later it comes. If the second walk has not settled yet, the error of one
     step stands in for the error of the cycle.
     """
-    count = min(len(first), len(again))
-    values, others = (np.array(each[:count], float) for each in (first, again))
+    count = min(len(first), len(second))
+    values, others = (np.array(each[:count], float) for each in (first, second))
     apart = np.abs(values - others)
     largest = np.where(np.isnan(apart), np.nan, np.fmax.accumulate(apart))
     if not period or count < 2 * period:

@@ -121,7 +121,7 @@ class RunFolder:
         write_atomically(self.path / RECORD, json.dumps(asdict(record), indent=1).encode())
 
     def worker(self) -> Holder | None:
-        """Return the process that works in the folder, or None if there is none, or if its command is unknown."""
+        """Return the process that works in the folder, or None if the folder is idle or the command is unknown."""
         try:
             worker = Holder(**json.loads(read_bounded(self.path / WORKER, RECORD_BYTES)))
         except (OSError, ValueError, TypeError, RecursionError):

@@ -45,8 +45,9 @@ MOST_ROWS: Final = 4
 PANEL_HEIGHT: Final = 1.6
 LINES: Final = {"rigid": {"linestyle": "-", "marker": "o"}, "contact": {"linestyle": "--", "marker": "s"}}
 LOWER_PANEL_INCHES = 1.7
+"""Mean height of the panels below the walker (in)."""
 AXIS_LABEL_INCHES = 0.4
-"""Mean height of the panels below the walker, and width of the axis labels beside it (in)."""
+"""Width of the axis labels next to the walker (in)."""
 
 
 def sweep_illustration(group: Group, parameters: Sequence[str]) -> Illustration | None:

@@ -40,12 +40,15 @@ CYCLE = 2
 POSTURES_BETWEEN = 5
 """Number of postures drawn between two heel strikes."""
 FAINT_WIDTH = 0.8
+"""Line width (pt) of legs between heel strikes."""
 FULL = 2.2
-"""Line widths (pt) of legs between heel strikes and at them."""
+"""Line width (pt) of legs at heel strikes."""
 HEADROOM = 0.19
+"""Free space above the walker (leg lengths)."""
 FOOTROOM = 0.13
+"""Free space below the walker (leg lengths)."""
 SIDEROOM = 0.12
-"""Free space above, below and beside the walker (leg lengths)."""
+"""Free space on either side of the walker (leg lengths)."""
 ARC = np.linspace(-0.6, 0.6, 25)
 ARC_MIDDLE = np.zeros(1)
 """Angles (rad) of the points of a sole's arc, and of its middle, from the leg's line."""
@@ -53,9 +56,11 @@ SMALL_FOOT = 0.01
 """Foot radius (leg lengths) below which a sole is drawn as a point."""
 AXES: Final[dict[str, Any]] = {"aspect": "equal", "xlabel": "horizontal position (m)", "ylabel": "height (m)"}
 ROOM_BELOW = 0.36
+"""Room (in) for landing times below the lowest foot."""
 SIDE_INCHES = 0.7
+"""Room (in) for axis labels at the side."""
 ROOM_ABOVE = 1.05
-"""Room (in) for landing times below the lowest foot, for axis labels at the side, and for the legend."""
+"""Room (in) for the legend."""
 SHAPE = 0.68
 """Maximum height of the axes relative to their width."""
 NO_STEPS = Group(
@@ -325,16 +330,18 @@ FIGURE_2, FIGURE_6 = (
 FIGURES = (FIGURE_2, FIGURE_6)
 
 SEEN_S = 0.08
+"""Time for which an animation shows a push-off (s)."""
 PUSH_SHARE = 0.3
-"""Time for which an animation shows a push-off (s), and length of the mark relative to the leg."""
+"""Length of the mark of a push-off relative to the leg."""
 FILM_SIZE = (6.4, 3.6)
+"""Size of a frame (in). Video formats require an even number of pixels along both sides."""
 FILM_DPI = 100
-"""Size (in) and resolution (pixels per in) of a frame. Video formats require an even number of pixels along both sides.
-"""
+"""Resolution of a frame (pixels per inch)."""
 STEPS_SHOWN = 4
 RELIEF = 0.04
+"""Maximum height of the magnified ground profile (leg lengths)."""
 RELIEF_DEPTH = 0.075
-"""Maximum height of the magnified ground profile, and its distance below the ground (leg lengths)."""
+"""Distance of the magnified ground profile below the ground (leg lengths)."""
 
 
 def film_times(sticks: Sticks, steps: int | None, rate: int, slower: float) -> Array:

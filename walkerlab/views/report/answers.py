@@ -35,8 +35,9 @@ Answer = Callable[[Summary], Sequence[str | Table]]
 """Function that returns the paragraphs and tables of an answer."""
 
 FIRST_VALUES = 4
+"""Number of values shown at the start of a long row."""
 LAST_VALUES = 6
-"""Numbers of values shown at the start and at the end of a long row."""
+"""Number of values shown at the end of a long row."""
 MAX_CYCLE = 12
 """Maximum number of steps of a cycle whose periods a sentence lists."""
 

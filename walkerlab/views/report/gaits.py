@@ -25,7 +25,7 @@ COORDINATE_NAME = re.compile(r"(?P<rate>d)?theta(?:_(?P<index>\d+))?(?:_(?P<body
 COMPASS_STATE = ("theta_1", "theta_2", "dtheta_1", "dtheta_2")
 """Coordinates of a compass; results of other walkers store the names of their coordinates."""
 LEG_ROLES = {"1": "swing", "2": "stance"}
-"""What each leg does in the step that begins in a gait's state."""
+"""Role of each leg in the step that begins in a gait's state."""
 SETS = {"as-printed": "as printed", "corrected": "corrected"}
 """Sets of equations: stored name and display name."""
 

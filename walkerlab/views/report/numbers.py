@@ -62,8 +62,9 @@ PLAIN_FROM = 1e-4
 PLAIN_BELOW = 1e6
 """Range of magnitudes written without a power of ten."""
 MAX_DECIMALS = 6
+"""Maximum number of decimals of step periods (s) and lengths (m)."""
 DEFAULT_DECIMALS = 4
-"""Decimals of step periods (s) and lengths (m): maximum, and default if the error is unknown."""
+"""Number of decimals of step periods (s) and lengths (m) whose error is unknown."""
 
 
 def number(value: float | None, digits: int = 5) -> str:

@@ -204,8 +204,9 @@ INDENT = "  "
 PARAGRAPH_WIDTH = 100
 """Line width of a paragraph (characters)."""
 LONGEST_ROW = 12
+"""Length of the longest row that is shown in full."""
 ENDS = 4
-"""Length of the longest row shown in full, and number of values shown at each end of a longer row."""
+"""Number of values shown at each end of a longer row."""
 
 
 def describe_summary(summary: Mapping[str, Any], indent: str = INDENT, short: bool = False) -> Iterator[str]:

@@ -153,7 +153,7 @@ def value_and_error(value: float, error: float | None, unit: str) -> str:
 
 
 def mass_in_words(key: str, text: str) -> str:
-    """Describe a mass in words, as in 'the hip weighs 9.8 ± 0.2 kg'."""
+    """Describe a mass in a phrase such as 'the hip weighs 9.8 ± 0.2 kg'."""
     body = axis_label(key).removesuffix(" mass")
     return f"the legs weigh {text} kg each" if body == "leg" else f"the {body} weighs {text} kg"
 

@@ -111,8 +111,9 @@ def judgement(key: str, summary: Mapping[str, Any], results: Results) -> tuple[s
 
 
 HEAD_STEPS = 20
+"""Number of steps listed from the beginning of a longer walk."""
 TAIL_STEPS = 4
-"""Number of steps listed from the beginning and from the end of a longer walk."""
+"""Number of steps listed from the end of a longer walk."""
 SERIES = {
     (RIGID_STAGE, "step_periods_s"): "rigid T (s)",
     (CONTACT_STAGE, "step_periods_s"): "contact T (s)",
