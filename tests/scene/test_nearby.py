@@ -10,7 +10,7 @@ import pytest
 from walkerlab.config.loader import load
 from walkerlab.errors import add_run_options
 from walkerlab.physics.orbits.fixed_point import find_gaits
-from walkerlab.scene.gait_suggestions import find_slopes_with_gaits, suggest_gaits
+from walkerlab.scene.gait_suggestions import find_slopes_with_gaits, round_inward, suggest_gaits
 from walkerlab.scene.rigid import rigid_walker
 
 KNEED = (
@@ -73,3 +73,8 @@ def test_no_slow_command_is_suggested_without_a_nearby_gait():
 
 def test_no_nearby_gait_is_searched_uphill():
     assert suggest_gaits(config("slope_deg=0")) == ""
+
+
+def test_ends_of_a_range_of_slopes_are_rounded_to_its_inside():
+    assert round_inward(0.40001, 4.1399) == pytest.approx((0.401, 4.13), abs=1e-12)
+    assert round_inward(4.1391, 4.1395) == (4.1391, 4.1395)

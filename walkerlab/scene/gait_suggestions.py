@@ -101,21 +101,29 @@ def suggest_gaits(scene: RigidConfig) -> str:
         command = f"`walkerlab fixedpoint --set walker.{FOOT_KEY}={ahead_m:.3g}`"
         advice.append(f"With its feet {ahead_m:.3g} m ahead of the shanks this walker has {description}: {command}.")
     if suitable is not None:
-        in_degrees = tuple(math.degrees(value) for value in suitable.stable or suitable.slopes)
+        first, last = round_inward(*map(math.degrees, suitable.stable or suitable.slopes))
         description = "A stable gait" if suitable.stable else "A gait, unstable,"
         slope_deg = math.degrees(suitable.nearest_slope(config.slope_rad))
         command = f"`walkerlab fixedpoint --set slope_deg={slope_deg:.3g}`"
-        advice.append(f"{description} exists at least from {in_degrees[0]:.3g} to {in_degrees[1]:.3g} deg: {command}.")
+        advice.append(f"{description} exists at least from {first:.3g} to {last:.3g} deg: {command}.")
     if not advice:
         feet_tried = name_feet_tried(config)
         advice.append(f"No gait was found on gentler or steeper slopes{feet_tried}.{suggest_walkers(config)}")
     return " ".join(advice)
 
 
+def round_inward(low: float, high: float) -> tuple[float, float]:
+    """Round the ends of a range of positive values to three digits inside it, or not at all if it is too narrow."""
+    steps = [10.0 ** (math.floor(math.log10(end)) - 2) for end in (low, high)]
+    rounded = math.ceil(low / steps[0]) * steps[0], math.floor(high / steps[1]) * steps[1]
+    return rounded if rounded[0] < rounded[1] else (low, high)
+
+
 def rigid_alone(scene: RigidConfig) -> Config:
     """Return a config with only the keys on which a gait of the rigid model depends."""
     data = {name: getattr(scene, name) for name in keys_of(RigidConfig)}
-    return Config.model_validate({**data, "push_off": {"impulse_N_s": scene.push_off.impulse_N_s}})
+    push_off = {"impulse_N_s": scene.push_off.impulse_N_s, "leg_2": scene.push_off.leg_2}
+    return Config.model_validate({**data, "push_off": push_off})
 
 
 def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:

@@ -359,8 +359,12 @@ def gain_of_freeing(
     refitted = fit(free_parameter(subject, (*keys, other.name), problem), start)
     if not isinstance(refitted, Fitted):
         return 0.0, 0.0
+    change = float(refitted.u[count] - start[count])
+    # A new fit may also end in better standard deviations. The parameter itself gains half its squared change, in
+    # standard errors.
+    variance = robust_covariance(refitted, np.eye(refitted.u.size))[count, count]
     gain = refitted.evaluation.likelihood - fitted.evaluation.likelihood
-    return float(gain), float(refitted.u[count] - start[count])
+    return min(float(gain), 0.5 * change**2 / float(variance)), change
 
 
 def free_parameter(subject: ModelUnderTest, keys: Sequence[str], problem: FitProblem) -> FitProblem:
