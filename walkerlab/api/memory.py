@@ -76,6 +76,7 @@ class ContactKeys(TypedDict, total=False):
     """Keys of the contact model's ground. `walkerlab schema contact` has their defaults and bounds."""
 
     units: Literal["adams", "si"]
+    normal_force: str
     stiffness: float
     exponent: float
     damping: float

@@ -240,7 +240,7 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
             keys, forecast.parameters(best.u), errors, problem.start, problem.bounds, forecast.scales, strict=True
         )
     )
-    pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(estimates, question.prior))
+    pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(best, keys, question.prior))
     fixed = [*fixed_parameters(subject, question, best)]
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
@@ -276,7 +276,7 @@ def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
     """Yield how far the data would move each estimate that is at a bound, in standard errors of the free estimate."""
     problem = fitted.problem
     scales = fitted.forecast.scales
-    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True)), 1e-300))
+    errors = independent_errors(fitted)
     for key, u, move, error, bounds, scale in zip(
         keys, fitted.u, fitted.evaluation.move, errors, problem.bounds, scales, strict=False
     ):
@@ -285,15 +285,20 @@ def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
                 yield Pull(key, "bound", bound, float(abs(move) / error))
 
 
-def pulls_of_priors(estimates: Sequence[Estimate], priors: Mapping[str, Sequence[float]]) -> Iterator[Pull]:
+def independent_errors(fitted: Fitted) -> Floats:
+    """Return the standard errors of the unknowns, in their scales, if all errors of the data are independent."""
+    variances = np.diag(np.linalg.pinv(fitted.evaluation.information, hermitian=True))
+    return np.sqrt(np.maximum(variances, 1e-300))
+
+
+def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Sequence[float]]) -> Iterator[Pull]:
     """Yield the distance of each prior from the estimate by the walk alone, in standard errors of the difference."""
-    for estimate in estimates:
-        if estimate.key in priors:
-            value, sigma = priors[estimate.key]
-            error = estimate.standard_error
-            free = 0.0 if error is None else sigma**2 - error**2
-            distance = abs(estimate.value - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
-            yield Pull(estimate.key, "prior", value, distance)
+    for key, u, error, scale in zip(keys, fitted.u, independent_errors(fitted), fitted.forecast.scales, strict=False):
+        if key in priors:
+            value, sigma = priors[key]
+            free = sigma**2 - (error * scale) ** 2
+            distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
+            yield Pull(key, "prior", value, float(distance))
 
 
 def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:

@@ -67,7 +67,8 @@ def swept(count=5):
     found = {"slope_deg": Variable(x, ("slope_deg",), "deg", "slope")}
     for k, model in enumerate(MODEL_COLOURS):
         found |= {name.format(k): Variable(y + k, ("slope_deg",), "1", name) for name, y in numbers.items()}
-        found[f"gaits.{k}.model"] = Variable(np.array([model] * count), ("slope_deg",), "", "model")
+        for table in ("gaits", "largest_step"):
+            found[f"{table}.{k}.model"] = Variable(np.array([model] * count), ("slope_deg",), "", "model")
     return Group(found)
 
 
