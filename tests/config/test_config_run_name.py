@@ -29,6 +29,7 @@ def name_of(*sets: str, path: Path | None = None, strides: int | None = None) ->
         (["name=other"], "other"),
         (["name=other", "strides=9"], "other@strides=9"),
         (["strides=9", "slope_deg=3"], "paper@slope_deg=3,strides=9"),
+        (["walker.leg_2.leg_mass_kg=5.5"], "paper@walker.leg_2.leg_mass_kg=5.5"),
     ],
 )
 def test_run_name_shows_the_change(sets: list[str], name: str) -> None:
