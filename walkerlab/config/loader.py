@@ -193,8 +193,10 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
             before[name] = block().model_dump(mode="json")
             added.append(f"{name}=added")
     values_before = dict(flatten(before))
-    # a key that is absent without its block counts as null
-    differing = {key: value for key, value in flatten(after) if values_before.get(key) != value}
+    differing = {key: value for key, value in flatten(after) if key not in values_before or values_before[key] != value}
+    # Null says nothing new about a key of a block that was null.
+    absent = {f"{key}." for key, value in values_before.items() if value is None}
+    differing = {key: value for key, value in differing.items() if value is not None or not key.startswith((*absent,))}
     if slope_deg is not None and "slope_rad" in differing:
         differing = {"slope_deg" if key == "slope_rad" else key: value for key, value in differing.items()}
         differing["slope_deg"] = slope_deg
