@@ -255,9 +255,9 @@ def test_multipliers_are_complex_numbers():
         (lambda: walkerlab.open_run("paper", 5), r"^runs: 5 is not a folder"),
         (
             lambda: walkerlab.sweep("fixedpoint", {"slope_deg": "[10]"}),
-            r"^over slope_deg: '\[10\]' is not a list of values",
+            r"^over slope_deg: '\[10\]' is neither a list of values nor a range",
         ),
-        (lambda: walkerlab.sweep("fixedpoint", {"slope_deg": 10}), r"^over slope_deg: 10 is not a list of values"),
+        (lambda: walkerlab.sweep("fixedpoint", {"slope_deg": 10}), r"^over slope_deg: 10 is neither a list of values nor a range"),
         (lambda: walkerlab.compass(hip_mass=20), r"^walker\.hip_mass: unknown key \(20\)"),
         (
             lambda: walkerlab.find_gait(slope_deg=1, slope_rad=1),
