@@ -257,7 +257,10 @@ def test_multipliers_are_complex_numbers():
             lambda: walkerlab.sweep("fixedpoint", {"slope_deg": "[10]"}),
             r"^over slope_deg: '\[10\]' is neither a list of values nor a range",
         ),
-        (lambda: walkerlab.sweep("fixedpoint", {"slope_deg": 10}), r"^over slope_deg: 10 is neither a list of values nor a range"),
+        (
+            lambda: walkerlab.sweep("fixedpoint", {"slope_deg": 10}),
+            r"^over slope_deg: 10 is neither a list of values nor a range",
+        ),
         (lambda: walkerlab.compass(hip_mass=20), r"^walker\.hip_mass: unknown key \(20\)"),
         (
             lambda: walkerlab.find_gait(slope_deg=1, slope_rad=1),
