@@ -1,6 +1,7 @@
 """Types of walkers and their dimensions: keys of the block `walker`."""
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import lru_cache, reduce
@@ -627,25 +628,24 @@ def contact_required_error(request: str, walker: Any, instead: str) -> ConfigErr
 
 
 def load_walkers() -> dict[str, type[Block]]:
-    """Import the types of walkers that extensions add, by word.
-
-    Raises ConfigError if one cannot be imported.
+    """Import the types of walkers that extensions add, by word. Those that cannot be imported are left out, with a
+    warning.
     """
     found = {}
     for word, code in declared("walkers").items():
         try:
             found[word] = load(code)
         except Exception as error:
-            why = f"the walker type {word} of an extension cannot be imported: {type(error).__name__}: {error}."
-            raise ConfigError(why, "Mend or uninstall the extension.") from error
+            why = f"{type(error).__name__}: {error}"
+            warnings.warn(f"the walker type {word} of an extension ({code}) is left out: {why}", stacklevel=2)
     return found
 
 
-OWN_WALKERS: Final = {"compass": CompassWalker, "straight-legs": StraightLegs, "kneed": Kneed, "parts": PartsWalker}
 if TYPE_CHECKING:
     Walker = CompassWalker | StraightLegs | Kneed | AssembledWalker
 else:
-    kinds = {**OWN_WALKERS, **load_walkers()}
+    kinds = {"compass": CompassWalker, "straight-legs": StraightLegs, "kneed": Kneed, "parts": PartsWalker}
+    kinds |= load_walkers()
     Walker = Annotated[
         reduce(or_, (Annotated[block, Tag(word)] for word, block in kinds.items())),
         Discriminator(
