@@ -41,6 +41,7 @@ TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 # the only packages that may hold compiled functions; a test checks this
 KERNEL_HOMES = ("solvers", "mechanics", "ground", "hybrid", "orbits")
+# A file may register a body with `.case(` without importing `kernels`.
 HOLDS_KERNELS = re.compile(rb"walkerlab\.physics\.kernels|numba|\.case\(")
 KEPT_GENERATIONS = 8
 UNUSED_S = 30 * 86_400.0  # older generations are deleted if no process has opened them for this long
@@ -207,7 +208,9 @@ def cache_folder() -> Path:
         folder.mkdir(0o700, exist_ok=True)
     else:
         folder.mkdir(0o700, exist_ok=True)
+        # Only a new folder can exceed the number of folders to keep.
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
+    # `_remove_unused` takes the time of the last change for that of the last use.
     os.utime(folder)
     return folder
 

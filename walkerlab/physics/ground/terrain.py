@@ -55,6 +55,7 @@ def foothold_height(terrain: Terrain, foothold: int) -> float:
 
 @kernel_part
 def height_of_pad(terrain: Terrain, foot: int, cell: int) -> float:
+    # Footholds are counted from pad 0 of the stance foot's lane. The other lane's pad 0 is `apart` footholds further.
     apart = (terrain.lanes[foot] - terrain.lanes[STANCE_FOOT]) / terrain.pitch
     return foothold_height(terrain, cell + math.floor(apart + 0.5))
 

@@ -81,6 +81,7 @@ def walk_in_form(
 
     Returns the outcome's number, or CHANGES_FORM, and the last event.
     """
+    # The next step size of the form before serves as the first one of this form.
     begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     search = seek(deadline(system, walk_state, method.clock[T]), NO_EVENT)
     terrain = walk_state.ground.terrain
@@ -134,6 +135,7 @@ def aim(
     start, end = method.clock[T_OLD], method.clock[T]
     if fraction <= 1.0:
         return approach(search, walk_state, start, end, fraction, event)
+    # This solver step was shortened to end at an event, but shows none: it may have ended just before it.
     if search.approaching and end >= search.target:
         return confirm(search, start, time_to_zero(method, finder, search.event))
     return EventSearch(
@@ -249,6 +251,7 @@ def react(
     # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return endings.CHANGES_FORM
+    # Switching points change neither the walk state nor the equations, so the method continues with its history.
     if not is_switching(event):
         begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     return endings.GOES_ON

@@ -139,7 +139,9 @@ def take_walk(
         judged_by = abs(swing_foot(walker, start)[1]) if step_length is None else step_length
         recorder.nearest = SHORTEST_LANDING * judged_by
     height = swing_foot(walker, start)[0]
-    if abs(height) > ON_GROUND * walker.leg_length:  # a start in mid-step, where no foot leaves the ground
+    # A start in mid-step, where no foot leaves the ground. With its own height as the foothold that it leaves, the
+    # swing foot's event function is not taken for zero at the start.
+    if abs(height) > ON_GROUND * walker.leg_length:
         rises[0] = -height
         recorder.locked = walker.kneed and is_straight(walker, start)
     if hip_above_fall(walker, start) < 0.0:
@@ -197,6 +199,7 @@ class Recorder:
         seen = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
         times = np.zeros(0)
         if self.sampled:
+            # enough if every step takes as long as a swing may take
             room = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
         if self.locked and self.steps == 0:
@@ -218,6 +221,7 @@ class Recorder:
         before = seen.before[:taken]
         after = seen.after[:taken]
         knees = np.where(seen.knee_time < 0.0, np.nan, seen.knee_time + self.time)
+        # No knee strikes in the steps in which a leg without a knee swings.
         for k, shank in enumerate(self.models["shank"]):
             knees[k :: self.models.size] = knees[k :: self.models.size] if shank != NO_SHANK else np.nan
         if self.sampled:
@@ -289,7 +293,8 @@ class Recorder:
         return Samples(time[order], state[order], step[order], bent[order])
 
     def build_result(self, outcome: Outcome) -> RigidWalkResult:
-        if self.tally.duration == 0.0:  # no swing has begun, so the start has not been observed yet
+        # No swing has begun, so the start has not been observed yet.
+        if self.tally.duration == 0.0:
             observe_start(self.seen, Mode(self.walker, BENT), self.start)
         end_time = self.time if outcome == Outcome.WALKED else float(self.tally.duration)
         if outcome == Outcome.WALKED and self.tally.min_normal_force < 0.0:
@@ -312,6 +317,7 @@ class Recorder:
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             driven=driven,
             energy_balance_residual=residual,
+            # `strike_loss` is what the strikes lose after the push-offs' work has made up for part of it.
             lost_in_strikes=float(self.tally.strike_loss) + driven.push_off,
             start=self.start,
             before=before,

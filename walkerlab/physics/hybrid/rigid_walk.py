@@ -206,6 +206,8 @@ def swing_phase(
     # A phase starts on the strike that ended the previous one; that zero is ignored.
     limit = latest
     coming = False
+    # After a knee strike the swing foot is in the air and the knee is no longer watched, so no event function starts at
+    # zero.
     at_start = is_bent(system) or system.model.shank == NO_SHANK
     begin(method, system, t, y, method.clock[H_NEXT])
     observe_start(observer, system, y)
@@ -213,6 +215,7 @@ def swing_phase(
         status = advance(method, system, limit)
         if status != STEP_DONE:
             return endings.BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else endings.SOLVER_FAILED
+        # The way to a located event was searched and observed before the solver step was rewound.
         if coming:
             continue
         near = may_end(system, method, at_start)
@@ -228,6 +231,7 @@ def swing_phase(
             observe(observer, method, system, finder, LEG_RATE, min(1.0, strike, fall, knee_strike), step)
         if fall < min(strike, knee_strike):
             return endings.FELL
+        # The foot lands before the knee has locked.
         if is_bent(system) and strike < knee_strike:
             return endings.BENT_KNEE
         if min(strike, knee_strike) <= 1.0:

@@ -32,6 +32,7 @@ from walkerlab.physics.solvers.system import Floats, block, derivative
 # With the safety factor of Hairer's code, 0.9, a fifth of a walk's steps are rejected, and the same error costs 11 %
 # more work.
 SAFETY = 0.8
+# Limits of the change of a step, as in Hairer's dop853.f.
 SHRINK_MOST = 0.333
 GROW_MOST = 6.0
 EXPONENT = 1.0 / 8.0
@@ -191,6 +192,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
     K = method.stages
     t, h = clock[T], clock[H_NEXT]
     for i in range(y.size):
+        # The derivative at the end of a step is the first stage of the next.
         y_old[i], K[0, i] = y[i], K[LAST_STAGE, i]
     limit = GROW_MOST
     outcome = OUT_OF_BUDGET
@@ -208,6 +210,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
             clock[H_NEXT] = max(clock[H_NEXT], h * growth) if last else h * growth
             return STEP_DONE
         counts[REJECTED] += 1
+        # As in Hairer's code, the step does not grow right after a rejection.
         limit = 1.0
         # the error may be infinite or not a number
         h *= change_of_step(error) if error < 1e300 else 0.1
@@ -215,6 +218,7 @@ def advance_dop853(method: Dop853, system: Any, t_end: float) -> int:
         if h <= SMALLEST_STEP * max(abs(t), 1.0):
             outcome = STEP_TOO_SMALL
             break
+    # Trial steps have overwritten the state and its derivative.
     for i in range(y.size):
         y[i], K[LAST_STAGE, i] = y_old[i], K[0, i]
     return outcome
