@@ -55,6 +55,7 @@ def statements(model: AdamsModel) -> Iterator[str]:
     for name, function in model.variables.items():
         yield from named_statement(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
     for name, force in model.forces.items():
+        # Of several functions in a statement, all but the last end in a backslash.
         yield from named_statement(
             name, f"GFORCE/{ids[name]}", f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
             f"RM = {ids[ORIGIN]}", f"FX = {expression(force.x)}\\", f"FY = {expression(force.y)}\\",

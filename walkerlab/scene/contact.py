@@ -129,6 +129,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     if not isinstance(walker, Kneed | AssembledWalker):
         return KneeRules()
     knee = walker.knee
+    # A knee that is free in the rigid strike must not be rigid while the leading foot sinks in.
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
@@ -154,6 +155,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
     rigid_step_length_m  initial pad pitch
     """
+    # A gait has no pinned step, and the search replaces this pitch by the gait's step length.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
     legs_differ = have_different_legs(config)

@@ -54,6 +54,7 @@ def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
     span = ValueSpan(0.02 * slope, min(MAX_FOLLOWED_TO, max(3.0 * slope, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
     for value in (*(factor * slope for factor in SLOPE_FACTORS), *COMMON_SLOPES):
+        # A search takes long, so the first stable gaits end it.
         if value in span and not any(candidate.stable for candidate in ranges):
             ranges += walkable_ranges(follow(SLOPE.vary(config, rigid_walker), span, value))
     return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, slope)), default=None)
@@ -77,6 +78,7 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
     part.
     """
     for branch in branches:
+        # The first monitor of the rigid model is the minimum normal force.
         good = [point for point in branch.points if point.monitors[0] >= 0.0]
         if len(good) < 2:
             continue
@@ -139,6 +141,7 @@ def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
 def feet_ahead(config: Config) -> tuple[float, ...]:
     if not isinstance(config.walker, Kneed):
         return ()
+    # Rounded as in the suggested command, which so gives the same gait.
     return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FOOT_SHARES)
 
 

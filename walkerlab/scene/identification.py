@@ -162,6 +162,7 @@ def identify_with(
     """Fit one model, or return the reason as text if no walk of the model can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
+    # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
@@ -296,6 +297,7 @@ def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Se
     for key, u, error, scale in zip(keys, fitted.u, independent_errors(fitted), fitted.forecast.scales, strict=False):
         if key in priors:
             value, sigma = priors[key]
+            # The difference between a prior and the estimate that includes it has this variance.
             free = sigma**2 - (error * scale) ** 2
             distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(key, "prior", value, float(distance))
@@ -330,6 +332,7 @@ def suggest_parameter(
         if gains[index] < PROMISING_GAIN:
             return
         gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
+        # With a fitted noise, a gain of the log-likelihood is a monotonic function of an F statistic.
         rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN
         if gain > DECISIVE_GAIN and rare and abs(change) > SMALLEST_CHANGE:
             before = NUISANCES.get(other.name, (other.value, 0.0))[0]
@@ -437,6 +440,7 @@ def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
+        # Only the exact differences may be one-sided, where a walk on one side ends early.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:

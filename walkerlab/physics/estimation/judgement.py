@@ -101,6 +101,7 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     sums = np.bincount(groups, whitening(fitted.data, fitted.noise)(fitted.data.residuals))
     squares = float((sums**2 / counts).sum())
     freedom = max(1, counts.size - fitted.u.size)
+    # As a normal deviate, so that the limit does not depend on the number of averages.
     if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > MAX_DEPENDENCE:
         yield (
             f"residuals of successive angles are correlated (averages over half a step scatter "

@@ -210,7 +210,9 @@ def root_along(segment: Segment[Data], measure: Callable[[CurvePoint[Data]], flo
 
     try:
         root = brentq(measure_at, 0.0, segment.length, xtol=ROOT_RESOLUTION, rtol=4.0 * np.finfo(float).eps)
+        # The root must be among `points`, even if Brent's method did not evaluate the measure there.
         measure_at(root)
+    # Brent's method raises ValueError if the measure has the same sign at both ends.
     except (_OffTheCurve, ValueError):
         return None
     return points[root]

@@ -169,6 +169,7 @@ class BranchTracer:
         bifurcations = list[Bifurcation]()
         crossings = list[Crossing]()
         step = self.control.first
+        # Just beyond a flip, a long step could lead to the same cycle with its halves exchanged.
         if period > self.step_map.stride:
             step = min(step, 0.5 * float(np.linalg.norm(half_cycle_difference(start.evaluated.data))))
         while end is None:
@@ -200,7 +201,8 @@ class BranchTracer:
                 end = BranchEnd(points[-1].value, f"a disturbance grows more than {MAX_CYCLE_GROWTH:g}-fold per cycle")
             before = last
             last = solved
-        if end.reason == CLOSED_LOOP:  # begin at an unstable gait, so that no stable stretch is split
+        # Begin at an unstable gait, so that no stable stretch is split.
+        if end.reason == CLOSED_LOOP:
             begin = min(range(len(points) - 1), key=lambda k: (points[k].stable, points[k].value))
             points = [*points[begin:-1], *points[: begin + 1]]
             end = replace(end, value=points[0].value)
@@ -356,6 +358,7 @@ class BranchFollower(BranchTracer):
         for halving in range(AMPLITUDE_HALVINGS):
             guess, normal, xi = predict_doubled(flip, form, 0.5**halving)
             point = correct(self.equations(2 * period), guess, normal, self.control.tolerance)
+            # A correction as large as the amplitude may have led back to the gait of the single period.
             if isinstance(point, CurvePoint) and np.linalg.norm(point.x - guess) < 0.5 * xi:
                 half = self.equations(period)(point.x)
                 parting = half.value @ (half.jacobian @ point.tangent)

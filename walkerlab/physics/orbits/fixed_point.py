@@ -317,6 +317,7 @@ class SlopeBranch:
 
     def gait_at(self, log_s: float, expected: Floats) -> Floats | None:
         s = math.exp(log_s)
+        # The residual is in units of z, which is proportional to s.
         effort = Effort(FOLLOWING_TOLERANCE * s, FOLLOWING_EVALUATIONS, SHORTEST_MOVE)
         gait = gait_near(self.step_map, unscale(s, expected), s**3, effort)
         if isinstance(gait, NotConverged):
@@ -328,6 +329,7 @@ class SlopeBranch:
 
 
 def unscale(s: float, y: Floats) -> Floats:
+    # The slope is s^3, and y[0] contains it.
     return np.array([s * y[0] - s**3, s * y[1], s * y[2]])
 
 
@@ -454,6 +456,8 @@ class Search:
         d = int(self.walker.coordinates)
         self.drawn += count
         starts = generator.uniform(MIN_START[:d], MAX_START[:d], (count, d))
+        # The first coordinate was drawn as the angle between the legs. With both feet on the slope it determines the
+        # stance leg's.
         starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
         if self.walker.legs_differ:
             self.draw_strides(starts)
@@ -476,6 +480,7 @@ class Search:
                 self.keep(gait.z, RANDOM_START)
 
     def stands(self, z: Floats) -> bool:
+        # With both feet on the slope, this sum with the stance leg counted twice is the angle between the legs.
         return bool(abs(feet_on_slope(self.walker, z[0], z[0])) < 2.0 * SMALLEST_ANGLE)
 
     def keep(self, z: Floats, by: str) -> bool:
@@ -486,6 +491,7 @@ class Search:
         cycle = gait_near(self.step_map, z, float(self.walker.slope), effort, STRIDE if self.walker.legs_differ else 1)
         if isinstance(cycle, NotConverged) or (self.walker.slope == 0.0 and self.stands(cycle.z)):
             return False
+        # Only the exact solution shows that a rough one belongs to a known gait.
         if self.record_hit(cycle.z, by):
             return True
         gait = measure_gait(self.walker, self.units, cycle)

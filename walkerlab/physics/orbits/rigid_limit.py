@@ -140,6 +140,7 @@ class Limit:
             step = contact_step(near)
             check = self.gait(changed, near, CHECK_TOLERANCE)
             off = step.period_s - self.period_s
+            # Without a check, the whole difference from the rigid gait counts as numerical error.
             distance = Distance(
                 setting,
                 step.period_s,

@@ -199,6 +199,7 @@ def differentiate_by_parameter(step_map: StepMap, z: Floats, p: float, swing: in
     for formula in (CENTRAL_2ND, FORWARD_2ND, tuple((-offset, -weight) for offset, weight in FORWARD_2ND)):
         steps = [step_map.step(z, p + offset * h, False, swing) for offset, _ in formula]
         outcomes = [step.outcome for step in steps]
+        # Values on this side give no valid walker or start, so the next formula is tried.
         if None in outcomes or Outcome.REJECTED in outcomes:
             continue
         outcome = next((outcome for outcome in outcomes if outcome is not Outcome.WALKED), Outcome.WALKED)

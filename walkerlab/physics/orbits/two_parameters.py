@@ -63,6 +63,7 @@ def critical_gaits(map_at: MapAt, kind: Kind, period: int, scales: tuple[float, 
         reach = DIFFERENCE_STEP * np.eye(x.size)
         neighbours = (gait(x + sign * unit) for unit in reach for sign in (1.0, -1.0))
         points = [point for point in (gait(x), *neighbours) if point is not None]
+        # The sums below rely on the order of the neighbours, so none may be missing.
         if len(points) < 1 + 2 * x.size:
             return Evaluated(Outcome.NO_HEEL_STRIKE, np.zeros(d + 1), np.zeros((d + 1, d + 2)), None)
         centre = points[0]
