@@ -98,6 +98,7 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
     yield from (f"QG = {values(x, y, 0)}", f"REULER = {values(part.angle, 0, 0)}")
     yield from (f"VX = {values(vx)}", f"VY = {values(vy)}", "VZ = 0", "WX = 0", "WY = 0", f"WZ = {values(part.spin)}")
     yield from (f"MASS = {values(part.mass)}", f"CM = {ids[part.centre]}")
+    # Only the moment about the plane's normal matters to the walk. Three equal moments are those of a possible body.
     yield f"IP = {values(part.inertia, part.inertia, part.inertia)}"
 
 

@@ -477,6 +477,8 @@ def add_forces(model: AdamsModel, export: Exported) -> None:
         reaction = f"{GROUND}.reaction_{number + 1}"
         model.markers[reaction] = Marker(GROUND, floating=True)
         along = "+".join(x)
+        # The forces act at the ball's lowest point, so friction has the radius as its arm about the marker at the
+        # centre.
         torque = f"{finite(foot.radius)}*({along})" if foot.radius else "0"
         model.forces[f"force_{number + 1}"] = Force(foot.marker, reaction, along, "+".join(y), torque)
 
@@ -492,6 +494,7 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
     if hip.damping_N_m_s_per_rad:
         terms.append(f"-{finite(MM * hip.damping_N_m_s_per_rad)}*WZ({{{i}}},{{{j}}},{{{j}}})")
     if hip.torque_N_m:
+        # Each factor changes its sign at its touchdown.
         factors = [f"SIGN(1,{finite(time)}-TIME)" for time in export.touches_s]
         groups = ["*".join(factors[k : k + 4]) for k in range(0, len(factors), 4)]
         for number, group in enumerate(groups):

@@ -171,6 +171,7 @@ def body_text(
     link = model.links[link_number]
     (px, pz), (x, z), (cx, cz) = link.parent_point_m, link.point_m, link.centre_m
     inside = "".join(joint_texts(model, link_number, hinges.get(link_number)))
+    # Only the moment about the y axis matters to the walk. Three equal moments are those of a possible body.
     i = max(link.inertia_kg_m2, MIN_INERTIA)
     inside += f'<inertial pos="{cx!r} 0 {cz!r}" mass="{link.mass_kg!r}" diaginertia="{i!r} {i!r} {i!r}"/>'
     for ball, foot in zip(model.balls, feet, strict=False):
@@ -263,6 +264,7 @@ def walker_text(export: Exported, head: Iterable[str], slope: Slope = "gravity")
         half = 0.5 * export.scene.ours.slope
         down = math.hypot(model.gravity_along, model.gravity_down)
         model = replace(model, gravity_along=0.0, gravity_down=down)
+        # This turn about the y axis lowers the ground ahead.
         scene = f'<body name="slope" quat="{math.cos(half)!r} 0 {math.sin(half)!r} 0">{scene}</body>'
     pairs = "".join(
         pair_text(model, model.balls[pad.foot], feet[pad.foot], f"pad_{number + 1}", contact)

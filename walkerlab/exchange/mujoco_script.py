@@ -104,6 +104,7 @@ class Walk:
     def drive(self, swing: int) -> None:
         """Apply the hip torque, and push the trailing foot during a pulse."""
         self.data.qfrc_applied[:] = 0.0
+        # The hip turns leg 1 against leg 2, so the torque on the swing leg changes its sign with the legs' roles.
         self.data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
         share = (self.data.time - self.touches_s[-1]) / self.duration if self.touches_s else 0.0
         if self.pushed and 0.0 < share < 1.0:

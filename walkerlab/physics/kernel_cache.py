@@ -204,6 +204,7 @@ def cache_folder() -> Path:
     compiler = f"py{sys.version_info.major}{sys.version_info.minor}-numba{numba.__version__}"
     folder = root / f"kernels-{sources_digest()[:16]}-{compiler}-{host}"
     if os.path.lexists(folder):
+        # This may delete the folder, which is then created again.
         folder = _closed_to_others(folder)
         folder.mkdir(0o700, exist_ok=True)
     else:

@@ -215,6 +215,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     velocity is then changed so that it rolls without slip.
     """
     walker = scene.walker
+    # The bodies of a straight leg turn as one in the rigid model; here each has its own angle.
     members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
@@ -228,6 +229,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker = scene.walker
+    # By definition, the static penetration is that under the whole weight, not under its part normal to the slope.
     return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
 
 

@@ -96,6 +96,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     """
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family)
+    # One step more than is measured: samples must lie before the last heel strike of a walk.
     level = np.zeros(plan.max_steps + 2)
     walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:

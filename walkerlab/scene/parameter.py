@@ -92,6 +92,7 @@ def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Seq
     for parameter, value in zip(parameters, values, strict=True):
         block = data
         for name in parameter.path[:-1]:
+            # A second leg like the first has no block of its own yet.
             block[name] = block.get(name) or {}
             block = block[name]
         block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value

@@ -254,7 +254,7 @@ class Forecast:
             return None
         angles = prediction.angles_rad
         count = self.measured.count
-        # A sample outside the walk is taken at the walk's end, whatever its time.
+        # A sample outside the walk is taken at its nearest end, whatever its time.
         rates = sensors[GAIN] * varied.rates * prediction.inside[:, None]
         moving = varied.samples_rad * sensors[GAIN] + rates[:, None] * self._drift(varied.durations_s)[:, :, None]
         moves = np.concatenate(

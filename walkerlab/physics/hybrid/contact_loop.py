@@ -85,6 +85,7 @@ def walk_in_form(
     begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     search = seek(deadline(system, walk_state, method.clock[T]), NO_EVENT)
     terrain = walk_state.ground.terrain
+    # The feet's order also decides when a walk with `until` ends, and which foothold's height a foot gets.
     watch_order = terrain.order_matters or until >= 0 or is_uneven(terrain)
     while steps_are_left(walk_state, until):
         status = advance(method, system, search.target)
@@ -251,7 +252,7 @@ def react(
     # the tangent jumps when the form changes, and when forces jump as the legs change roles; the caller applies this
     if locked_knees(walk_state.knee) != locked or (stepped and jumps_at_touch(system)):
         return endings.CHANGES_FORM
-    # Switching points change neither the walk state nor the equations, so the method continues with its history.
+    # The force is continuous at its switching points, so the method continues with its history.
     if not is_switching(event):
         begin(method, system, method.clock[T], method.y, method.clock[H_NEXT])
     return endings.GOES_ON

@@ -201,6 +201,7 @@ class Recorder:
         if self.sampled:
             # enough if every step takes as long as a swing may take
             room = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
+            # Each block of steps starts at a time of zero.
             times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
         if self.locked and self.steps == 0:
             seen.knee_time[0] = -1.0

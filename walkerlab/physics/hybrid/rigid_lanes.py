@@ -235,7 +235,8 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     h = min(load_lanes(rows, NEXT_STEP), left)
     stages, end, end_rate = run_stages(walker, 0.0, y, k1, h)
     error_5, error_3 = error_sums(memory, y, end, combine(LANE_ERROR_5, stages), combine(LANE_ERROR_3, stages))
-    # Lanes cannot branch, so TINY_ERROR prevents a division by zero here and below.
+    # Lanes cannot branch, so TINY_ERROR prevents a division by zero here and below. h is negative where a lane goes
+    # back to a heel strike.
     error = abs(h) * error_5 / math.sqrt(4.0 * (error_5 + 0.01 * error_3) + TINY_ERROR)
     change = SAFETY / math.sqrt(math.sqrt(math.sqrt(error + TINY_ERROR)))
     change = min(GROW_MOST, max(SHRINK_MOST, change))

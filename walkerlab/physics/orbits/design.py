@@ -80,7 +80,7 @@ def minimise(problem: DesignProblem, start: Floats) -> DesignSearch:
                 return scale * point.numbers[name], scale * point.gradients[name] * span
             last, last_point = last_good[0]
             back = u - last
-            # A point may have a gait but not this quantity. It then counts as one range away from itself, so that the
+            # At the last good point itself, which may lack this quantity, the distance counts as one range, so that the
             # value rises.
             distance = float(np.linalg.norm(back)) or 1.0
             return scale * last_point.numbers[name] + PENALTY_SLOPE * distance * distance, 2.0 * PENALTY_SLOPE * back

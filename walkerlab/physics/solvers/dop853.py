@@ -125,6 +125,7 @@ def try_step(method: Dop853, system: Any, t: float, h: float) -> float:
                     by_order_5[i] = fused(ERROR_WEIGHTS_5[j], K[j, start + i], by_order_5[i])
                     by_order_3[i] = fused(ERROR_WEIGHTS_3[j], K[j, start + i], by_order_3[i])
         for i in range(width):
+            # `at` is the state of the last stage, which is the solution.
             y[start + i] = at[start + i]
             scale = 1.0 / (method.atol + method.rtol * max(abs(y_old[start + i]), abs(y[start + i])))
             relative_5 = by_order_5[i] * scale
@@ -159,6 +160,7 @@ def begin_dop853(method: Dop853, system: Any, t: float, y: Any, h: float) -> Non
     clock = method.clock
     at = method.at
     slope = method.stages[LAST_STAGE]
+    # No step has been taken yet, so this row is free.
     ahead = method.stages[0]
     clock[T_OLD], clock[T], clock[H_NEXT] = t, t, h
     for i in range(method.y.size):
