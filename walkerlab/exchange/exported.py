@@ -103,6 +103,7 @@ class Exported:
     @property
     def knee_links(self) -> tuple[int, ...]:
         """Index of each leg's shank, or () for straight legs."""
+        # The first two coordinates are the position of the base.
         return tuple(index - 2 for index in self.scene.knee_indices)
 
     @cached_property

@@ -102,6 +102,7 @@ def planar_model(
             grow(neighbour)
 
     grow(root)
+    # The rows have room for as many links as bodies. If knees are locked there are fewer links.
     chain = np.ascontiguousarray(np.array([rows[body.name] for body in assembly.bodies])[:, : len(members)])
     links = tuple(lump_bodies(assembly, *link) for link in zip(members, hinges, strict=True))
     balls = []

@@ -128,6 +128,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
     """
     problem = problem_of(subject, measured, question)
     if measured.sampled:
+        # `identify` always fits a delay to angles at their sample times.
         nuisances = tuple(dict.fromkeys((*question.sensors, DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast

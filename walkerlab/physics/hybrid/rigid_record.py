@@ -123,6 +123,7 @@ def assumptions(mode: Mode, y: Any) -> tuple[float, float, float]:
     """Return the ground's pull (N), the friction ratio and the swing foot's depth (m). See section 3.1 of the paper."""
     along, normal = ground_reaction(mode, y)
     ratio = abs(along) / normal if normal > 0.0 else 0.0
+    # The sign of the normal force is changed so that the worst of all three is a maximum.
     return -normal, ratio, -swing_foot(mode.model, y)[0]
 
 
@@ -198,6 +199,7 @@ def observe(
     t, h = method.clock[T_OLD], method.clock[T] - method.clock[T_OLD]
     t_end = t + fraction * h
     spacing = 0.125 * fraction
+    # `tally.energy` is still that at the end of the solver step before, which is the start of this one.
     mean_energy = SIMPSON[0] * tally.energy
     y = vector(mode.model.zero_state)
     before = middle = assumptions_at(method, mode, 0.0)
@@ -206,6 +208,7 @@ def observe(
         after = record_extremes(tally, mode, y)
         mean_energy += SIMPSON[eighth] * tally.energy
         for measure in range(3):
+            # The parabola through the last three samples has its maximum between them.
             if eighth > 1 and abs(vertex(before[measure], middle[measure], after[measure])) <= 1.0:
                 refine_maximum(tally, method, mode, measure, spacing * (eighth - 1), spacing, fraction)
         before = middle

@@ -272,6 +272,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
         before[i] = y[i]
     derivative(system, method.clock[T], before, f)
     value, rate = event_value(system, y, y[n : 2 * n])
+    # The solver step ends at the event up to the error of its dense output, so a step of first order bridges the rest.
     wait = -value / rate if rate != 0.0 else 0.0
     for i in range(2 * n):
         y[i] += wait * f[i]
@@ -287,6 +288,7 @@ def pass_event(method: Any, system: Mode, following: RigidModel, new: Any, strik
             lift = strikes.lift[step + 1, column - 1]
             if lift != 0.0 and not knee:
                 _, _, upward, _ = swing_foot_motion(model, y, y[n : 2 * n])
+                # A foothold that rises meets the foot earlier: `upward` is negative.
                 wait += lift / upward
             waits[step, column - 1] = wait
             shift_column(y, at, f, wait)

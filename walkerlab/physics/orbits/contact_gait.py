@@ -171,4 +171,5 @@ def follow_from_rigid(
 
 
 def append_length(gait: Cycle) -> Floats:
+    # The pitch of the pads is followed together with the gait.
     return np.append(gait.z, gait.lengths_m)

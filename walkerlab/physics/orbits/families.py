@@ -103,6 +103,7 @@ class GaitBranch:
             if gait.stable:
                 values.append(gait.value)
             if gait.stable != following.stable:
+                # Where no bifurcation was located, stability changes somewhere between the two points.
                 on_it = (b.value for b in self.bifurcations if b.lies_between(gait, following))
                 edge = next(on_it, 0.5 * (gait.value + following.value))
                 if stable:
@@ -122,6 +123,7 @@ class GaitBranch:
                 yield first, first.z + share * (second.z - first.z)
 
     def closes_on(self, flip: Bifurcation) -> list[bool]:
+        # An end counts as near a flip up to twice the distance to its neighbour on the branch.
         reach = (2.0 * np.ptp(values) + 1e-12 for values in (self.values[:2], self.values[-2:]))
         near = [bool(abs(end.value - flip.value) <= far) for end, far in zip(self.ends, reach, strict=True)]
         return [flip.kind == "flip" and end.closes and is_near for end, is_near in zip(self.ends, near, strict=True)]
