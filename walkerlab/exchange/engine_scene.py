@@ -22,7 +22,8 @@ from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.parts import assembly_of
 
-CREEP_LOAD = 0.1  # ratio of tangential to normal force of a standing foot; about the mean over a walk
+# ratio of tangential to normal force of a standing foot; about the mean over a walk
+CREEP_LOAD = 0.1
 
 
 @dataclass(frozen=True)

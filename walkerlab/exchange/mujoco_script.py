@@ -72,7 +72,7 @@ class Walk:
         # The time falls when somebody resets the walk, as in the viewer.
         if data.time < self.time_s:
             self.begin()
-        # MuJoCo's Runge-Kutta method calls back several times in a time step.
+        # A callback at the same time again, as from `mj_forward`, is no new time step.
         if data.time > self.time_s:
             self.time_s = data.time
             if data.ncon > 0:

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 
 BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
 SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
-GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # derivatives of a radau5 step are exact
+# The derivatives of a radau5 step are exact.
+GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)
 FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
 
 

@@ -23,7 +23,8 @@ from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
 SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # slopes to try in this order, relative to the config's slope
-COMMON_SLOPES = (0.03, 0.12)  # rad; most walkers that have gaits have them on these slopes
+# rad; most walkers that have gaits have them on these slopes
+COMMON_SLOPES = (0.03, 0.12)
 # rad; the steepest slope to which gaits are followed lies between these
 MIN_FOLLOWED_TO = 0.2
 MAX_FOLLOWED_TO = 0.35

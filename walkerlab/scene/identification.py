@@ -68,7 +68,8 @@ SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
-CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
+# Walk errors are near 1e-10, far below noise.
+CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)
 MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear

@@ -168,7 +168,8 @@ def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], mo
 
     if not suffices(most):
         return None
-    low, high = 0, most  # more steps never increase an error
+    # More steps never increase an error.
+    low, high = 0, most
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if suffices(middle) else (middle, high)

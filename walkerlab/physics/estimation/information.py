@@ -198,7 +198,7 @@ def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:
     losses = []
     for index in range(len(quantities)):
         noise = fitted.noise.measurement.copy()
-        # So noisy a quantity says nothing.
+        # With so much noise, the quantity contributes nothing.
         noise[index] *= 1e6
         without = evaluate(fitted.rows, fitted.noise._replace(measurement=noise)).information
         remaining = np.diag(basis @ marginalise(without, count) @ basis.T)

@@ -202,7 +202,8 @@ def ground_jacobian(system: OnGround, t: float, y: Any, J: Any) -> None:
         for j in range(2 * half):
             J[i, j], J[half + i, j] = 1.0 if j == i + half else 0.0, 0.0
     solve_motion(system, t, y, s, c, M, alpha)
-    for k in range(n):  # row k: angular accelerations due to a unit torque on body k
+    # row k: angular accelerations due to a unit torque on body k
+    for k in range(n):
         for l in range(n):
             by_torque[k, l] = 1.0 if k == l else 0.0
         solve_linked(form.E[0], n, M, by_torque[k])

@@ -14,7 +14,8 @@ from walkerlab.physics.kernels import kernel_part
 
 REMOTE_EDGE = 1e9  # m, further than any walk gets
 STANCE_FOOT = 1  # foot that carries the first step
-EVEN = np.zeros(1)  # writable, like unpickled arrays, because kernels would be compiled again for a read-only array
+# writable, like unpickled arrays, because kernels would be compiled again for a read-only array
+EVEN = np.zeros(1)
 
 
 class Terrain(NamedTuple):

@@ -46,7 +46,8 @@ EXPECTED_STEP = 3.0  # pendulum times; most steps are shorter
 # libraries' multistep methods. In the stability catalogue it is at most 9; the worst case is ground of 1e14 N/m.
 RESIDUAL_FACTOR = 100.0
 SET_STIFF = "set solver.contact.method to radau5."
-FINEST_RTOL = 1e-10  # rtol below which rounding, not the tolerance, determines the residual
+# rtol below which rounding, not the tolerance, determines the residual
+FINEST_RTOL = 1e-10
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,10 @@ from walkerlab.physics.solvers.stepping import BUDGET, RHS, clear_counts
 from walkerlab.physics.solvers.system import State
 
 STEPS_AT_ONCE = 64
-BUDGET_OF_A_STEP = 50_000  # evaluations of the right-hand side; the tightest tolerance needs about 700
-MAX_FRICTION = 1.0  # friction coefficient, about as for rubber on dry concrete
+# evaluations of the right-hand side; the tightest tolerance needs about 700
+BUDGET_OF_A_STEP = 50_000
+# friction coefficient, about as for rubber on dry concrete
+MAX_FRICTION = 1.0
 SAMPLES_PER_UNIT_TIME = 64  # the unit of time is sqrt(L/g)
 CLOSEST_SAMPLES = 1e-2  # fraction of the sampling interval; a sample closer to a heel strike is dropped
 

@@ -43,7 +43,8 @@ SLOT_OF_START, STEPS_TAKEN = 0, 1  # rows of `LaneMemory.slots`
 
 NOBODY = -1
 FIRST_LANE_STEP = 0.1  # pendulum times
-ARRIVAL_TIME = 1e-5  # pendulum times; a Taylor expansion bridges the time to a heel strike that is closer than this
+# pendulum times; a Taylor expansion bridges the time to a heel strike that is closer than this
+ARRIVAL_TIME = 1e-5
 STRIKE_REFINEMENTS = 6
 MAX_TRIES = 20_000  # attempted solver steps in one swing
 MIN_LANE_STEP = 1e-13  # pendulum times
@@ -59,7 +60,8 @@ class TwoLegs(NamedTuple):
     arm_x: tuple[float, ...]  # (2,)
     arm_y: tuple[float, ...]
     hip: SpringDamper
-    unpaired: float  # kg m^2; `unpaired` to `lean` are copies of the model's values, so that loops need not load them
+    # kg m^2; `unpaired` to `lean` are copies of the model's values, so that loops need not load them
+    unpaired: float
     mass: float  # kg
     radius: float  # m
     gravity_along: float  # m/s^2

@@ -63,7 +63,8 @@ class Observer(NamedTuple):
     times: Any  # (samples,) s, rising
     states: Any  # (samples, 2 n) and any tangent columns: derivatives at a fixed time since the last heel strike
     steps: Any  # (samples,) index of the step in which each sample lies
-    tally: Any  # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
+    # () array of RIGID_TALLY: passing a structured scalar to a kernel takes as long as a solver step
+    tally: Any
 
 
 def new_observer(times: Any, state_size: int) -> Observer:

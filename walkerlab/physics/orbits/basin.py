@@ -21,7 +21,8 @@ from walkerlab.physics.orbits.rigid_map import RigidStepper, state_on_section, s
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats, Integers
 
-RTOL, ATOL = 1e-6, 1e-8  # tolerances of walks in a basin; they cause errors of 1e-7 per step
+# tolerances of walks in a basin; they cause errors of 1e-7 per step
+RTOL, ATOL = 1e-6, 1e-8
 CYCLE_RTOL, CYCLE_ATOL = 1e-11, 1e-13  # tolerances of walks that determine attractors
 SECTION_SIZE = 3
 UNREACHED = -1  # attractor index of a walk that reaches no attractor

@@ -21,7 +21,8 @@ from walkerlab.physics.solvers.system import Floats
 
 Kind = Literal["fold", "flip", "torus"]
 BIFURCATION_KINDS: tuple[Kind, ...] = ("fold", "flip", "torus")
-NORMAL_FORM_STEP = 1e-3  # difference step for the normal form; coordinates are of magnitude one
+# difference step for the normal form; coordinates are of magnitude one
+NORMAL_FORM_STEP = 1e-3
 FORM_REFINEMENTS = 4
 FIRST_MULTIPLIER_DROP = 0.2  # 1 minus the multiplier at the first point of a new branch
 PAIR_TOLERANCE = 1e-4  # distance from the unit circle within which multipliers form a critical pair

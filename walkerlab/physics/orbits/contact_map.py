@@ -199,7 +199,8 @@ def step_from_section(
     """
     laid = ground
     start = state_on_section(walker, z, stance)
-    if ground.terrain.has_pads:  # the stance foot stands in the middle of a pad
+    # The stance foot stands in the middle of a pad.
+    if ground.terrain.has_pads:
         foothold = feet_motion(walker.whole, start)[stance].along
         lanes = (foothold + pitch_m, foothold) if stance == STANCE_FOOT else (foothold, foothold + pitch_m)
         laid = JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
@@ -387,7 +388,8 @@ class ContactMap(StepMap):
         Monitor("tripped", "1", "whether the swing foot trips on pads spaced by the gait's own step length", 0.5),
     )
     disturbs_after = 1
-    probe = 1e-6  # small compared with the penetration of stiff ground, which is below 0.01 mm
+    # small compared with the penetration of stiff ground, which is below 0.01 mm
+    probe = 1e-6
 
     def __init__(
         self,

@@ -133,7 +133,8 @@ def correct(
 @dataclass(frozen=True)
 class StepControl:
     first: float = 0.01  # arclength of the first step
-    shortest: float = 1e-9  # arclength; folds of long gaits are sharper than 1e-8
+    # arclength; folds of long gaits are sharper than 1e-8
+    shortest: float = 1e-9
     longest: float = 0.05  # arclength
     turn: float = 0.97  # cosine of the largest angle between the tangents of neighbouring points
     tolerance: float = 1e-12  # largest residual of the equations

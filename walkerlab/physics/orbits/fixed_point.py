@@ -46,7 +46,8 @@ from walkerlab.physics.solvers.system import Floats, State
 RANDOM_START = "random start"
 # rad, half the angle between the legs. On level ground, or from a random start, a smaller angle means standing still.
 SMALLEST_ANGLE = 1e-5
-ANGLE_NOISE = 1e-3  # relative to the angle between the legs at heel strike; samples do not resolve smaller angles
+# relative to the angle between the legs at heel strike; samples do not resolve smaller angles
+ANGLE_NOISE = 1e-3
 SAME_GAIT = 1e-5  # states with a smaller relative distance belong to the same gait
 # tolerances of steps during the search; gaits are solved with EXACT_STEPS
 SEARCH_TOLERANCES = Tolerances("dop853", 1e-7, 1e-10, 20_000)
@@ -57,11 +58,13 @@ MAX_GAIT_EVALUATIONS, SHORTEST_MOVE = 60, 2.0**-8  # limits of Newton's method
 # following a gait from a vanishing slope
 SLOPE_STRIDES = Strides(math.log(2.0), math.log(1.001), 3)  # in the logarithm of the slope's cube root
 FOLLOWING_EVALUATIONS = 20
-FOLLOWING_TOLERANCE = 1e-6  # relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
+# relative residual; cannot be tight, since a multiplier tends to 1 as the slope vanishes
+FOLLOWING_TOLERANCE = 1e-6
 # largest relative distance from the prediction; beyond it the gait belongs to another branch
 MAX_STATE_JUMP = 0.05
 MAX_PERIOD_JUMP = 0.02
-MAX_RETREATS = 5  # halvings of the seed's amplitude; the seed's error shrinks with the square of the amplitude
+# halvings of the seed's amplitude; the seed's error shrinks with the square of the amplitude
+MAX_RETREATS = 5
 # random starts: angle between the legs (rad), angular velocities (sqrt(g/L)) of swing and stance leg, and of a shank
 # whose knee was free at heel strike
 MIN_START = np.array([0.0, -1.0, -1.0, -1.0])

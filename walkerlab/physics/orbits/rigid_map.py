@@ -68,7 +68,8 @@ MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 KEPT_METHODS = 4  # one for each number of tangent columns
 LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples count as at this time
-SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
+# in sqrt(L/g); a shorter step means standing still, which is also a fixed point
+SHORTEST_STEP = 0.05
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
 NO_RESIDUAL = 1e300

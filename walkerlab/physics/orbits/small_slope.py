@@ -37,9 +37,11 @@ LONG_PERIOD = "long-period seed"
 SHORT_PERIOD = "short-period seed"
 SCAN = 400  # number of samples that bracket a root
 LOSS_ANGLE = 1e-3  # rad, small compared to one and large compared to rounding errors
-LONG_AMPLITUDE = 0.05  # rad, angle between the legs at which the long-period seed is accurate to a percent
+# rad, angle between the legs at which the long-period seed is accurate to a percent
+LONG_AMPLITUDE = 0.05
 SHORT_AMPLITUDE = 0.002
-MAX_GROWTH = 30.0  # largest exponent of growth while falling for half a step; above it, rounding errors swamp the start
+# largest exponent of growth while falling for half a step; above it, rounding errors swamp the start
+MAX_GROWTH = 30.0
 # matrices for a slope of 1 rad: STATE_OF turns (z, 1) into the state, SECTION_ROWS (z, 1) into z, and FEET_DOWN the
 # state into theta_1 + theta_2
 STATE_OF = np.array([[-1.0, 0.0, 0.0, -2.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
