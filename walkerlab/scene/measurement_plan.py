@@ -108,8 +108,9 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     touches = np.append(0.0, np.cumsum(walk.durations_s[steps]))
     times = np.arange(0.0, touches[-1], 1.0 / plan.rate_hz)
     angles = walks.sample_legs(subject.z, family.start, level, times)  # type: ignore[arg-type]
-    of_steps = MeasuredWalk(walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps])
-    return of_steps, split_into_steps(times, angles, touches)
+    quantities = walk.durations_s[steps], walk.lengths_m[steps], walk.angles_rad[steps]
+    of_steps = MeasuredWalk(*quantities, first_leg=subject.first_leg)
+    return of_steps, replace(split_into_steps(times, angles, touches), first_leg=subject.first_leg)
 
 
 @dataclass(frozen=True, eq=False)

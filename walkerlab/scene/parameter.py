@@ -130,9 +130,7 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    # `identify` does not support legs that differ; all others may vary a key that leg 2 takes from leg 1.
-    left_out = SECOND_LEG in key.split(".") and asker[:1] != ("identify",)
-    reason = why_no_parameter(key, config, own, stated_value if left_out else value_at)
+    reason = why_no_parameter(key, config, own, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
     unit = annotation_of(own[key], "unit") or "1"

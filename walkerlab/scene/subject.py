@@ -58,6 +58,12 @@ class ModelUnderTest:
         ]
 
     @property
+    def first_leg(self) -> int:
+        """Leg (1 or 2) that swings in the first complete step from the gait's section."""
+        # On the contact model's section leg 1 has begun its swing, so the first complete step is that of leg 2.
+        return 1 if self.model == RIGID else 2
+
+    @property
     def units(self) -> Units:
         return unit_walker(rigid_walker(self.config))[1]
 

@@ -43,6 +43,8 @@ KEPT_PREDICTIONS: Final = 16
 class WalkMap(Protocol):
     """Walks of a family of walkers from the section. Like `step_map.StepMap`, but with several parameters."""
 
+    stride: int  # number of steps after which the map repeats: 2 for legs that differ
+
     def step(self, z: Floats, p: Any) -> MappedStep:
         """Take a step from z (d,), with its derivative."""
 

@@ -259,6 +259,7 @@ def walk_from_section(
     stance: int = STANCE_FOOT,
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
+    first_stance = stance
     start = state_on_section(walker, z, stance)
     steps = heights.size - 1
     walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1, stance)
@@ -285,25 +286,43 @@ def walk_from_section(
     touched = int(walk_state.progress.steps)
     times = walk_state.touch_time[:touched]
     along = walk_state.touch_along[:touched]
-    angles = touch_angles(walker, ground.frame.leg_length, np.diff(along), np.diff(walk_state.touch_height[:touched]))
+    angles = touch_angles(walker, first_stance, np.diff(along), np.diff(walk_state.touch_height[:touched]))
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(along), angles, z)
 
 
-def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
-    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above."""
-    apart = 0.5 * np.hypot(along, up) / leg_length
-    return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
+def leg_lengths(walker: ContactWalker) -> Floats:
+    """Return the lengths (2,) of the straight legs from hip to sole (m)."""
+    levers = walker.whole.foot_y
+    below_hip = [(levers[1 - k] - levers[k])[np.unique(walker.legs[k])].sum() for k in range(2)]
+    return np.asarray(walker.whole.radius + below_hip)
+
+
+def touch_angles(walker: ContactWalker, foot: int, along: Floats, up: Floats) -> Floats:
+    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above.
+
+    foot  the first to land, after which the feet take turns
+    """
+    apart = np.hypot(along, up)
+    lengths = leg_lengths(walker)[np.add.outer((foot, 1 - foot), np.arange(apart.size)) % 2]
+    ahead = 0.5 * (apart + (lengths[0] ** 2 - lengths[1] ** 2) / apart) / lengths[0]
+    return np.asarray(np.arcsin(np.clip(ahead, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
 
 def sample_legs_from_section(
-    walker: ContactWalker, ground: JudgedGround, tolerances: Tolerances, z: Floats, heights: Floats, times: Floats
+    walker: ContactWalker,
+    ground: JudgedGround,
+    tolerances: Tolerances,
+    z: Floats,
+    heights: Floats,
+    times: Floats,
+    stance: int = STANCE_FOOT,
 ) -> Floats:
     """Sample angles (times, 2) in `walk_from_section`, first stance leg first. Times (s) count from the section."""
-    start = state_on_section(walker, z, STANCE_FOOT)
-    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, heights.size)
+    start = state_on_section(walker, z, stance)
+    walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, heights.size, stance)
     observer = new_observer(walker, walk_state, start, times, track_energy=False)
     walk_on(walker, tolerances, walk_state, observer, start, NO_LIMIT)
-    legs = [ANGLES + walker.legs[foot][0] for foot in (STANCE_FOOT, 1 - STANCE_FOOT)]
+    legs = [ANGLES + walker.legs[foot][0] for foot in (stance, 1 - stance)]
     return np.asarray(observer.samples.states[:, legs])
 
 
@@ -398,8 +417,12 @@ class ContactMap(StepMap):
         tolerances: Tolerances,
         step_length_m: float,
         like: WalkerOnGround,
+        first: int = 0,
     ) -> None:
-        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` sets the units."""
+        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` sets the units.
+
+        first  leg that swings in even steps: 0 for leg 1, 1 for leg 2
+        """
 
         @lru_cache(CACHE_SIZE)
         def site_at(p: float) -> WalkerOnGround | None:
@@ -412,18 +435,22 @@ class ContactMap(StepMap):
         self.scale = scale
         self.tolerances = tolerances
         self._on_pads = like.ground.terrain.has_pads
-        angled = angled_bodies(like.walker, STANCE_FOOT)
-        turning = turning_bodies(like.walker, STANCE_FOOT)
+        self._first = first
+        angled = angled_bodies(like.walker, self._stance(0))
+        turning = turning_bodies(like.walker, self._stance(0))
         rates = (f"rate_{body}" for body in turning)
         self.names = ("height", *(f"angle_{body}" for body in angled), "along_rate", "height_rate", *rates)
-        self._units = [section_units(like, stance_of(swing)) for swing in range(2)]
+        self._units = [section_units(like, self._stance(swing)) for swing in range(2)]
+
+    def _stance(self, swing: int) -> int:
+        return stance_of(self._first + swing)
 
     def scale_section(self, z: Floats) -> Floats:
         return np.asarray(z / self._units[0])
 
     def _walk(self, site: WalkerOnGround, z: Floats, derived: bool, swing: int = 0) -> SectionStep:
         pitch_m = site.ground.terrain.pitch
-        stance = stance_of(swing)
+        stance = self._stance(swing)
         z_m = z * self._units[swing % 2]
         return step_from_section(site.walker, site.ground, self.tolerances, z_m, pitch_m, derived, stance)
 
@@ -459,21 +486,22 @@ class ContactMap(StepMap):
         site = valid(self._at(p))
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         scene = (site.walker, site.ground, endless)
-        walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, stance_of(swing))
+        walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, self._stance(swing))
         # If the sections of both legs differ in size, the size tells which leg stands. Otherwise they have the same
         # units.
         return replace(walk, z=walk.z / next(units for units in self._units if units.size == walk.z.size))
 
     def rest_on_ground(self, z: Floats, p: float) -> Floats:
         site = self._at(p)
-        return z if site is None else stand(site.walker, z * self._units[0], STANCE_FOOT) / self._units[0]
+        return z if site is None else stand(site.walker, z * self._units[0], self._stance(0)) / self._units[0]
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
         site = valid(self._at(p))
         touch = self.step(z, p, derived=False)
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         times = times_s + touch.strike_s
-        return sample_legs_from_section(site.walker, site.ground, endless, z * self._units[0], heights_m, times)
+        start = z * self._units[0]
+        return sample_legs_from_section(site.walker, site.ground, endless, start, heights_m, times, self._stance(0))
 
     def cost_of_transport(self, z: Floats, p: float) -> float | None:
         stride = walk_steps(self, z, p, self.stride, derived=False)

@@ -133,6 +133,15 @@ def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] 
     return stance * straight[:, STANCE] + swing * straight[:, SWING], straight[:, STANCE] + rate * straight[:, SWING]
 
 
+def section_basis(section: StrikeSection, z: Floats) -> Floats:
+    """Return the derivatives (d, 2 n) of the state with respect to the section coordinates at z (d,)."""
+    if section.curved is None:
+        return np.asarray(section.basis)
+    basis = np.array(section.basis)
+    basis[0, : basis.shape[1] // 2] = valid(angles_on_slope(section.curved, float(z[0])))[1]
+    return basis
+
+
 def state_on_section(walker: RigidModel, z: Any) -> State:
     """Return the state (2 n) at section coordinates z (d,)."""
     return tuple(states_on_section(walker, z).tolist())
@@ -469,28 +478,29 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return None
-        walker, units, (d, m), steps = unit.walker, unit.units, unit.section.basis.shape, heights_m.size - 1
+        units, (d, m), steps = unit.units, unit.section.basis.shape, heights_m.size - 1
         rises, nearest = unit.floor(z, heights_m)
         walk = self._exact.walk(unit.section, z, steps, False, (rises, nearest))
         if walk.outcome is not Outcome.WALKED:
             return None
-        starts = np.vstack((state_on_section(walker, z), walk.strikes.after))
+        starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
         # Not at the start, whose changes are columns of `along`, nor after the last step.
-        kicks = [unit_kicks(unit, start) for start in starts[1:-1]] if kicked else []
+        kicks = [unit_kicks(*unit.swinging(step), starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
         count = along.shape[1] + sum(map(len, kicks))
         lifts = np.zeros((steps + 1, count))
         lifts[:, :given] = np.diff(along[d:], axis=0, prepend=along[d : d + 1]) / units.length
         columns = np.zeros((count, m))
         since = np.zeros(count)
-        columns[:given] = along[:d].T @ unit.section.basis
+        columns[:given] = along[:d].T @ section_basis(unit.section, z)
         of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
         parts = list[tuple[Floats, ...]]()
         for step, start in enumerate(starts[:-1]):
+            walker, section = unit.swinging(step)
             room = LAST_SAMPLE * (touches[step + 1] - touches[step])
             times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
-            tangents = self._exact.differentiate(unit.section, start, (rises[step : step + 2], nearest), times)
+            tangents = self._exact.differentiate(section, start, (rises[step : step + 2], nearest), times)
             if tangents is None:
                 return None
             moved = np.column_stack((columns, lifts[step + 1]))
@@ -587,15 +597,15 @@ def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
     return np.where(swaps, angles[..., ::-1], angles)
 
 
-def unit_kicks(unit: SimilarWalker, start: Floats) -> Floats:
+def unit_kicks(walker: RigidModel, section: StrikeSection, start: Floats) -> Floats:
     """Return independent changes (kicks, 2 n) of the rates in a state (2 n,) just after heel strike.
 
     Normal numbers times these change the rates with covariance s^2 M^-1, M the mass matrix of the rates that are free
     there. s makes such a change as large as the rates, on average.
     """
-    free = unit.section.basis[1:]
-    rates = coordinates_of(unit.walker, start)[1:]
-    M = free[:, start.size // 2 :] @ mass_matrix(unit.walker, start) @ free[:, start.size // 2 :].T
+    free = section.basis[1:]
+    rates = coordinates_of(walker, start)[1:]
+    M = free[:, start.size // 2 :] @ mass_matrix(walker, start) @ free[:, start.size // 2 :].T
     kicks = np.linalg.inv(np.linalg.cholesky(M))
     return np.asarray(np.linalg.norm(rates) / np.linalg.norm(kicks) * kicks @ free)
 
