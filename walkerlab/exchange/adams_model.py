@@ -432,7 +432,7 @@ def friction_function(leg: str, law: Coulomb) -> str:
     slip = f"VARVAL({{{leg}_slip}})"
     normal = f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = map(finite, law)
-    # Beyond v the rise stays at mu or -mu, and the second STEP takes off what is lost down to the dynamic coefficient.
+    # Beyond v the rise stays at mu or -mu, and the second STEP adds the fall to the dynamic coefficient.
     rise = f"STEP({slip},-{v},-{mu},{v},{mu})"
     return f"-{normal}*({rise}+SIGN(1,{slip})*(STEP(ABS({slip}),{v},{mu},{w},{less})-{mu}))"
 

@@ -114,7 +114,7 @@ class Walk:
         """Push a foot towards the hip. `share` is the elapsed fraction of the pulse."""
         point = self.data.geom_xpos[foot] - self.model.geom_size[foot, 0] * self.up
         line = self.data.xanchor[self.hip.id] - point
-        # Each foot walks in a lane beside the hip's plane, but the push acts in that plane.
+        # Each foot walks in a lane to one side of the hip, but the push acts in the plane of the walk.
         line[1] = 0.0
         force = 30.0 * (share * (1.0 - share)) ** 2 * impulse / self.duration * line / np.linalg.norm(line)
         body = self.model.geom_bodyid[foot]

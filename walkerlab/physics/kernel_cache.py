@@ -209,9 +209,9 @@ def cache_folder() -> Path:
         folder.mkdir(0o700, exist_ok=True)
     else:
         folder.mkdir(0o700, exist_ok=True)
-        # Only a new folder can exceed the number of folders to keep.
+        # Only a new folder can make them too many.
         _remove_unused(list(root.glob(f"kernels-*-{host}")))
-    # `_remove_unused` takes the time of the last change for that of the last use.
+    # `_remove_unused` reads the time of the last use from the folder's time of change.
     os.utime(folder)
     return folder
 

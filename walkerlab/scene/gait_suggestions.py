@@ -55,7 +55,7 @@ def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
     span = ValueSpan(0.02 * slope, min(MAX_FOLLOWED_TO, max(3.0 * slope, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
     for value in (*(factor * slope for factor in SLOPE_FACTORS), *COMMON_SLOPES):
-        # A search takes long, so the first stable gaits end it.
+        # A search is slow, so it stops at the first stable gaits.
         if value in span and not any(candidate.stable for candidate in ranges):
             ranges += walkable_ranges(follow(SLOPE.vary(config, rigid_walker), span, value))
     return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, slope)), default=None)
@@ -142,7 +142,7 @@ def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
 def feet_ahead(config: Config) -> tuple[float, ...]:
     if not isinstance(config.walker, Kneed):
         return ()
-    # Rounded as in the suggested command, which so gives the same gait.
+    # Rounded as in the suggested command, so that the command gives the same gait.
     return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FOOT_SHARES)
 
 

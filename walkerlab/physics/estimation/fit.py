@@ -195,7 +195,7 @@ def fit(problem: FitProblem, start: Floats, on_round: Callable[[], None] = lambd
         if forecast.walks_taken > problem.max_walks:
             end = FitEnd.OUT_OF_WALKS
             break
-    # The result deserves exact derivatives. Where a slightly changed walk ends early, those of the search must do.
+    # The errors follow from these derivatives, so they are exact unless a slightly changed walk ends early.
     data = linearise(problem, u, disturbances, True, robust) or linearise(problem, u, disturbances, robust=robust)
     predicted = forecast.predict(u, even)
     if data is None or predicted is None:
@@ -232,7 +232,7 @@ def reduce_heights(problem: FitProblem, u: Floats, heights: Floats) -> Floats:
 def average_noise(before: Noise, after: Noise) -> Noise:
     """Return the geometric mean of two measurement noises and the arithmetic mean of two process noises."""
     measurement = np.sqrt(before.measurement * after.measurement)
-    # A standard deviation of the disturbances may be zero, where a geometric mean would stay.
+    # A disturbance may have a standard deviation of zero, and a geometric mean would then stay at zero.
     return Noise(measurement, *(0.5 * (before.process + after.process)).tolist())
 
 

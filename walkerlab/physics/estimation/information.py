@@ -124,7 +124,7 @@ def averaged_covariance(fitted: Fitted, basis: Floats) -> Floats:
     drawn = evaluate_at(logs)
     inverses = np.linalg.pinv(basis @ marginalise(drawn.information, count) @ basis.T, hermitian=True)
     moved = drawn.move[:, :count] @ basis.T
-    # Law of total variance: the estimate moves with the standard deviations, too.
+    # Law of total variance: the estimate itself moves with the standard deviations.
     covariances = inverses + moved[:, :, None] * moved[:, None, :]
     weights = np.exp(drawn.restricted - drawn.restricted.max())
     return np.asarray(np.tensordot(weights / weights.sum(), covariances, 1))

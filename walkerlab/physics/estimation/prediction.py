@@ -208,7 +208,7 @@ class Forecast:
 
         if exact:
             return derivative(values, SAMPLED_STEP if self.measured.sampled else EXACT_STEP)
-        # During the search, one-sided differences do, at the cost of one walk.
+        # During the search, differences are one-sided: they cost one walk instead of two.
         here = values(0.0)
         ahead = values(QUICK_STEP)
         return None if here is None or ahead is None else (ahead - here) / QUICK_STEP

@@ -201,7 +201,7 @@ class Recorder:
         seen = new_heel_strikes(steps, self.numbers, self.kneed, rises, self.nearest)
         times = np.zeros(0)
         if self.sampled:
-            # enough if every step takes as long as a swing may take
+            # Enough samples even if every step takes the longest time that a swing may take.
             room = math.ceil(steps * LONGEST_SWING * SAMPLES_PER_UNIT_TIME) + 1
             # Each block of steps starts at a time of zero.
             times = self.interval * np.arange(self.grid_index, self.grid_index + room, dtype=np.float64) - self.time
@@ -224,7 +224,7 @@ class Recorder:
         before = seen.before[:taken]
         after = seen.after[:taken]
         knees = np.where(seen.knee_time < 0.0, np.nan, seen.knee_time + self.time)
-        # No knee strikes in the steps in which a leg without a knee swings.
+        # There are no knee strikes in steps in which a leg without a knee swings.
         for k, shank in enumerate(self.models["shank"]):
             knees[k :: self.models.size] = knees[k :: self.models.size] if shank != NO_SHANK else np.nan
         if self.sampled:
@@ -320,7 +320,7 @@ class Recorder:
             foothold_height_m=None if self.heights is None else self.heights[1 : self.steps + 1],
             driven=driven,
             energy_balance_residual=residual,
-            # `strike_loss` is what the strikes lose after the push-offs' work has made up for part of it.
+            # `strike_loss` is the loss minus the work of the push-offs.
             lost_in_strikes=float(self.tally.strike_loss) + driven.push_off,
             start=self.start,
             before=before,

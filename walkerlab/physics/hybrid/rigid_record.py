@@ -108,7 +108,7 @@ def observe_strike(observer: Observer, mode: Mode, following: RigidModel, heel: 
                 push = push_off(model, after)
                 along = along - push.along
                 impulse = impulse - push.upward
-                # The push-off acts on the trailing foot, which needs friction for it, too.
+                # The push-off acts on the trailing foot, which also needs friction for it.
                 tally.max_impulse_ratio = max(tally.max_impulse_ratio, abs(push.along) / push.upward)
             tally.strike_loss += tally.step_strike_loss
             tally.forward_work += tally.step_forward_work
@@ -181,7 +181,7 @@ def refine_maximum(
         middle += shift * spacing
         keep_worst(tally, assumptions_at(method, mode, middle))
         spacing *= 0.125
-        # The next three points must lie in the solver step, too.
+        # The next three points must also lie in the solver step.
         middle = min(max(middle, spacing), last - spacing)
 
 

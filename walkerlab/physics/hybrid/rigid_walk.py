@@ -215,7 +215,7 @@ def swing_phase(
         status = advance(method, system, limit)
         if status != STEP_DONE:
             return endings.BUDGET_EXHAUSTED if status == OUT_OF_BUDGET else endings.SOLVER_FAILED
-        # The way to a located event was searched and observed before the solver step was rewound.
+        # The interval up to a located event was searched and observed before the solver step was rewound.
         if coming:
             continue
         near = may_end(system, method, at_start)

@@ -65,7 +65,7 @@ def levers(assembly: Assembly, root: Anchor, point: Anchor) -> Floats:
     d = np.zeros((len(assembly.bodies), 2))
     here = np.array(root.at_m)
     for body, leaving, entering in path(assembly, root.body, point.body):
-        # The lever of a body on the way runs from where the way enters it to where it leaves it.
+        # A body's lever runs from the point where the path enters the body to the point where it leaves it.
         d[assembly.index(body)] += np.array(leaving) - here
         here = np.array(entering)
     d[assembly.index(point.body)] += np.array(point.at_m) - here

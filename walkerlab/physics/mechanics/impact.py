@@ -103,7 +103,7 @@ def strike(before: RigidModel, model: RigidModel, phase: int, y: Any, new: Any) 
             twist = push.by_trailing * new[at + SWING] + push.by_leading * new[at + STANCE]
         turn = new[at : at + n]
         rate = new[at + n : at + 2 * n]
-        # Z^T M (u+ - u) = 0 holds for neighbouring angles, too. Its change contains Z^T dM (u+ - u), where Z is
+        # Z^T M (u+ - u) = 0 also holds for neighbouring angles. Its change contains Z^T dM (u+ - u), while Z is
         # constant.
         mass_change(model, s, c, turn, jump, jump_along, jump_upward, turned)
         project(model, constraints, rate, along, upward, twist, turned, p)
@@ -179,7 +179,7 @@ def push_off(model: RigidModel, new: Any) -> PushOffImpulse:
     # The impulse passes through the hip; this is its moment about the leading leg's contact point.
     angular = share * (x_l * y_t - y_l * x_t)
     # Turning a leg moves the hip about the arc's centre, which is R above the contact point: dx = -(y - R), dy = x.
-    # With R > 0 the length of the trailing line changes, too.
+    # With R > 0 the length of the trailing line also changes.
     by_trailing = share * (x_l * x_t + y_l * (y_t - R_t)) - angular * x_t * R_t / (length * length)
     by_leading = -share * ((y_l - R_l) * y_t + x_l * x_t)
     return PushOffImpulse(share * x_t, share * y_t, angular, by_trailing, by_leading)

@@ -86,7 +86,7 @@ def locate_bifurcation(segment: Segment[Cycle], kind: Kind, scale: float) -> Bif
     multipliers = point.evaluated.data.multipliers
     if kind == "torus":
         on_circle = [m for m in multipliers if m.imag > 0.0 and abs(abs(m) - 1.0) < PAIR_TOLERANCE]
-        # Two real multipliers with product one satisfy the test, too: a saddle, not a bifurcation.
+        # Two real multipliers with product one also satisfy the test. They belong to a saddle, not to a bifurcation.
         if not on_circle:
             return None
         multiplier = complex(on_circle[0])

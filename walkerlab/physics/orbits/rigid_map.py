@@ -485,7 +485,7 @@ class RigidMap(StepMap):
             return None
         starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
-        # Not at the start, whose changes are columns of `along`, nor after the last step.
+        # There are no kicks at the start, whose changes are columns of `along`, nor after the last step.
         kicks = [unit_kicks(*unit.swinging(step), starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
         count = along.shape[1] + sum(map(len, kicks))

@@ -159,7 +159,7 @@ def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> t
 def largest_survived(stands: Callable[[float], bool], unit: float, width: float = BISECTION_WIDTH) -> float:
     """Return the size up to which every disturbance is survived, at most MAX_DISTURBANCE times `unit`."""
     steps = round(MAX_DISTURBANCE / SEARCH_GRID)
-    # From the smallest size on, so that all sizes below the result are survived.
+    # Sizes are tried from the smallest on, so that all sizes below the result are survived.
     low = next((k - 1 for k in range(1, steps + 1) if not stands(k * SEARCH_GRID * unit)), steps)
     if low == steps:
         return MAX_DISTURBANCE * unit

@@ -189,7 +189,7 @@ def short_period_seed(walker: RigidModel, modes: Modes, longest: float) -> Small
         return None
     slope = 0.5 * SHORT_AMPLITUDE / float(z[0] + 1.0)
     per_angle = 0.5 * (z + THETA_2) / (z[0] + 1.0)
-    # With hardly any mass at the feet the cube root holds already at this amplitude.
+    # With hardly any mass at the feet, the cube-root law already holds at this amplitude.
     if slope_for_loss(walker, per_angle) * SHORT_AMPLITUDE**3 > slope:
         return cube_root_seed(SHORT_PERIOD, walker, per_angle, period)
     return SmallSlopeSeed(SHORT_PERIOD, slope, slope * z, period, np.zeros(3))

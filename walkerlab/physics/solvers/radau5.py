@@ -202,8 +202,8 @@ def solve_stages(method: Radau5, system: Any, t: float, h: float) -> int:
             rate = size / size_old
             if rate >= 0.99:
                 return 0
-            # Predicted size of what is left after the last allowed iteration. It is useless to go on if that is too
-            # large.
+            # Predicted size of the correction that remains after the last allowed iteration. If it is too large, more
+            # iterations are useless.
             ahead = rate ** (MAX_NEWTON - iteration) / (1.0 - rate) * size
             if ahead > 10.0 * tolerance:
                 return 0
