@@ -113,6 +113,7 @@ def scene_on_pads(
             raise NoAnswer(f"no contact gait to lay the pads for: {search.reason}", search.advice)
         pitch = float(search.gait.lengths_m.mean())
         if len(search.gait.steps) > 1:
+            # Pads lie where the feet touch, and these distances differ from those between sections.
             first, second = lengths_between_touches(search.gait)
             asymmetry = float((second - first) / pitch)
     return contact_scene(config, rigid_step, pitch, asymmetry)

@@ -121,6 +121,7 @@ def add_strike_samples(motion: Motion) -> Motion:
     ]
     for strike in motion.knee_strikes:
         index = np.searchsorted(motion.time, strike)
+        # Extrapolation from both sides needs three samples on each.
         if 3 <= index <= motion.time.size - 3 and strike not in motion.time:
             added += [(strike - side, slice(index - 3, index)), (strike, slice(index, index + 3))]
     strikes = np.concatenate((motion.step_ends, motion.knee_strikes))

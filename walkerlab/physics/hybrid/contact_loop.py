@@ -150,6 +150,7 @@ def approach(
 ) -> EventSearch:
     """Shorten the solver step from `start` to `end` (s) to end at its event, or accept it if it already does."""
     latest = search.latest if search.approaching else end
+    # If another event comes first now, its refinements count from zero.
     refinements = search.refinements if search.approaching and event == search.event else 0
     # A solver step cannot have length zero.
     wait = max(fraction * (end - start), EVENT_TIME)
@@ -203,6 +204,7 @@ def confirm(search: EventSearch, start: float, wait: float) -> EventSearch:
     target = search.target + wait
     refinements = search.refinements + 1
     rewinds = search.rewinds + 1
+    # The event cannot lie beyond the solver step in which it first appeared.
     if not occurs and doubtful and start < target <= search.latest:
         return EventSearch(
             target,
@@ -273,6 +275,7 @@ def jumps_at_touch(system: OnGround) -> bool:
 def deadline(system: OnGround, walk_state: WalkState, t: float) -> float:
     """Compute the time (s) at which the step or a flight gets too long or the push-off ends, whichever is first."""
     by_step, by_flight = time_limits(walk_state)
+    # A rest shorter than the accuracy of event times counts as over.
     left = pulse_left(system, t)
     return min(by_step, by_flight, t + left) if left > EVENT_TIME else min(by_step, by_flight)
 
@@ -295,6 +298,7 @@ def time_to_zero(method: Any, finder: CrossingFinder, event: int) -> float:
     if change == 0.0:
         return 0.0
     wait = -finder.values[event, last] * span / change
+    # A function that hardly changes would send the target far away.
     return max(-0.5 * h, min(0.5 * h, wait))
 
 

@@ -245,6 +245,7 @@ class Recorder:
         zeros = compute_in_turns(self.walker, np.arange(touched.size), energy_at_touch, touched)
         if self.tally.duration == 0.0:
             return float(sum(energies(self.walker, self.start)) - zeros[0])
+        # The last duration is that of a swing without a heel strike.
         durations = np.diff(strikes, prepend=0.0, append=max(float(self.tally.duration), self.time))
         return float((self.tally.energy_integral - zeros @ durations) / float(self.tally.duration))
 

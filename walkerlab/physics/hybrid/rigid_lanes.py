@@ -248,6 +248,7 @@ def try_steps(walker: TwoLegs, memory: LaneMemory) -> bool:
     pendulum_time = walker.pendulum_time
     stuck = max(tries - MAX_TRIES, MIN_LANE_STEP * pendulum_time - abs(h))
     attention = max(may_end(walker, y, end, h), over, load_lanes(rows, ARRIVALS))
+    # A rejected solver step needs no attention: the lane tries a shorter one next.
     event = choose(stuck, 1.0, choose(accepted, choose(attention, 1.0, 0.0), 0.0))
     quiet = choose(event, 0.0, accepted)
     for i in range(4):

@@ -161,6 +161,7 @@ def step_along(
         point = correct(equations, guess, last.tangent, control.tolerance)
         if isinstance(point, CurvePoint):
             correction = float(np.linalg.norm(point.x - guess))
+            # A sharp turn or a long correction may lead to another branch.
             if point.tangent @ last.tangent > control.turn and correction < 0.5 * length and acceptable(point):
                 longer = 1.6 if point.corrections <= FEW_CORRECTIONS else 1.0
                 return point, min(control.longest, longer * length)

@@ -290,6 +290,7 @@ class SlopeBranch:
         gait is lost.
         """
         s = float(np.cbrt(slope))
+        # Below the seed's slope, a guess between the limit and the seed is good enough to start there.
         follower = self.seed_follower if s > np.cbrt(self.seed.slope) else self.start_follower(s)
         if follower is None:
             return 0.0, None

@@ -368,6 +368,7 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
             solve(system, memory.pivots, move, 0, d)
         else:
             share *= 0.5
+            # The start itself leads to no step.
             if least == NO_RESIDUAL or share < SMALLEST_MOVE:
                 return NO_GAIT
         for i in range(d):
