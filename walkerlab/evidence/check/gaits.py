@@ -12,6 +12,7 @@ import numpy as np
 
 from walkerlab.config.check import Instant
 from walkerlab.config.reads import RigidConfig
+from walkerlab.config.second_leg import describe_second_leg
 from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
 from walkerlab.evidence.check.conventions import Convention, state_at
 from walkerlab.evidence.check.plain_walker import (
@@ -47,7 +48,7 @@ SLOW_RATIO = 0.1  # ratio of successive errors above which the derivative is com
 
 def why_not_plain(config: RigidConfig) -> str:
     """Explain why the plain model does not describe a config's walker, or return '' if it does."""
-    if getattr(config.walker, "leg_2", None) is not None:
+    if describe_second_leg(config.walker):
         return "the plain model has two equal legs"
     if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
         return "the plain model has no walkers of type parts"
