@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Any
 
@@ -58,44 +58,34 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
     """Build the plain model of a config's walker, or of a changed one on its slope."""
     walker = changed or config.walker
     assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
-    radius = walker.foot_radius_m
-    ahead = getattr(walker, "foot_centre_ahead_m", 0.0)
-    knee = 0j
-    damping = 0.0
-    free = False
-    if isinstance(walker, CompassWalker):
-        # the compass rolls on its ball feet in the contact model only
-        radius = 0.0
-        centre = -1j * walker.mass_to_hip_m
-        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART)
-    elif isinstance(walker, StraightLegs):
-        centre = walker.leg_mass_ahead_m - 1j * walker.leg_mass_below_hip_m
-        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART)
-    else:
-        thigh = walker.thigh
-        shank = walker.shank
-        knee = -1j * walker.thigh.length_m
-        upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
-        lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
-        parts = (upper, lower)
-        free = walker.knee.at_heel_strike == "free"
-        damping = walker.knee.damping_N_m_s_per_rad
+    # the compass rolls on its ball feet in the contact model only
+    radius = 0.0 if isinstance(walker, CompassWalker) else walker.foot_radius_m
     torso = walker.torso
-    return PlainWalker(
-        parts=parts,
-        knee=knee,
+    plain = PlainWalker(
+        parts=(NO_PART, NO_PART),
+        knee=0j,
         hip_mass=walker.hip_mass_kg,
-        foot=ahead - 1j * (walker.leg_length_m - radius),
+        foot=getattr(walker, "foot_centre_ahead_m", 0.0) - 1j * (walker.leg_length_m - radius),
         radius=radius,
         gravity=config.gravity_m_s2,
         slope=config.slope_rad,
         torso=NO_PART if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
         hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
         push_off=config.push_off.impulse_N_s,
-        free_at_strike=free,
-        knee_damping=damping,
         signs={(STRAIGHT, STANCE, SWING): -1.0} if config.equations == "as-printed" else {},
     )
+    if not isinstance(walker, Kneed):
+        below = walker.mass_to_hip_m if isinstance(walker, CompassWalker) else walker.leg_mass_below_hip_m
+        centre = getattr(walker, "leg_mass_ahead_m", 0.0) - 1j * below
+        return replace(plain, parts=(LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART))
+    thigh = walker.thigh
+    shank = walker.shank
+    upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
+    lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
+    free = walker.knee.at_heel_strike == "free"
+    damping = walker.knee.damping_N_m_s_per_rad
+    knee = -1j * thigh.length_m
+    return replace(plain, parts=(upper, lower), knee=knee, free_at_strike=free, knee_damping=damping)
 
 
 def scales(walker: PlainWalker, size: int) -> Floats:
@@ -125,41 +115,33 @@ def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tu
     A  derivative of the step map of a similar walker, with which the search begins
     """
     unit = scales(walker, len(start))
-    identity = np.eye(len(start))
-    x, last, is_own = np.array(start, float), math.inf, False  # whether A is this walker's own derivative
-    old = error = x
-    move = np.zeros(len(x))
+    best: tuple[Floats, PlainStep] | None = None
+    x: Floats = np.array(start, float)
+    last = math.inf
+    is_own = False  # whether A is this walker's own derivative
     for _ in range(MAX_MOVES):
         step = walker.step(x)
         size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
-        if step is not None and size < SMALLEST_MOVE:
-            break
         if step is not None and size < last:
+            best = x, step
+            if size < SMALLEST_MOVE:
+                return best
             slow = size > SLOW_RATIO * last
             last = size
-            old = x
-            error = step.after - x
-        elif last == math.inf:
-            return None
-        elif last < MAX_RESIDUAL:
-            step = walker.step(old)
-            return None if step is None else (old, step)
+        elif best is None or last < MAX_RESIDUAL:
+            return best
+        elif is_own:
+            x = 0.5 * (x + best[0])
+            continue
         else:
-            slow = not is_own
-            move = 0.5 * move
-            x = old - move
-            if not slow:
-                continue
+            slow = True
         if A is None or slow:
-            A = derivative(walker, old, 1e-10)
+            A = derivative(walker, best[0], 1e-10)
             is_own = True
             if A is None:
                 return None
-        move = np.linalg.solve(A - identity, error)
-        x = old - move
-    else:
-        return None
-    return x, step
+        x = best[0] - np.linalg.solve(A - np.eye(len(x)), best[1].after - best[0])
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,33 +185,27 @@ class CheckedStep:
 
     def values(self, items: Sequence[Item], convention: Convention) -> dict[str, complex | None]:
         """Return the right value of each printed number in the printed conventions, or None if the models lack it."""
+        instants = {"state": convention.instant, "state_before": BEFORE}
         values: dict[str, complex | None] = {}
-        factor = convention.rate_factor(self.walker)
-        written = self.written(items, convention)
+        known: dict[str, Any] = {}
+        for name in {item.quantity for item in items}:
+            if name in instants:
+                state = self.state(instants[name], convention.origin == "vertical")
+                known[name] = [] if state is None else convention.write(self.walker, state)
+            else:
+                known[name] = self.quantity(name)
         for item in items:
-            value = written[item.quantity] if item.quantity in written else self.quantity(item.quantity)
+            value = known[item.quantity]
             if isinstance(value, list | tuple):
                 value = value[item.place] if item.place < len(value) else None
-            if isinstance(value, int | float | complex):
-                scale = factor ** POWERS_OF_TIME.get(item.quantity, 0)
-                scale *= convention.steps if item.quantity in SUMMED_OVER_STEPS else 1
-                power = convention.steps if item.quantity == "spectral_radius" else 1
-                values[item.name] = complex((value * scale) ** power)
-            else:
-                values[item.name] = None
+            if value is not None:
+                value *= convention.rate_factor(self.walker) ** POWERS_OF_TIME.get(item.quantity, 0)
+                value *= convention.steps if item.quantity in SUMMED_OVER_STEPS else 1
+                value = complex(value ** (convention.steps if item.quantity == "spectral_radius" else 1))
+            values[item.name] = value
         listed = [item for item in items if item.quantity == "multipliers"]
-        multipliers = self.quantity("multipliers") if listed else ()
-        return values | match_multipliers(listed, [value**convention.steps for value in multipliers])
+        return values | match_multipliers(listed, [value**convention.steps for value in known.get("multipliers", ())])
 
     @cache  # noqa: B019 - walks are few, and live as long as their check
     def state(self, instant: Instant, vertical: bool) -> Floats | None:
         return state_at(self.walker, self.start, self.step, instant, vertical)
-
-    def written(self, items: Sequence[Item], convention: Convention) -> dict[str, list[float]]:
-        """Return the numbers of the states that are printed, by quantity. Empty lists where there is no such state."""
-        written = {}
-        instants = {"state": convention.instant, "state_before": BEFORE}
-        for name in instants.keys() & {item.quantity for item in items}:
-            state = self.state(instants[name], convention.origin == "vertical")
-            written[name] = [] if state is None else convention.write(self.walker, state)
-        return written
