@@ -128,7 +128,7 @@ class Checked:
             return None
         items = self.numbers(name)
         numbers = np.array([item.value for item in items])
-        moves = np.diag([item.unit for item in items])
+        moves = np.diag([item.last_digit for item in items])
         state, *moved = (
             self.conventions[name].read(self.walker, each, known) for each in (numbers, *(numbers + moves))
         )
@@ -178,7 +178,7 @@ class Checked:
     def rows(self) -> list[dict[str, Any]]:
         """Return each printed number with the right one and its verdict."""
         values = {} if self.right is None else self.right.values(self.items, self.convention)
-        return [judge(item, values[item.name], f"this gait has no {spell_name(item.name)}") for item in self.items]
+        return [judge(item, values[item.name], f"this gait has no {spell_name(item.name)}").row for item in self.items]
 
     @cached_property
     def question(self) -> Question | None:
@@ -264,7 +264,8 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
 
 def answer_without(check: Check, reason: str) -> dict[str, Any]:
     """Return the answer if there is no right gait to compare with."""
-    rows = [judge(item, None, reason) for item in items_of({**check.printed, "state_before": check.state_before}, {})]
+    items = items_of({**check.printed, "state_before": check.state_before}, {})
+    rows = [judge(item, None, reason).row for item in items]
     head = {"source": check.source.model_dump(), "finding": NOT_COMPARABLE, "reason": reason, "values": rows}
     lists: dict[str, Any] = {"momenta": [], "explanations": [], "undecided": "", "searched": False}
     return {**head, **lists, **dict.fromkeys(("periodic", "closest", "nearest_gait", "routes"))}

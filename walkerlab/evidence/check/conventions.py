@@ -157,7 +157,7 @@ def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequen
         return abs(walker.feet_apart(reading.read(walker, [item.value for item in items], known)))
 
     opposite = replace(convention, second="stance-minus-swing")
-    near = FEET_DIGITS * max(item.unit for item in items) / (RAD_IN_DEG if convention.unit == "deg" else 1.0)
+    near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if convention.unit == "deg" else 1.0)
     return opposite if miss(opposite) <= near < miss(convention) else convention
 
 

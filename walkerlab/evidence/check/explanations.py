@@ -117,7 +117,7 @@ class Question:
             return None
         values = walk.values(self.quick_items, self.convention)
         known = [(values[item.name], item) for item in self.quick_items if item.printed.bounds is None]
-        found = [(value.real - item.value) / item.unit for value, item in known if value is not None]
+        found = [(value.real - item.value) / item.last_digit for value, item in known if value is not None]
         return np.array(found) if len(found) > 1 else None
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:

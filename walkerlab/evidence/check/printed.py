@@ -41,6 +41,11 @@ class PrintedNumber:
         return value
 
     @property
+    def about(self) -> dict[str, Any]:
+        """Name or source, as JSON values."""
+        return {"quantity": self.quantity}
+
+    @property
     def digits(self) -> Digits:
         """The number or its real part, without bounds."""
         return self.printed.real
@@ -55,7 +60,7 @@ class PrintedNumber:
         return min(part.count for part in (self.digits, self.printed.imaginary) if part is not None)
 
     @property
-    def unit(self) -> float:
+    def last_digit(self) -> float:
         """Unit of the last digit, or half the width of finite bounds."""
         low, high = self.printed.bounds or (0.0, math.inf)
         return max(0.5 * (high - low), self.digits.unit) if math.isfinite(high - low) else self.digits.unit
@@ -82,10 +87,10 @@ class PrintedNumber:
             return math.inf
         if self.printed.bounds is not None:
             low, high = self.printed.bounds
-            return max(0.0, low - right.real, right.real - high) / self.unit
+            return max(0.0, low - right.real, right.real - high) / self.last_digit
         if self.printed.both_signs:
             right = complex(right.real, abs(right.imag))
-        return abs(right - self.printed.value) / self.unit
+        return abs(right - self.printed.value) / self.last_digit
 
     def write(self, right: complex) -> str:
         """Format a right value with `MORE_DIGITS` more digits than the printed one."""
@@ -105,6 +110,10 @@ class Item(PrintedNumber):
     quantity: str  # name without its component
     place: int  # index of the component
     text: str
+
+    @property
+    def about(self) -> dict[str, Any]:
+        return {"name": self.name}
 
 
 def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
@@ -126,16 +135,29 @@ def spell_name(name: str) -> str:
     return f"{axis_label(quantity).removesuffix('s')} {part}" if part else axis_label(quantity)
 
 
-def judge(item: Item, right: complex | None, reason: str = "") -> dict[str, Any]:
-    """Compare a printed number with the right one, and return both with the verdict as JSON values.
+@dataclass(frozen=True)
+class Judged:
+    """A printed number, what it was compared with, and the verdict."""
 
-    right   a pair in the result if it is complex
-    reason  why there is no right value
-    """
+    number: PrintedNumber
+    values: Mapping[str, Any]  # JSON values by name
+    verdict: str
+    evidence: str
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """Row of a table, as JSON values."""
+        printed = {**self.number.about, "printed": self.number.text}
+        return {**printed, **self.values, "verdict": self.verdict, "evidence": self.evidence}
+
+
+def judge(item: Item, right: complex | None, reason: str = "") -> Judged:
+    """Compare a printed number with the right one. If `right` is None, `reason` explains why."""
     agreeing = 0 if right is None else item.agreeing(right)
-    units = format_units(item.miss(right))
+    miss = item.miss(right)
     all_digits = agreeing == item.count
-    verdict = REPRODUCED if all_digits else DIFFERENT
+    enough = all_digits or (agreeing >= FEWEST_DIGITS and 2 * agreeing >= item.count)
+    verdict = REPRODUCED if enough else DIFFERENT
     value: Any = None
     if right is None:
         verdict = NOT_COMPARABLE
@@ -143,25 +165,19 @@ def judge(item: Item, right: complex | None, reason: str = "") -> dict[str, Any]
     else:
         value = [right.real, right.imag] if item.printed.imaginary or right.imag else right.real
         if item.printed.bounds is not None:
-            outside = f"outside what is printed by {units} times its tolerance"
+            outside = f"outside what is printed by {format_units(miss)} times its tolerance"
             evidence = "within what is printed" if all_digits else outside
-        elif all_digits:
-            evidence = "all digits"
         else:
-            evidence = f"{agreeing or 'none'} of {item.count} digits; off by {units} units of the last one"
-            if agreeing >= FEWEST_DIGITS and 2 * agreeing >= item.count:
-                verdict = REPRODUCED
-    return {
-        "name": item.name,
-        "printed": item.text,
+            off = f"{agreeing or 'none'} of {item.count} digits; off by {format_units(miss)} units of the last one"
+            evidence = "all digits" if all_digits else off
+    values = {
         "right": value,
         "right_text": "" if right is None else item.write(right),
         "digits": agreeing,
         "of_digits": item.count,
-        "difference_in_units": None if right is None else item.miss(right),
-        "verdict": verdict,
-        "evidence": evidence,
+        "difference_in_units": None if right is None else miss,
     }
+    return Judged(item, values, verdict, evidence)
 
 
 def format_units(number: float) -> str:

@@ -6,9 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from walkerlab.evidence.check.printed import (
+    CONTRADICTED,
     DIFFERENT,
     EXPLAINED,
+    INPUT,
     NOT_COMPARABLE,
+    NOT_REPRODUCED,
     REPRODUCED,
     UNEXPLAINED,
     format_units,
@@ -20,7 +23,11 @@ from walkerlab.views.report.numbers import count, number
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, table
 
 Row = Mapping[str, Any]
-TONES: Mapping[str, Tone] = {REPRODUCED: "good", DIFFERENT: "bad", NOT_COMPARABLE: "plain"}
+TONES: Mapping[str, Tone] = {
+    INPUT: "given", REPRODUCED: "good", EXPLAINED: "fair", CONTRADICTED: "bad", DIFFERENT: "bad",
+    NOT_REPRODUCED: "plain", NOT_COMPARABLE: "plain",
+}  # fmt: skip
+"""Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
 MANY_UNITS = 1e5
 LONGEST_LIST = 2  # angles and rates that are listed one by one
 COLUMNS = (
