@@ -247,7 +247,7 @@ def test_states_before_the_strike_and_in_mid_stance_are_right(tmp_path):
     walker = plain_walker(config)
     tilt = np.array([0.0174, 0.0174, 0.0, 0.0])
     start = np.array(find_gaits(rigid_walker(config), 0).gait.state) + tilt
-    _, step = gait_near(walker, start)
+    step = gait_near(walker, start).step
     printed = [f"{value:.6f}" for value in step.before - tilt]
     assert walkerlab.check(config, {"state": printed}, instant="before-strike").finding == "reproduced"
     pair = walkerlab.check(config, {"state": ["-0.204200", "0.169400", "-0.605819", "-0.861041"]}, state_before=printed)

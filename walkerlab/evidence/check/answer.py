@@ -22,7 +22,7 @@ from walkerlab.evidence.check.explanations import (
     explain,
     find_periodic_changes,
 )
-from walkerlab.evidence.check.gaits import PLAIN, CheckedStep, gait_near, plain_walker, scales, why_not_plain
+from walkerlab.evidence.check.gaits import CheckedStep, gait_near, plain_walker, scales, why_not_plain
 from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, PlainStep, PlainWalker
 from walkerlab.evidence.check.printed import (
     DIFFERENT,
@@ -161,8 +161,7 @@ class Checked:
         start = None if printed is None else start_from(self.walker, printed[0], self.convention.instant)
         if start is None or np.abs(start - nearest.start).max() < SAME_GAIT:
             return nearest
-        gait = gait_near(self.walker, start)
-        other = nearest if gait is None else CheckedStep(self.walker, *gait)
+        other = gait_near(self.walker, start) or nearest
         moved = np.abs(other.start - nearest.start).max() > SAME_GAIT
         return other if moved and self.distance(other) < self.distance(nearest) else nearest
 
@@ -188,7 +187,7 @@ class Checked:
             return None
         plain = CheckedStep(right.walker, right.start, right.step)
         values = plain.values(self.items, self.convention)
-        items = [item for item in self.items if item.quantity in PLAIN and values[item.name] is not None]
+        items = [item for item in self.items if values[item.name] is not None]
         state = self.printed_state("state", self.walker.full_state(right.start))
         return Question(self.config, items, self.convention, plain, state and state[0], self.walks)
 

@@ -101,8 +101,10 @@ class Question:
         The gait must have every digit of all numbers, or at least of all states, of three or more numbers that are not
         right.
         """
+        if self.reproduced(gait, self.state_items) != self.state_items:
+            return None
         reproduced = self.reproduced(gait, self.items)
-        enough = len(reproduced) >= min(FEW, len(self.items)) and all(item in reproduced for item in self.state_items)
+        enough = len(reproduced) >= min(FEW, len(self.items))
         return self.explanation(candidate.kind, candidate.what, reproduced) if enough else None
 
     def miss(self, walk: CheckedStep, items: Sequence[Item], convention: Convention | None = None) -> float:
@@ -130,17 +132,15 @@ class Question:
         if np.abs(move[:2]).max() > FARTHEST_GUESS:
             return None
         # a value may be printed that the state alone does not determine
-        needs_times = self.convention.instant != "after-strike" or any(
-            item.quantity != "state" for item in self.quick_items
-        )
-        after = walker.step(start + move, tolerance) if needs_times else step
+        quantities = {self.convention.instant, *(item.quantity for item in self.quick_items)}
+        after = step if quantities == {"after-strike", "state"} else walker.step(start + move, tolerance)
         return None if after is None else CheckedStep(walker, start + move, after)
 
     def attempt(self, candidate: Candidate, guess: CheckedStep | None) -> Iterator[Attempt]:
         """Yield the gait of a candidate near a first guess, if there is one."""
         gait = None if guess is None else gait_near(candidate.walker, guess.start, self.right.derivative)
         if gait is not None:
-            yield candidate, CheckedStep(candidate.walker, *gait)
+            yield candidate, gait
 
 
 def explain(question: Question) -> tuple[list[Explanation], dict[str, Any] | None]:
@@ -311,9 +311,8 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
         foot = walker.foot - sign * 1j * walker.radius
         other = replace(walker, foot=foot)
         gaits = (gait_near(other, start) for start in starts if foot.imag < 0.0)
-        gait = next(filter(None, gaits), None)
-        if gait is not None:
-            yield f"the stated leg length {how} the foot's radius", CheckedStep(other, *gait)
+        for gait in [*filter(None, gaits)][:1]:
+            yield f"the stated leg length {how} the foot's radius", gait
 
 
 def misprinted_values(question: Question) -> Iterator[Explanation]:

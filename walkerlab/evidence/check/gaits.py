@@ -32,11 +32,6 @@ POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Power of rates in which a quantity scales with the unit of time."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
 """Quantities whose value for a stride is the sum of the values of its steps."""
-PLAIN = (
-    "state", "state_before", "multipliers", "spectral_radius", "period_s", "step_length_m", "speed_m_s", "froude",
-    "knee_strike_s",
-)  # fmt: skip
-"""Quantities that the plain model computes."""
 # Near the optimum of central differences of steps with errors of `EXACT`: rad, and rad/s times sqrt(L/g).
 DIFFERENCE = 1e-6
 MAX_MOVES = 16
@@ -109,41 +104,6 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
     return np.array(columns).T
 
 
-def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, PlainStep] | None:
-    """Find the gait near a start by Newton's method. Return its start and step, or None if it is not found.
-
-    A  derivative of the step map of a similar walker, with which the search begins
-    """
-    unit = scales(walker, len(start))
-    best: tuple[Floats, PlainStep] | None = None
-    x: Floats = np.array(start, float)
-    last = math.inf
-    is_own = False  # whether A is this walker's own derivative
-    for _ in range(MAX_MOVES):
-        step = walker.step(x)
-        size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
-        if step is not None and size < last:
-            best = x, step
-            if size < SMALLEST_MOVE:
-                return best
-            slow = size > SLOW_RATIO * last
-            last = size
-        elif best is None or last < MAX_RESIDUAL:
-            return best
-        elif is_own:
-            x = 0.5 * (x + best[0])
-            continue
-        else:
-            slow = True
-        if A is None or slow:
-            A = derivative(walker, best[0], 1e-10)
-            is_own = True
-            if A is None:
-                return None
-        x = best[0] - np.linalg.solve(A - np.eye(len(x)), best[1].after - best[0])
-    return None
-
-
 @dataclass(frozen=True, eq=False)
 class CheckedStep:
     """One step of a walker: a gait, or a first guess at one."""
@@ -209,3 +169,38 @@ class CheckedStep:
     @cache  # noqa: B019 - walks are few, and live as long as their check
     def state(self, instant: Instant, vertical: bool) -> Floats | None:
         return state_at(self.walker, self.start, self.step, instant, vertical)
+
+
+def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> CheckedStep | None:
+    """Find the gait near a start by Newton's method, or return None if it is not found.
+
+    A  derivative of the step map of a similar walker, with which the search begins
+    """
+    unit = scales(walker, len(start))
+    best: CheckedStep | None = None
+    x: Floats = np.array(start, float)
+    last = math.inf
+    is_own = False  # whether A is this walker's own derivative
+    for _ in range(MAX_MOVES):
+        step = walker.step(x)
+        size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
+        if step is not None and size < last:
+            best = CheckedStep(walker, x, step)
+            if size < SMALLEST_MOVE:
+                return best
+            slow = size > SLOW_RATIO * last
+            last = size
+        elif best is None or last < MAX_RESIDUAL:
+            return best
+        elif is_own:
+            x = 0.5 * (x + best.start)
+            continue
+        else:
+            slow = True
+        if A is None or slow:
+            A = derivative(walker, best.start, 1e-10)
+            is_own = True
+            if A is None:
+                return None
+        x = best.start - np.linalg.solve(A - np.eye(len(x)), best.step.after - best.start)
+    return None
