@@ -42,7 +42,6 @@ from walkerlab.scene.rigid import rigid_walker, state_names
 
 SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L and g of 1
 SAME_GAIT: Final = 1e-6
-CHOSEN: Final = "chosen"
 SMALL_VALUE: Final = 1e-3  # smallest printed value whose differences are relative to it, not absolute
 GAIT_VALUES: Final = (
     "state", "multipliers", "period_s", "step_length_m", "speed_m_s", "froude", "spectral_radius", "knee_strike_s",
@@ -135,61 +134,55 @@ class Checked:
         return state, np.abs(np.subtract(moved, state)).sum(axis=0)
 
     @cached_property
-    def walks(self) -> list[CheckedStep]:
-        """The right gaits, with their values by the compiled model."""
+    def gaits(self) -> dict[CheckedStep, dict[str, Any]]:
+        """The right gaits, with their values by the compiled model. The one that `fixedpoint` reports comes first."""
         names = state_names(self.config)
-        found = []
-        for gait in self.search.gaits:
+        found = {}
+        for gait in sorted(self.search.gaits, key=lambda gait: gait is not self.search.gait):
             rates = gait.state[len(names) // 2 :]
             extra = (rates[2],) if self.walker.kneed and self.walker.free_at_strike else ()
             start = np.array([*(angle + self.walker.slope for angle in gait.state[:2]), *rates[:2], *extra])
             step = self.walker.step(start)
             if step is not None:
-                measured = {**values_of(gait_summary(gait)), CHOSEN: gait is self.search.gait}
-                found.append(CheckedStep(self.walker, start, step, measured))
+                found[CheckedStep(self.walker, start, step)] = values_of(gait_summary(gait))
         return found
 
     @cached_property
     def right(self) -> CheckedStep | None:
         """The right gait nearest to the printed one, or None if no gait was found."""
-        if not self.walks:
+        if not self.gaits:
             return None
-        if not self.items:
-            return max(self.walks, key=lambda walk: bool(walk.measured[CHOSEN]))
-        nearest = min(self.walks, key=self.distance)
+        nearest = min(self.gaits, key=self.distance)
         printed = self.printed_state("state", self.walker.full_state(nearest.start))
         start = None if printed is None else start_from(self.walker, printed[0], self.convention.instant)
         if start is None or np.abs(start - nearest.start).max() < SAME_GAIT:
             return nearest
-        other = gait_near(self.walker, start) or nearest
+        other = gait_near(self.walker, start, nearest.derivative) or nearest
         moved = np.abs(other.start - nearest.start).max() > SAME_GAIT
         return other if moved and self.distance(other) < self.distance(nearest) else nearest
 
-    def distance(self, walk: CheckedStep) -> float:
+    def values(self, gait: CheckedStep) -> dict[str, complex | None]:
+        """Return a gait's values of all printed numbers, in the printed convention."""
+        return gait.values(self.items, self.convention, self.gaits.get(gait, {}))
+
+    def distance(self, gait: CheckedStep) -> float:
         """Return the distance of a gait from the printed values, each relative to its size."""
-        values = walk.values(self.items, self.convention)
+        values = self.values(gait)
         pairs = [(item.printed.value, values[item.name]) for item in self.items]
         return sum(
             1.0 if value is None else min(abs(value - printed) / (abs(printed) + SMALL_VALUE), 1.0)
             for printed, value in pairs
         )
 
-    def rows(self) -> list[dict[str, Any]]:
-        """Return each printed number with the right one and its verdict."""
-        values = {} if self.right is None else self.right.values(self.items, self.convention)
-        return [judge(item, values[item.name], f"this gait has no {spell_name(item.name)}").row for item in self.items]
-
     @cached_property
     def question(self) -> Question | None:
         """Printed values to explain, or None without a right gait."""
-        right = self.right
-        if right is None:
+        if self.right is None:
             return None
-        plain = CheckedStep(right.walker, right.start, right.step)
-        values = plain.values(self.items, self.convention)
+        values = self.right.values(self.items, self.convention)
         items = [item for item in self.items if values[item.name] is not None]
-        state = self.printed_state("state", self.walker.full_state(right.start))
-        return Question(self.config, items, self.convention, plain, state and state[0], self.walks)
+        printed = self.printed_state("state", self.walker.full_state(self.right.start))
+        return Question(self.config, items, self.convention, self.right, printed and printed[0], [*self.gaits])
 
     @cached_property
     def printed_step(self) -> PrintedStep | None:
@@ -238,7 +231,8 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
     question = checked.question
     if right is None or question is None:
         return answer_without(check, f"the walker has no gait here ({checked.search.reason})")
-    rows = checked.rows()
+    values = checked.values(right)
+    rows = [judge(item, values[item.name], f"this gait has no {spell_name(item.name)}").row for item in checked.items]
     searched = any(row["digits"] < row["of_digits"] and row["right"] is not None for row in rows)
     explanations, closest = explain(question) if searched else ([], None)
     periodic = periodicity(checked, right)
@@ -257,7 +251,7 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
         "undecided": advise_on_ambiguity(explanations),
         "searched": searched,
         "nearest_gait": nearest_gait(checked, right),
-        "routes": routes(right),
+        "routes": routes(checked, right),
     }
 
 
@@ -357,24 +351,26 @@ def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
     return {"energy_drift_J": walker.energy(STRAIGHT, end[0]) - walker.energy(STRAIGHT, start[0])}
 
 
-def nearest_gait(checked: Checked, walk: CheckedStep) -> dict[str, Any]:
+def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
     """Describe the right gait that is nearest to the printed one."""
-    radius = walk.quantity("spectral_radius")
+    names = ("period_s", "step_length_m", "multipliers", "spectral_radius")
+    values = {name: gait.quantity(name) for name in names} | checked.gaits.get(gait, {})
+    radius = values["spectral_radius"]
     return {
-        "state": [*(float(angle) - walk.walker.slope for angle in walk.start[:2]), *map(float, walk.start[2:])],
-        "state_names": ["theta_1", "theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank"][: len(walk.start)],
-        "period_s": walk.quantity("period_s"),
-        "step_length_m": walk.quantity("step_length_m"),
-        "multipliers": [[value.real, value.imag] for value in walk.quantity("multipliers")],
+        "state": [*(float(angle) - gait.walker.slope for angle in gait.start[:2]), *map(float, gait.start[2:])],
+        "state_names": ["theta_1", "theta_2", "dtheta_1", "dtheta_2", "dtheta_1_shank"][: len(gait.start)],
+        "period_s": values["period_s"],
+        "step_length_m": values["step_length_m"],
+        "multipliers": [[value.real, value.imag] for value in values["multipliers"]],
         "stable": radius is not None and radius < 1.0,
-        "gaits": len(checked.walks),
+        "gaits": len(checked.gaits),
     }
 
 
-def routes(walk: CheckedStep) -> dict[str, Any]:
+def routes(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
     """Compare both routes: the compiled model's gait must return to itself in the plain model."""
-    unit = scales(walk.walker, len(walk.start))
-    difference = float(np.abs((walk.step.after - walk.start) / unit).max())
-    if "period_s" in walk.measured:
-        difference = max(difference, abs(walk.measured["period_s"] - walk.step.period) / walk.walker.pendulum_time)
+    unit = scales(gait.walker, len(gait.start))
+    period = checked.gaits.get(gait, {}).get("period_s", gait.step.period)
+    difference = float(np.abs((gait.step.after - gait.start) / unit).max())
+    difference = max(difference, abs(period - gait.step.period) / gait.walker.pendulum_time)
     return {"difference": difference, "agree": difference < SAME_ROUTE}

@@ -303,7 +303,7 @@ def conventions(question: Question) -> Iterator[Explanation]:
 
 def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     """Yield the right gaits, and those of walkers whose leg length includes or excludes the foot's radius."""
-    yield from (("", CheckedStep(gait.walker, gait.start, gait.step)) for gait in question.gaits)
+    yield from (("", gait) for gait in question.gaits)
     walker = question.walker
     printed = None if question.state is None else start_from(walker, question.state, question.convention.instant)
     starts = [start for start in (printed, question.right.start) if start is not None]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from walkerlab.evidence.check.plain_walker import (
 from walkerlab.evidence.check.printed import Item, match_multipliers
 
 BEFORE: Instant = "before-strike"
+NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Power of rates in which a quantity scales with the unit of time."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
@@ -111,7 +113,6 @@ class CheckedStep:
     walker: PlainWalker
     start: Floats  # coordinates just after the heel strike
     step: PlainStep
-    measured: Mapping[str, Any] = field(default_factory=dict)  # values of the compiled model by name
 
     @cached_property
     def derivative(self) -> Floats | None:
@@ -126,25 +127,27 @@ class CheckedStep:
         return tuple(values[:-1])
 
     def quantity(self, name: str) -> Any:
-        """Return a value from the compiled model or, if it lacks it, the plain one. Return None if both lack it."""
-        if name in self.measured:
-            return self.measured[name]
+        """Return a value by name, or None if the plain model lacks it."""
         if name == "multipliers":
             return self.multipliers
         if name == "spectral_radius":
             return abs(self.multipliers[0]) if self.multipliers else None
-        step = self.step
         speed = self.step.length / self.step.period
         return {
-            "period_s": step.period,
-            "step_length_m": step.length,
+            "period_s": self.step.period,
+            "step_length_m": self.step.length,
             "speed_m_s": speed,
             "froude": speed / math.sqrt(self.walker.gravity * self.walker.leg_length),
-            "knee_strike_s": step.knee_strike,
+            "knee_strike_s": self.step.knee_strike,
         }.get(name)
 
-    def values(self, items: Sequence[Item], convention: Convention) -> dict[str, complex | None]:
-        """Return the right value of each printed number in the printed conventions, or None if the models lack it."""
+    def values(
+        self, items: Sequence[Item], convention: Convention, measured: Mapping[str, Any] = NOTHING
+    ) -> dict[str, complex | None]:
+        """Return the right value of each printed number in the printed conventions, or None if the models lack it.
+
+        measured  values of the compiled model by name, which replace those of the plain one
+        """
         instants = {"state": convention.instant, "state_before": BEFORE}
         values: dict[str, complex | None] = {}
         known: dict[str, Any] = {}
@@ -153,7 +156,7 @@ class CheckedStep:
                 state = self.state(instants[name], convention.origin == "vertical")
                 known[name] = [] if state is None else convention.write(self.walker, state)
             else:
-                known[name] = self.quantity(name)
+                known[name] = measured[name] if name in measured else self.quantity(name)
         for item in items:
             value = known[item.quantity]
             if isinstance(value, list | tuple):
