@@ -80,7 +80,8 @@ SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
-CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
+# Walk errors are near 1e-10, far below noise.
+CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)
 MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
@@ -229,6 +230,7 @@ def identify_beginning(
     """Fit a model to a walk whose first step is that of `measured.first_leg`. Returns as `identify_with`."""
     model = subject.model
     problem = problem_of(subject, measured, question)
+    # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
@@ -390,6 +392,7 @@ def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Se
     for key, u, error, scale in zip(keys, fitted.u, independent_errors(fitted), fitted.forecast.scales, strict=False):
         if key in priors:
             value, sigma = priors[key]
+            # The difference between a prior and the estimate that includes it has this variance.
             free = sigma**2 - (error * scale) ** 2
             distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(key, "prior", value, float(distance))
@@ -424,6 +427,7 @@ def suggest_parameter(
         if gains[index] < PROMISING_GAIN:
             return
         gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
+        # With a fitted noise, a gain of the log-likelihood is a monotonic function of an F statistic.
         rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN
         if gain > DECISIVE_GAIN and rare and abs(change) > SMALLEST_CHANGE:
             before = NUISANCES.get(other.name, (other.value, 0.0))[0]
@@ -538,6 +542,7 @@ def fixed_parameters(
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
+        # Only the exact differences may be one-sided, where a walk on one side ends early.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:

@@ -96,6 +96,7 @@ def predict_measured(subject: ModelUnderTest, question: Identify, plan: Plan) ->
     """
     family = ConfigFamily(subject.config, question.keys)
     walks = step_map_of(subject, family)
+    # One step more than is measured: samples must lie before the last heel strike of a walk.
     level = np.zeros(plan.max_steps + 2)
     walk = walks.take_disturbed_walk(subject.z, family.start, level)  # type: ignore[arg-type]  # values of several parameters
     if walk.durations_s.size <= plan.max_steps:
@@ -128,6 +129,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
     """
     problem = problem_of(subject, measured, question)
     if measured.sampled:
+        # `identify` always fits a delay to angles at their sample times.
         nuisances = tuple(dict.fromkeys((*question.sensors, DELAY)))
         problem = replace(problem, forecast=replace(problem.forecast, in_phase=False, nuisances=nuisances))
     forecast = problem.forecast
@@ -167,7 +169,8 @@ def steps_for(key: str, wanted: float, errors_after: Callable[[int], Errors], mo
 
     if not suffices(most):
         return None
-    low, high = 0, most  # more steps never increase an error
+    # More steps never increase an error.
+    low, high = 0, most
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if suffices(middle) else (middle, high)

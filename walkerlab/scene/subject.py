@@ -96,6 +96,7 @@ def find_model_gait(
     # Imported late, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
+    # The scene's config may hold only the keys that a stage reads; the search copies a complete one.
     scene_config = SLOPE.config_at(config, config.slope_rad)
     assert scene_config is not None, "the slope of the config is always possible"
     answer = gait_off_pads(scene_config, length, as_state(gait["state"]))

@@ -79,6 +79,7 @@ def turning_bodies(walker: ContactWalker, stance: int) -> tuple[int, ...]:
     """Return the bodies that turn independently, the swing leg's first. The locked stance shank is left out."""
     # if only one leg has a knee, there are fewer where that leg stands
     locked = locked_shank(walker, stance)
+    # `legs` repeats the last body of a leg without a knee, and `dict.fromkeys` drops the repetition.
     bodies = (*walker.legs[1 - stance], *(body for body in walker.legs[stance] if body != locked))
     return tuple(dict.fromkeys(bodies))
 
@@ -198,7 +199,8 @@ def step_from_section(
     """
     laid = ground
     start = state_on_section(walker, z, stance)
-    if ground.terrain.has_pads:  # the stance foot stands in the middle of a pad
+    # The stance foot stands in the middle of a pad.
+    if ground.terrain.has_pads:
         foothold = feet_motion(walker.whole, start)[stance].along
         lanes = (foothold + pitch_m, foothold) if stance == STANCE_FOOT else (foothold, foothold + pitch_m)
         laid = JudgedGround(checkerboard(pitch_m, lanes), ground.frame)
@@ -214,7 +216,8 @@ def step_from_section(
     slipped = material_along(walker.whole, landed, along, stopped.state) - float(walk_state.touched[landed])
     rolled = along - float(walk_state.foothold[landed]) - slipped
     DP = np.zeros((z.size, 0))
-    if derived:  # project the flow's derivative onto the section, along the flow
+    # Project the flow's derivative onto the section, along the flow.
+    if derived:
         system = present_walker(walker, walk_state)
         rate = state_rate(system, to_form(system.form, end), end.size, stopped.time_s)
         gradient = np.zeros(end.size)
@@ -266,6 +269,7 @@ def walk_from_section(
 
     stopped = Stopped(Outcome.WALKED, 0.0, start, np.zeros(4, np.int64))
     if push != 0.0:
+        # With room for a single touchdown, the walk stops there for the push.
         stopped = go_on(shorten(walk_state, 1), start)
         pushed = pushed_at_hip(
             place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
@@ -276,6 +280,7 @@ def walk_from_section(
     if stopped.outcome is Outcome.WALKED:
         stance = int(walk_state.progress.stance)
         z = coordinates_of(walker, np.array(stopped.state), stance)
+        # Heights on the section are measured from the ground of the stance foot.
         z[0] -= walk_state.level[stance]
         stopped = go_on(walk_state, stopped.state)
     touched = int(walk_state.progress.steps)
@@ -322,12 +327,14 @@ def sample_legs_from_section(
 
 
 def ground_with_footholds(ground: JudgedGround, heights: Floats) -> JudgedGround:
+    # The foot that stands on the section has the height of the first touchdown, which is where `heights` begins.
     over = np.append(heights[0], heights) - heights[0]
     return ground._replace(terrain=ground.terrain._replace(heights=over)) if over.any() else ground
 
 
 def shorten(walk_state: WalkState, steps: int) -> WalkState:
     fields = ("touch_time", "touch_along", "touch_height", "slip", "rolling", "lift_time")
+    # The shorter arrays are views, so steps are recorded in `walk_state` itself.
     return walk_state._replace(**{name: getattr(walk_state, name)[:steps] for name in fields})
 
 
@@ -342,6 +349,7 @@ def pushed_at_hip(system: OnGround, walker: ContactWalker, state: State, impulse
     M = np.zeros((n, n))
     sines_cosines(form, y, s, c)
     add_inertia(form, n, s, c, y[half + 2 :], M, r)
+    # A forward impulse above the centre of mass turns the walker clockwise.
     r[:] = -impulse * (s * form.hip_x[:n] + c * form.hip_y[:n])
     factor_linked(form.E[0], n, M)
     solve_linked(form.E[0], n, M, r)
@@ -363,6 +371,7 @@ def walk_state_on_section(
     walk_state.has_ground[swing] = feet[swing].height > 0.0 and has_ground_in_air(
         ground.terrain, bool(walk_state.has_ground[swing]), False, True
     )
+    # The swing foot is above the gap that follows the pad it left.
     walk_state.left_cells[swing] = walk_state.cells[swing] - 1
     walk_state.foothold[swing] = feet[stance].along - ground.frame.leg_length
     return walk_state
@@ -398,7 +407,8 @@ class ContactMap(StepMap):
         Monitor("tripped", "1", "whether the swing foot trips on pads spaced by the gait's own step length", 0.5),
     )
     disturbs_after = 1
-    probe = 1e-6  # small compared with the penetration of stiff ground, which is below 0.01 mm
+    # small compared with the penetration of stiff ground, which is below 0.01 mm
+    probe = 1e-6
 
     def __init__(
         self,
@@ -477,6 +487,8 @@ class ContactMap(StepMap):
         endless = replace(self.tolerances, budget=self.tolerances.budget * heights_m.size)
         scene = (site.walker, site.ground, endless)
         walk = walk_from_section(*scene, z * self._units[swing % 2], heights_m, push_N_s, self._stance(swing))
+        # If the sections of both legs differ in size, the size tells which leg stands. Otherwise they have the same
+        # units.
         return replace(walk, z=walk.z / next(units for units in self._units if units.size == walk.z.size))
 
     def rest_on_ground(self, z: Floats, p: float) -> Floats:

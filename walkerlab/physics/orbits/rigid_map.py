@@ -68,7 +68,8 @@ MONITORED_STEPS = Tolerances("dop853", 1e-13, 1e-13, ENDLESS)
 STEPS_PER_BATCH = 8  # steps between renormalisations of a long walk's tangent
 KEPT_METHODS = 4  # one for each number of tangent columns
 LAST_SAMPLE = 1.0 - 1e-9  # fraction of a step; later samples count as at this time
-SHORTEST_STEP = 0.05  # in sqrt(L/g); a shorter step means standing still, which is also a fixed point
+# in sqrt(L/g); a shorter step means standing still, which is also a fixed point
+SHORTEST_STEP = 0.05
 # Newton's method from random starts
 MAX_START_EVALUATIONS, SMALLEST_MOVE = 40, 2.0**-6  # evaluations; fraction of a move at which it is no longer halved
 NO_RESIDUAL = 1e300
@@ -104,6 +105,7 @@ def strike_section(walker: RigidModel) -> StrikeSection:
     origin = np.zeros(2 * n)
     basis = np.zeros((d, 2 * n))
     origin[:n] = -feet_on_slope(walker, 0.0, 0.0) * straight[:, SWING]
+    # With both feet on the slope, the legs' angles have a constant sum.
     basis[0, :n] = straight[:, STANCE] - straight[:, SWING]
     basis[1:, n:] = at_strike[:, places[1:] - n].T
     columns = np.add.outer(places, 2 * n * np.arange(1, d + 1))
@@ -119,11 +121,13 @@ def angles_on_slope(walker: RigidModel, stance: float) -> tuple[Floats, Floats] 
     """
     psi = stance + walker.slope
     straight = walker.E[STRAIGHT]
+    # height of the hip above the centre of the swing foot's arc, which is one radius above the slope
     raised = hip_height(walker, np.full(2, stance)) - walker.swing_radius
     length, ahead = (f(walker.swing_hip_x, walker.swing_hip_y) for f in (math.hypot, math.atan2))
     if abs(raised) >= length:
         return None
     behind = math.acos(raised / length)
+    # derivative of -acos(raised / length)
     rate = (math.cos(psi) * walker.hip_x - math.sin(psi) * walker.hip_y) / (length * math.sin(behind))
     swing = ahead - behind - walker.slope
     return stance * straight[:, STANCE] + swing * straight[:, SWING], straight[:, STANCE] + rate * straight[:, SWING]
@@ -249,6 +253,7 @@ class RigidStepper(local):
         """Walk until `strikes` is full or the walk ends, and return the outcome and the number of completed steps."""
         method.counts[:BUDGET] = 0
         method.counts[BUDGET] = min(strikes.time.size * self.budget, ENDLESS)
+        # The method chooses its first step itself, so a result does not depend on the walk before.
         method.clock[H_NEXT] = 0.0
         status, completed = walk(section.walker, method, self.memory.finder, observer, y, strikes)
         return Outcome(status), completed
@@ -262,6 +267,7 @@ class RigidStepper(local):
         times  of samples, from the start of the step
         """
         m = start.size
+        # One column for each value of the start, and a zero column for the rise.
         y = np.concatenate((start, TANGENT_SCALE * np.eye(m + 1, m).ravel()))
         strikes: HeelStrikes = new_heel_strikes(1, y.size, True, *floor, m + 1)
         strikes.lift[1, m] = TANGENT_SCALE
@@ -287,6 +293,7 @@ class RigidStepper(local):
         z = np.array([z for z, _ in gaits]).reshape(-1, d)
         DP = np.array([DP for _, DP in gaits]).reshape(-1, d, d)
         results = np.zeros(len(starts), np.int64)
+        # At a fold, I - DP is singular.
         solve_from_starts(section, self.memory, KnownGaits(z, np.linalg.pinv(np.eye(d) - DP)), starts, results)
         return results
 
@@ -345,6 +352,7 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
                 distance = 0.0
                 remaining = 0.0
                 for i in range(d):
+                    # z + (I - DP)^-1 (P(z) - z) is where Newton's method with the gait's derivative would go.
                     off = z[i] - gaits.z[gait, i]
                     distance = max(distance, abs(off))
                     for j in range(d):
@@ -360,6 +368,7 @@ def solve_from(section: StrikeSection, memory: Memory, gaits: KnownGaits, z: Any
             solve(system, memory.pivots, move, 0, d)
         else:
             share *= 0.5
+            # The start itself leads to no step.
             if least == NO_RESIDUAL or share < SMALLEST_MOVE:
                 return NO_GAIT
         for i in range(d):
@@ -477,6 +486,7 @@ class RigidMap(StepMap):
             return None
         starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
+        # There are no kicks at the start, whose changes are columns of `along`, nor after the last step.
         kicks = [unit_kicks(*unit.swinging(step), starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
         count = along.shape[1] + sum(map(len, kicks))
@@ -497,6 +507,7 @@ class RigidMap(StepMap):
             moved = np.column_stack((columns, lifts[step + 1]))
             before, after = moved @ tangents.before, moved @ tangents.after
             lengths = step_length_changes(walker, tangents.end[None], columns[None], before[None])[0]
+            # The times of samples are fixed, so a step that begins later is sampled earlier.
             samples = np.einsum("ck,tkl->tcl", moved, tangents.samples) - since[:, None] * tangents.rates[:, None]
             parts.append((moved @ tangents.waits, lengths, after[:, STANCE], tangents.rates, samples))
             columns = after
