@@ -400,9 +400,10 @@ class RigidMap(StepMap):
             section = strike_section(unit)
             n = len(unit.arm_x)
             feet = np.array((section.start[:n] + unit.slope, section.basis[0, :n], unit.foot_x, unit.foot_y)).T
-            sections = (section, strike_section(unit.exchanged)) if unit.legs_differ else (section,)
+            walkers = (unit, unit.exchanged) if unit.legs_differ else (unit,)
+            swings = tuple(Swing(each, strike_section(each), *floats_of(each)) for each in walkers)
             rolling = float(unit.radius), float(-section.start[SWING])
-            return SimilarWalker(unit, units, section, sections, feet.tolist(), *rolling)
+            return SimilarWalker(unit, units, section, swings, feet.tolist(), *rolling)
 
         self._unit_at = unit_at
         self.scale = scale
@@ -418,7 +419,8 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return failed_step(None, z.size)
-        _, section = unit.swinging(swing)
+        leg = unit.swinging(swing)
+        section = leg.section
         step = self._exact.walk(section, z, derived=derived)
         if step.outcome is not Outcome.WALKED or step.time[0] < SHORTEST_STEP:
             standing = step.outcome is Outcome.WALKED
@@ -427,8 +429,8 @@ class RigidMap(StepMap):
         period_s = float(step.time[0]) * unit.units.time
         DP = step.DP[0]
         angle = float(ahead[0])
-        if len(unit.sections) > 1:
-            length = length_of_step(section.walker[0], float(z[0]), step.strikes.before[0])
+        if len(unit.swings) > 1:
+            length = leg.step_length(float(z[0]), step.strikes.before[0])
         else:
             length = unit.step_length(float(z[0]), angle)
         length_m = length * unit.units.length
@@ -447,7 +449,7 @@ class RigidMap(StepMap):
     ) -> DisturbedWalk:
         """Walk from z over foothold heights (m), with a push just after the heel strike at z."""
         unit = valid(self._unit_at(p))
-        walker, section = unit.swinging(swing)
+        walker, section, *_ = unit.swinging(swing)
         units = unit.units
         start = np.array(state_on_section(walker, z))
         start = pushed_at_hip(walker, start, push_N_s / units.impulse) if push_N_s != 0.0 else start
@@ -487,7 +489,7 @@ class RigidMap(StepMap):
         starts = np.vstack((state_on_section(unit.walker, z), walk.strikes.after))
         touches = np.append(0.0, walk.time)
         # There are no kicks at the start, whose changes are columns of `along`, nor after the last step.
-        kicks = [unit_kicks(*unit.swinging(step), starts[step]) for step in range(1, steps)] if kicked else []
+        kicks = [unit_kicks(*unit.swinging(step)[:2], starts[step]) for step in range(1, steps)] if kicked else []
         given = along.shape[1]
         count = along.shape[1] + sum(map(len, kicks))
         lifts = np.zeros((steps + 1, count))
@@ -498,7 +500,7 @@ class RigidMap(StepMap):
         of_step = np.clip(np.searchsorted(touches, times_s / units.time, "right") - 1, 0, steps - 1)
         parts = list[tuple[Floats, ...]]()
         for step, start in enumerate(starts[:-1]):
-            walker, section = unit.swinging(step)
+            walker, section, *_ = unit.swinging(step)
             room = LAST_SAMPLE * (touches[step + 1] - touches[step])
             times = np.minimum(times_s[of_step == step] / units.time - touches[step], room)
             tangents = self._exact.differentiate(section, start, (rises[step : step + 2], nearest), times)
@@ -529,7 +531,7 @@ class RigidMap(StepMap):
         unit = self._unit_at(p)
         if unit is None:
             return None
-        count = len(unit.sections)
+        count = len(unit.swings)
         walk = take_walk(unit.walker, EXACT_STEPS, state_on_section(unit.walker, z), count)
         return float(walk.driven.cost_of_transport(walk.lengths_m.sum())) if walk.steps == count else None
 
@@ -539,7 +541,7 @@ class RigidMap(StepMap):
         """Return the ground's normal impulse (N s) in a push at the hip and its minimum normal force (N) afterwards."""
         # Negative values mean that the ground would have to pull.
         unit = valid(self._unit_at(p))
-        walker, _ = unit.swinging(swing)
+        walker = unit.swinging(swing).walker
         units = unit.units
         start = state_on_section(walker, z)
         pushed = as_state(pushed_at_hip(walker, start, push_N_s / units.impulse))
@@ -583,15 +585,6 @@ class RigidMap(StepMap):
         return Iterates(outcome, all_points, np.concatenate(growth), periods, all_points[:, 0])
 
 
-def length_of_step(model: Any, before: float, end: Floats) -> float:
-    """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
-    ahead = model["radius"] * (before - end[STANCE])
-    for angle, x, y in zip(end.tolist(), model["foot_x"].tolist(), model["foot_y"].tolist(), strict=False):
-        psi = angle + model["slope"]
-        ahead += math.cos(psi) * x - math.sin(psi) * y
-    return float(ahead)
-
-
 def reorder_by_leg(angles: Floats, steps: Integers) -> Floats:
     """Reorder angles (samples, ..., 2) of swing and stance leg by leg: first swing leg, first stance leg."""
     swaps = (steps % 2 == 1).reshape(-1, *[1] * (angles.ndim - 1))
@@ -611,20 +604,44 @@ def unit_kicks(walker: RigidModel, section: StrikeSection, start: Floats) -> Flo
     return np.asarray(np.linalg.norm(rates) / np.linalg.norm(kicks) * kicks @ free)
 
 
+class Swing(NamedTuple):
+    """A leg's swing: the model and the section at its start, and what the length of its step depends on."""
+
+    walker: RigidModel
+    section: StrikeSection
+    slope: float
+    radius: float  # of the stance foot
+    levers: list[tuple[float, float]]  # of each body, to the swing foot
+
+    def step_length(self, before: float, end: Floats) -> float:
+        """Return a step's length from the stance leg's angle (rad) at its start and the state at its end."""
+        angles = end[: len(self.levers)].tolist()
+        ahead = self.radius * (before - angles[STANCE])
+        for angle, (x, y) in zip(angles, self.levers, strict=True):
+            psi = angle + self.slope
+            ahead += math.cos(psi) * x - math.sin(psi) * y
+        return float(ahead)
+
+
+def floats_of(walker: RigidModel) -> tuple[float, float, list[tuple[float, float]]]:
+    """Return the slope, the radius of the stance foot, and the levers to the swing foot."""
+    levers = list(zip(walker.foot_x.tolist(), walker.foot_y.tolist(), strict=True))
+    return float(walker.slope), float(walker.radius), levers
+
+
 class SimilarWalker(NamedTuple):
     walker: RigidModel
     units: Units
     section: StrikeSection
-    sections: tuple[StrikeSection, ...]  # one for each leg that swings next; a single one for equal legs
+    swings: tuple[Swing, ...]  # one for each leg that swings next; a single one for equal legs
     # by body: angle from the slope's normal at z = 0, derivative of that angle with respect to theta_2, and foot levers
     feet: list[list[float]]
     radius: float
     apart: float  # rad, negative of the sum of the leg angles when both feet are on the slope
 
-    def swinging(self, swing: int) -> tuple[RigidModel, StrikeSection]:
-        """Return the model and the section at the start of the step `swing`, as in `Stepper.step`."""
-        leg = swing % len(self.sections)
-        return self.walker.exchanged if leg else self.walker, self.sections[leg]
+    def swinging(self, swing: int) -> Swing:
+        """Return the leg that swings in the step `swing`, as in `Stepper.step`."""
+        return self.swings[swing % len(self.swings)]
 
     def floor(self, z: Floats, heights_m: Floats) -> tuple[Floats, float]:
         """Return rises and nearest landing (see HeelStrikes) over foothold heights (m), in units of the walker."""
