@@ -255,8 +255,8 @@ def basin(
     cells      number of cells of the grid of starts, along each of its two axes
     keys       other keys of the block `basin`, such as model, or of the config, such as seed
 
-    Returns a result whose `summary` has the share of starts that walk on, and whose arrays have the outcome of each
-    cell. Raises ConfigError for values that are not allowed.
+    Returns a result whose `summary` has the share of starts that lead to walking, and whose arrays have the outcome of
+    each cell. Raises ConfigError for values that are not allowed.
 
     >>> basin(cells=(6, 4)).dataset("basin").outcome.shape
     (6, 4)

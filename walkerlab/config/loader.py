@@ -44,7 +44,7 @@ IMPLAUSIBLE_LENGTH_M: Final = 20.0
 IMPLAUSIBLE_GRAVITY_M_S2: Final = 30.0
 """Stronger than the gravity of any planet in the solar system; a larger value is perhaps in cm/s^2."""
 WATER_KG_M3: Final = 1000.0
-"""Density of water; a mass larger than a water cube as wide as the legs are long is perhaps in grams."""
+"""Density of water; a mass above that of a cube of water with sides as long as the legs is perhaps in grams."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,7 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
-FAR_OFF: Final = 0.01  # rad or rad/s; a stated value of a start that is off by more is refused
+FAR_OFF: Final = 0.01  # rad or rad/s; a start is rejected if one of its stated values is off by more than this
 BY_UNITS: Final = {"units": "si, and set the other values of the block too"}
 JUDGED_BY: Final = {
     **dict.fromkeys(BOUNDS_SI, BY_UNITS),

@@ -52,7 +52,7 @@ class Walk:
         mujoco.set_mjcb_control(self.control)
 
     def begin(self) -> None:
-        """Stand on the second leg, with its knee locked and the other one free."""
+        """Stand on the second leg, whose knee is locked while the other one is free."""
         self.time_s = -1.0
         self.stance = 1
         self.touches_s: list[float] = []
@@ -64,7 +64,7 @@ class Walk:
             self.model.jnt_limited[self.knees[leg]] = 0
 
     def control(self, _model: Any, data: Any) -> None:
-        """Apply push-off and hip torque. Once in a time step, look for a touchdown and turn the knees."""
+        """Apply push-off and hip torque. Once in a time step, also look for touchdowns and update the knees."""
         if data is not self.data:
             return
         if data.time < self.time_s:
@@ -93,7 +93,7 @@ class Walk:
             self.sinks = self.pushes = True
 
     def scale_friction(self) -> None:
-        """Let the friction's damper grow with the load on the feet, as in ADAMS: a strike is many times the weight."""
+        """Let the friction's damper grow with the load on the feet, as in ADAMS. At a strike it is many weights."""
         load = self.data.qfrc_constraint[self.height]
         self.model.opt.impratio = self.impratio * max(1.0, load / self.weight)
 

@@ -39,7 +39,7 @@ def rigid_walk_omissions(config: SimulateConfig) -> tuple[Entry, ...]:
 
 
 def stance_omission(config: RigidConfig) -> Entry:
-    """Describe the omission at the stance foot of the rigid model: a compass pivots on a point, others may roll."""
+    """Describe what the rigid model omits at the stance foot. A compass pivots on a point, other walkers may roll."""
     if config.walker.type == "compass":
         return omission(
             "floating base, stance contact and foot radius of the rigid walk",

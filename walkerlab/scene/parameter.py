@@ -101,7 +101,7 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
-    """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg."""
+    """Return the value at a path of keys. A key that is left out for the second leg has the value of the first leg."""
     value = value_at(config, path)
     return value_at(config, [name for name in path if name != SECOND_LEG]) if value is None else value
 
@@ -119,7 +119,7 @@ def dotted(key: Key) -> str:
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """Return the parameter for a config key.
+    """Return the parameter that a config key names.
 
     Raises ConfigError if the key is not a number that a model uses.
     """

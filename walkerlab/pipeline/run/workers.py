@@ -286,7 +286,7 @@ def map_in_order(
 
     jobs   maximum number of processes
     first  indices of calls to run first and in this process, so that kernels are compiled once
-    rank   rank of an index; low ranks start first; give long calls low ranks, so that no call runs alone at the end
+    rank   rank of an index. Low ranks start first; long calls should have them, so that no call runs alone at the end
     """
     if jobs <= 1 or len(calls) <= 1:
         for call in calls:

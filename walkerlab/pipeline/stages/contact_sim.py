@@ -88,7 +88,7 @@ def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -
 
 def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict[str, Any]:
     """Return the asymmetry of a walk's last stride, with that of the times from touch to lift, leg 2 minus leg 1."""
-    # leg 2 stands in the first step of a stride; the foot that stood last may not have lifted
+    # In the first step of a stride leg 2 is the stance leg. The last stance foot may not have lifted yet.
     count = walk.steps - walk.steps % STRIDE
     if not count or walk.stance_s.size < count:
         return {}

@@ -38,10 +38,10 @@ from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait, section_coordinates
 
 SOLVED: Final = Effort(1e-10)
-DIFFERENCE: Final = 5e-3  # gap of the difference quotients of largest disturbances, as a fraction of the bounds' range
-FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances, so that searches are not lost in its noise
+DIFFERENCE: Final = 5e-3  # step of difference quotients of largest disturbances, relative to the range of the bounds
+FINE_WIDTH: Final = 1e-10  # accuracy of largest disturbances; a coarser one would add noise that misleads the search
 ROBUSTNESS: Final = ("gait_sensitivity_norm", *LARGEST)  # quantities compared between start and optimum
-MEETING: Final = 1e-3  # gap between the magnitudes of the two largest multipliers below which they count as meeting
+MEETING: Final = 1e-3  # the two largest multipliers meet if their magnitudes differ by less than this
 LABELS: Final = {
     "to": Label("", "parameter of the config"),
     "start": Label("SI", "start of the search"),
@@ -53,7 +53,7 @@ WIDEN_ADVICE: Final = "Widen the bounds (--over), or the constraints (--keep)."
 def run(config: DesignConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint) -> Content:
     """Search for the optimum.
 
-    checkpoint  results of the searches of an earlier run; new ones are added
+    checkpoint  results of searches that an earlier run completed; new results are added
 
     Raises ConfigError for an invalid request, NoAnswer if no walker meets the constraints.
     """
@@ -165,7 +165,7 @@ def keys_on_bound(design: Design, x: Floats) -> list[str]:
 
 
 class Gaits:
-    """Gait and gradients as functions of the parameters. Each search for a gait starts at the last one found."""
+    """Gait and gradients as functions of the parameters. Each search for a gait starts from the last gait found."""
 
     def __init__(
         self,
@@ -257,7 +257,7 @@ class Gaits:
     ) -> dict[str, float]:
         """Differentiate the largest disturbances by a parameter, from gaits at values `gap` below and above.
 
-        If there is no gait on one side, the difference to the gait in the middle is taken.
+        If there is no gait on one side, the difference from the gait in the middle is used.
         """
         if not self.largest:
             return {}

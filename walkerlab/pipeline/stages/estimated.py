@@ -23,7 +23,7 @@ def refuse_model(config: ContactConfig, block: Identify) -> None:
 
 
 def refuse_keys(config: ContactConfig, block: Identify) -> None:
-    """Raise ConfigError for a key that is not a parameter of the models, or a value or prior that cannot be used."""
+    """Raise ConfigError for a key that is no parameter of the models, and for a value or prior that cannot be used."""
     refuse_values(config, "fit", block.fit, block.models)
     refuse_values(config, "prior", {key: pair[:1] for key, pair in block.prior.items()}, block.models)
     for key, (value, sigma) in block.prior.items():

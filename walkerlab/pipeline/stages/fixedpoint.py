@@ -43,7 +43,7 @@ STATE = Label("rad, rad/s", "state just after heel strike", ("coordinate",))
 def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
     """Find the gaits of each set of equations.
 
-    again  whether the advice then names nearby gaits, which takes a second
+    again  whether to name nearby gaits if none is found, which takes a second
 
     Raises NoAnswer if the config's own set has no physical gait.
     """
@@ -66,7 +66,7 @@ def run(config: FixedPointConfig, _inputs: Mapping[str, Content], progress: Prog
 
 
 def suggest_nearby(config: RigidConfig) -> str:
-    # imported here: most walkers have a gait
+    # Imported here, because it is needed only if no gait is found.
     from walkerlab.scene.gait_suggestions import suggest_gaits
 
     return suggest_gaits(config)
@@ -113,7 +113,7 @@ def summary(config: RigidConfig, searches: Mapping[str, GaitSearch]) -> dict[str
 
 
 def numbers_of(gait: RigidGait) -> dict[str, Label]:
-    """Return the labels of a gait's quantities, including the knees' if it has any."""
+    """Return the labels of a gait's quantities, with that of the knee strike for walkers with knees."""
     return NUMBERS if gait.knee_strike is None else NUMBERS | KNEE_LABELS
 
 

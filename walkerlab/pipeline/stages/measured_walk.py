@@ -50,7 +50,7 @@ MIN_STEPS: Final = 2
 MOST_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
-SAME_TOUCHES: Final = 0.002  # rad, largest change of the sum of leg angles at heel strike that counts as no change
+SAME_TOUCHES: Final = 0.002  # rad; a smaller change of the sum of leg angles at heel strike counts as no change
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -94,7 +94,7 @@ def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWal
 
 
 def doubts_about(block: Identify, config: RigidConfig) -> tuple[str, ...]:
-    """Return sentences about oddities in the block's angles, and about their corrections."""
+    """Describe, in sentences, the oddities of the angles and how they were handled."""
     walk, _ = read_angles(block, config.slope_rad)
     try:
         return (*walk.doubts, *divide_into_steps(walk, rigid_walker(config), block.data).doubts)
@@ -128,9 +128,9 @@ def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> Mea
 
 
 def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]:
-    """Read the recording in the block's file, and return it with the smallest decimal place of its angles (rad).
+    """Read the recording in the block's file. Return it with the smallest decimal place of its angles (rad).
 
-    That is 0 for angles that are computed from markers.
+    The decimal place is 0 for angles that are computed from markers.
     """
     recording = read_recording(Path(block.data), DATA_KEY)
     if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:

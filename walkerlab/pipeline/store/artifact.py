@@ -41,7 +41,7 @@ class Identity:
 
 
 def changed_parts(old: Identity, new: Identity) -> list[str]:
-    """Describe the differences between two identities, or return none if their keys are equal."""
+    """Describe the differences between two identities. There are none if their keys are equal."""
     changes = list(differences("", old.config_slice, new.config_slice))
     for name in sorted({*old.input_keys, *new.input_keys}):
         if old.input_keys.get(name) != new.input_keys.get(name):

@@ -55,7 +55,7 @@ class Swept:
     question: SweptStage
     path: Path  # file of the sweep
     summary: Mapping[str, Any]  # summary stored in the file
-    reused: int  # number of points whose result existed
+    reused: int  # number of points whose stored result was reused
     wall_s: float  # total time
     bugs: tuple[str, ...] = ()  # tracebacks of bugs that stopped the computation of points
 

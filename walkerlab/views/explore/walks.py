@@ -104,7 +104,7 @@ def reach(key: str, first: Any, unit: str, field: FieldInfo, start: Config) -> d
         by = FAR_AROUND if any(part in key for part in BY_MAGNITUDE) else AROUND
         least, most = sorted((first / by, first * by))
         logarithmic = first > 0.0 and low >= 0.0 and high > DECADES * low
-        # a value close to zero must be able to reach the typical size
+        # A slider that starts close to zero must reach the typical size.
         most = max(most, ordinary) if logarithmic else most
     if unit != "deg":
         least = max(least, low)
@@ -133,7 +133,7 @@ def ordinary_size(key: str, unit: str, start: Config) -> float:
     }.get(unit, 0.0)  # fmt: skip
 
 
-@lru_cache(maxsize=1000)  # asked again for every key whenever a slider is released
+@lru_cache(maxsize=1000)  # called again for every key whenever a slider is released
 def gaits_by(key: str, start: Config) -> Parameter | None:
     """Return the key as a parameter along which gaits can be followed, or None if no model depends on it."""
     try:
@@ -279,7 +279,8 @@ def numbers(question: ExploredConfig) -> Answered:
 def follow_gaits(question: ExploredConfig) -> Answered:
     """Follow gaits over one key: values, quantities and stability along each model's branches.
 
-    The request's changes contain the block `continuation`: key, ends and points. Status 409 if a newer request came.
+    The request's changes contain the block `continuation`: key, ends and points. The status is 409 if a newer request
+    has arrived.
     """
     try:
         config = question.loaded.config

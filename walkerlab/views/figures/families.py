@@ -166,7 +166,8 @@ ATTRACTOR_QUANTITIES: Final = {"step_period": "step period", "stance_angle": "st
 ROOM: Final = 0.06
 """Margin around the stable gaits, relative to their span; unstable branches are cut off beyond it."""
 MIN_PANEL_SPAN: Final = 0.05
-"""Minimum span of panel (b) as a fraction of the full range, and of a vertical axis as a fraction of its magnitude."""
+"""Panel (b) spans at least this fraction of the full range, and a vertical axis at least this fraction of its values.
+"""
 TOLD_APART: Final = 0.04
 """Minimum distance between the labels of gaits born in folds, as a fraction of the axis."""
 CLOSER: Final = 0.8
@@ -243,7 +244,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
 
 
 def close_of(results: Results) -> tuple[float, float] | None:
-    """Return the parameter range around the bifurcations and any attractor, or None if it is no closer view."""
+    """Return the parameter range around the bifurcations and any attractor, or None if that is no closer view."""
     summary = results[CONTINUATION_STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]
     if not found:

@@ -32,8 +32,8 @@ class Need:
     scene: str = ""
 
     def missing_in(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why the requirement is not met, or None if it is. `absent` holds the reason for each missing result,
-        by stage.
+        """Return the reason why the requirement is not met, or None if it is met. `absent` holds the reason for each
+        missing result, by stage.
         """
         if self.stage not in results:
             why = absent.get(self.stage)
@@ -81,8 +81,8 @@ class Illustration:
         return f"figure {self.name if self.number is None else self.number}"
 
     def why_left_out(self, results: Results, absent: Mapping[str, str]) -> str | None:
-        """Return why it cannot be drawn, or None if it can. `absent` holds the reason for each missing result, by
-        stage.
+        """Return the reason why the illustration cannot be drawn, or None if it can. `absent` holds the reason for each
+        missing result, by stage.
         """
         reasons = (need.missing_in(results, absent) for need in self.needs)
         return next((reason for reason in reasons if reason is not None), None)

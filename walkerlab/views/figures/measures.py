@@ -32,9 +32,9 @@ SECOND_LEG_ANGLE = -0.3
 BENT_ANGLE = -0.75
 """Angle (rad) at which the shank of the second leg is drawn."""
 LEFT_OF_LEG = 0.62
-"""Distance (leg lengths) of the labels behind the leg from it."""
+"""Distance (leg lengths) between the leg and the labels behind it."""
 FIRST_LANE = 0.24
-"""Distance (leg lengths) of the first dimension line ahead of the leg from it."""
+"""Distance (leg lengths) between the leg and the first dimension line ahead of it."""
 LETTER = 0.0088
 """Width of a character as a fraction of the picture's width."""
 LINE_SPACING = 0.0195
@@ -168,7 +168,7 @@ class View:
     """Part of the plane (m) around a leg that shows all its labels, and where they are."""
 
     labels: list[tuple[str, str, Point]]  # text, colour and position of each label behind the leg
-    heights: list[float]  # of these labels
+    heights: list[float]  # height of each of these labels
     lanes: list[list[Length]]  # vertical dimensions ahead of the leg, by lane
     ahead: list[int]  # number of characters that fit in each lane
     left: float

@@ -39,7 +39,7 @@ FIRST_VALUES = 4
 LAST_VALUES = 6
 """Number of values shown at the end of a long row."""
 MAX_CYCLE = 12
-"""Maximum number of steps of a cycle whose periods a sentence lists."""
+"""A sentence lists the periods of a cycle only if it has at most this many steps."""
 
 
 def answer(stage: str, summary: Summary) -> list[str]:

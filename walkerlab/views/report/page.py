@@ -154,7 +154,7 @@ def text_content(text: str | None, name: str) -> Markup:
 
 
 def shorten_attribute(name: str, value: str) -> str:
-    """Shorten an attribute: coordinates to a hundredth of a point, colours to CSS variables."""
+    """Shorten the value of an attribute: round coordinates to 0.01 pt, and replace colours by CSS variables."""
     if name in ("id", "href", "clip-path"):
         return value.strip()
     if name == "style":
@@ -184,7 +184,7 @@ class Page:
     file: str = MAIN
     study: Source | None = None  # the study reproduced, or None
     relation: str = "Redoes"  # first word of the line about the study: Redoes, or After if the scene differs
-    pending: tuple[LeftOut, ...] = ()  # results still being computed, or not yet when the command was stopped
+    pending: tuple[LeftOut, ...] = ()  # results that are not computed yet, or were not when the command was stopped
     run: str = ""  # name of the run for suggested commands; empty for the default run
 
 
@@ -203,7 +203,7 @@ def render(page: Page) -> str:
 
 
 def digest_of(script: str) -> str:
-    """Return the hash by which the page's content security policy recognises its own script."""
+    """Return the hash by which the page's content security policy recognises the script of the page."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
 

@@ -1,4 +1,4 @@
-"""Plots a sweep and writes its page."""
+"""Plot a sweep, and write its page."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -61,7 +61,7 @@ def check_quantities(group: Group, names: Sequence[str], option: str = "--show")
 
 
 def check_options(stage: str, names: Mapping[str, str], variables: Collection[str]) -> None:
-    """Raise ConfigError for an unknown quantity in `names` (by option). Nested ones may appear later."""
+    """Raise ConfigError for an unknown quantity in `names` (by option). Quantities in blocks may still appear later."""
     available = sorted({*variables, *HEADLINES.get(stage, ())} - {"outcome"})
     for option, name in names.items():
         if name not in available and "." not in name:

@@ -17,7 +17,7 @@ EMPTY_CELL: Final = "--"
 PACKAGES: Final = r"% \usepackage{booktabs, graphicx, siunitx}"
 WITHOUT_GRAPHICX: Final = r"\providecommand{\resizebox}[3]{#3}"
 SHRINK: Final = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
-"""Begin of a box that is at most as wide as the text around it."""
+"""Start of a box that is at most as wide as the text around it."""
 MIN_HEAD: Final = 10
 """Number of characters of a column's head that always stay on one line."""
 MAX_UNWRAPPED: Final = 28
@@ -81,7 +81,7 @@ def type_size(cells: Sequence[Sequence[str]], columns: int) -> str:
 
 
 def head_rows(titles: Sequence[str], layouts: Sequence[str], cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return the lines of each column's head: words over one another, and units in a row of their own."""
+    """Return the lines of each column's head: one word above the other, and the unit in a row of its own."""
     parts = [TITLE.fullmatch(title) for title in titles]
     has_units = any(part and part["unit"] for part in parts)
     heads = []
@@ -103,7 +103,7 @@ def format_column(data: Sequence[Any]) -> tuple[str, list[str]]:
     written = column_format(numbers)
     cells = [written(value) if is_number(value) else escape_tex(value) for value in data]
     decimals = [cell for cell in cells if DECIMAL.fullmatch(cell)]
-    # text that looks like numbers, such as printed values, makes the column numeric if it is most of the column
+    # Text that looks like numbers, such as printed values, counts as numbers if most of the column looks like it.
     if not numbers and 2 * len(decimals) <= len(cells) - cells.count(EMPTY_CELL):
         longest, longest_word = (max(map(len, texts), default=0) for texts in (cells, " ".join(cells).split()))
         return WRAPPED if longest_word <= MAX_UNWRAPPED < longest else "l", cells

@@ -14,7 +14,7 @@ from walkerlab.views.report.words import words
 NO_EFFECT = 1e-6
 """Fraction of the largest singular value below which a parameter combination counts as having no effect on any walk."""
 CONTRADICTION = 3.0  # distance (standard errors) beyond which a prior and the walk contradict each other
-NOTABLE_CHANGE = 0.5  # of an estimate, in standard errors, if a fixed parameter is 1 % larger
+NOTABLE_CHANGE = 0.5  # change of an estimate (standard errors) that is reported, if a fixed parameter is 1 % larger
 UNITS_IN_WORDS = {"deg": " degrees", "1": "", "": ""}
 TIME_ORIGINS = {"time_offset_s": " from the first heel strike"}
 GAIT_WORDS = {
@@ -119,7 +119,7 @@ def tables(summary: Mapping[str, Any]) -> list[Table]:
 def sensitive_rows(summary: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return the fixed parameters, the most influential first, with the change of each estimate if one is 1 % larger.
 
-    A parameter is left out if this changes all estimates by less than half a standard error.
+    A parameter is left out if its change moves all estimates by less than half a standard error.
     """
     rows = dict[str, dict[str, Any]]()
     errors = {row["key"]: row["standard_error"] for row in estimates}

@@ -82,7 +82,7 @@ def design_blocks(summary: Mapping[str, Any]) -> list[str | Table]:
 
 
 def is_worse(row: Mapping[str, Any]) -> bool:
-    """Whether a gait is less robust at the optimum than at the start: survives less, or is more sensitive."""
+    """Whether a gait is less robust at the optimum than at the start: it survives less, or is more sensitive."""
     change = row["best"] / row["start"] - 1.0 if row["start"] else 0.0
     return (change if row["quantity"].startswith("largest") else -change) < -WORSE
 
