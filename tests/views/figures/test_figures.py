@@ -156,7 +156,7 @@ assert "matplotlib.pyplot" not in sys.modules, "pyplot has state, and opens wind
 """
 
 
-def test_equal_results_give_equal_bytes_in_any_process_and_matplotlib_style(tmp_path):
+def test_equal_results_give_equal_bytes_in_any_process_and_style(tmp_path):
     (tmp_path / "matplotlibrc").write_text(OWN_SETTINGS)
     here, package = Path(__file__).parent, Path(__file__).parents[3]
     environment = {
