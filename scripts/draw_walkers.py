@@ -39,7 +39,7 @@ def pictures() -> dict[str, bytes]:
     }
     return {
         **found,
-        "walker-parts.svg": draw_measures(own_parts().walker, "parts"),
+        "walker-parts.svg": draw_measures(config_of_parts().walker, "parts"),
         "walker-angles.svg": draw_angles(),
     }
 
@@ -73,7 +73,7 @@ def draw_angles(swing: float = -0.42, stance: float = 0.22) -> bytes:
         return files_of(figure, "angles", "Leg angles of the compass walker from the vertical", ["svg"])[0]
 
 
-def own_parts() -> Config:
+def config_of_parts() -> Config:
     """Return the config by which the page explains a walker made of parts."""
     example = OWN_PARTS.search(PAGE.read_text(encoding="utf-8"))
     assert example is not None, f"{PAGE} has an example named own-parts"

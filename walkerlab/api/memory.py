@@ -102,7 +102,7 @@ def shows(keys: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
     return copy_signature
 
 
-def passed(keys: Mapping[str, object]) -> dict[str, Setting]:
+def stated_keys(keys: Mapping[str, object]) -> dict[str, Setting]:
     """Return the keys that a caller passed. None leaves a key at its default."""
     return {name: cast(Setting, value) for name, value in keys.items() if value is not None}
 
@@ -135,7 +135,7 @@ def compass(**keys: Unpack[CompassKeys]) -> CompassWalker:
     >>> compass(hip_mass_kg=20).total_mass_kg
     30.0
     """
-    return cast(CompassWalker, walker("compass", **passed(keys)))
+    return cast(CompassWalker, walker("compass", **stated_keys(keys)))
 
 
 @shows(KneedKeys)
@@ -150,7 +150,7 @@ def kneed(**keys: Unpack[KneedKeys]) -> Kneed:
     >>> kneed(hip_mass_kg=1.0).total_mass_kg
     2.1
     """
-    return cast(Kneed, walker("kneed", **passed(keys)))
+    return cast(Kneed, walker("kneed", **stated_keys(keys)))
 
 
 @shows(ContactKeys)
@@ -165,7 +165,7 @@ def contact(**keys: Unpack[ContactKeys]) -> Contact:
     >>> contact(static_friction=0.6, dynamic_friction=0.5).stiffness
     100000.0
     """
-    block = validate_tree(tree_of({"contact": passed(keys)}, NOWHERE)).contact
+    block = validate_tree(tree_of({"contact": stated_keys(keys)}, NOWHERE)).contact
     assert block is not None, "a block set by an argument is in the config"
     return block
 

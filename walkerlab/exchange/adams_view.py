@@ -22,7 +22,7 @@ def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
     commands = ", ".join(map(quote, model.commands(end_s, pinned_until_s)))
     script = command("simulation script create", sim_script_name=f".{model.name}.walk", solver_commands=commands)
-    lines += [line for each in (*building(model), script) for line in each]
+    lines += [line for each in (*build_commands(model), script) for line in each]
     return "\n".join([*lines, ""])
 
 
@@ -36,7 +36,7 @@ def quote(text: str) -> str:
     return f'"{text}"'
 
 
-def building(model: AdamsModel) -> Iterator[list[str]]:
+def build_commands(model: AdamsModel) -> Iterator[list[str]]:
     root = f".{model.name}"
 
     def full(name: str) -> str:

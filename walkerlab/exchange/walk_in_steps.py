@@ -106,7 +106,7 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         )
     step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
     refuse_duration(step_s, source)
-    refuse_hurry(step_s, model, source)
+    refuse_short_steps(step_s, model, source)
     refuse_spread(walk, touches, source)
     offsets = offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height)
     doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
@@ -334,7 +334,7 @@ def unit_doubts(touches: list[Touch]) -> Iterator[str]:
         )
 
 
-def refuse_hurry(step_s: float, model: RigidModel, source: str) -> None:
+def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
     """Raise ConfigError for steps that are far shorter than a leg takes to swing forwards."""
     gravity = math.hypot(model.gravity_along, model.gravity_down)
     weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])

@@ -191,7 +191,7 @@ def identify_with(
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
         fit(problem, start, begin(f"{model} model, start {number} of {question.starts}", MAX_ROUNDS))
-        for number, start in enumerate(starts_of(problem, question.starts), 1)
+        for number, start in enumerate(fit_starts(problem, question.starts), 1)
     ]
     predicted = [result for result in fits if result is not None]
     if not predicted:
@@ -232,7 +232,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
 
 
-def starts_of(problem: FitProblem, count: int) -> list[Floats]:
+def fit_starts(problem: FitProblem, count: int) -> list[Floats]:
     """Return the starts of the fit, each (unknowns,): the config's values, then random values near them."""
     rng = np.random.default_rng(0)
     count_parameters = problem.forecast.scales.size

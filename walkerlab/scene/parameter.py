@@ -130,7 +130,7 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    reason = why_no_parameter(key, config, own, stated_value)
+    reason = explain_non_parameter(key, config, own, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
     unit = annotation_of(own[key], "unit") or "1"
@@ -144,10 +144,10 @@ def parameter_keys(config: ContactConfig) -> Iterator[str]:
     """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
     written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
-    yield from (written.get(key, key) for key in own if not why_no_parameter(key, config, own))
+    yield from (written.get(key, key) for key in own if not explain_non_parameter(key, config, own))
 
 
-def why_no_parameter(
+def explain_non_parameter(
     key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""

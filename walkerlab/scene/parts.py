@@ -48,7 +48,7 @@ def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
         shank = Limb(lower.length_m, lower.mass_kg, lower.mass_below_knee_m, lower.mass_ahead_m, lower.inertia_kg_m2)
         return kneed_legs(thigh, shank, walker.hip_mass_kg, Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
-    return own_parts(walker)
+    return described_parts(walker)
 
 
 def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
@@ -61,7 +61,7 @@ def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
     return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - present)
 
 
-def own_parts(walker: AssembledWalker) -> Assembly:
+def described_parts(walker: AssembledWalker) -> Assembly:
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),

@@ -37,9 +37,9 @@ from walkerlab.pipeline.stages.walk import (
     TIME,
     count_outcomes,
     legs,
-    numbers_of,
     rigid_start,
     step_columns,
+    summarise_walk,
     variables_over_time,
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, real_and_imaginary, rows_group
@@ -196,7 +196,7 @@ class TuneRun:
 
 
 def walk_summary(walk: ContactWalkResult) -> dict[str, Any]:
-    quantities = numbers_of(walk)
+    quantities = summarise_walk(walk)
     return {key: quantities[key] for key in WALK_SUMMARY_KEYS}
 
 

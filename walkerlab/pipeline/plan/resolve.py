@@ -69,7 +69,7 @@ def resolve(
     else:
         read = load(path, sets, strides, name)
         source = source_of(path, runs)
-    refuse_what_makes_no_walker(read)
+    refuse_invalid_parts(read)
     for stage in PIPELINE.stages:
         stage.checks(read.config)
     changes = [*sets, *([] if strides is None else [f"strides={strides}"])]
@@ -122,7 +122,7 @@ def warn_of_edits(config: Config | None, folder: RunFolder, warn: Callable[[str]
         )
 
 
-def refuse_what_makes_no_walker(read: LoadedConfig) -> None:
+def refuse_invalid_parts(read: LoadedConfig) -> None:
     """Raise ConfigError, with a position in the file, if the parts listed in a config do not form a walker."""
     config = read.config
     if not isinstance(config.walker, AssembledWalker):

@@ -117,7 +117,7 @@ class WorkerTimeoutError(Exception):
 
 
 @dataclass(frozen=True)
-class Told:
+class CallMessage:
     """Message that a running call sends."""
 
     value: Any
@@ -176,7 +176,7 @@ class Worker:
         work = pickle.dumps(call)
         with contextlib.suppress(OSError):  # a dead worker is noticed because its answer is missing
             self._line.send_bytes(work)
-        while isinstance(message := self._receive(timeout_s), Told):
+        while isinstance(message := self._receive(timeout_s), CallMessage):
             if hear is not None:
                 hear(message.value)
         if message.error is not None:
@@ -184,11 +184,11 @@ class Worker:
         value: R = message.value
         return value
 
-    def _receive(self, timeout_s: float | None) -> Told | Answer:
+    def _receive(self, timeout_s: float | None) -> CallMessage | Answer:
         try:
             if not self._line.poll(timeout_s):
                 raise WorkerTimeoutError
-            message: Told | Answer = self._line.recv()
+            message: CallMessage | Answer = self._line.recv()
         except (EOFError, OSError):
             raise WorkerDiedError(self.ended()) from None
         return message
@@ -309,7 +309,7 @@ class LeaveError(BaseException):
 def tell(value: Any) -> None:
     """Send a message to the parent process."""
     assert _lines, "only calls in a worker send messages"
-    _lines[0].send(Told(value))
+    _lines[0].send(CallMessage(value))
 
 
 _lines: list[Connection] = []

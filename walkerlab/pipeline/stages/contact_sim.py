@@ -22,10 +22,10 @@ from walkerlab.pipeline.stages.walk import (
     content_of_walk,
     legs,
     measure_pace,
-    numbers_of,
     rigid_start,
     step_asymmetry,
     steps_of,
+    summarise_walk,
     turning,
     variables_over_time,
 )
@@ -63,7 +63,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     tolerances = tolerances_of(config, steps)
     interval = scene.ground.frame.pendulum_time / SAMPLES_PER_PENDULUM_TIME if config.outputs else None
     heights = foothold_heights(config.ground, steps + 1)
-    tell_unresolved_slip(tolerances.atol, scene, progress)
+    warn_of_unresolved_slip(tolerances.atol, scene, progress)
 
     def walk(tolerances: Tolerances, sampled: bool) -> ContactWalkResult:
         progress.start("contact-sim" if sampled else "contact-sim: numerical error", 1)
@@ -76,7 +76,7 @@ def run(config: ContactSimConfig, inputs: Mapping[str, Content], progress: Progr
     return content_of_walk("contact-sim", walk, tolerances, stored, summarise, progress, again)
 
 
-def tell_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
+def warn_of_unresolved_slip(atol: float, scene: ContactScene, progress: Progress) -> None:
     """Warn if the tolerance on velocities (m/s) is too coarse for the friction law."""
     rising = scene.walker.friction.rising_until
     if atol > RESOLVED * rising:
@@ -99,7 +99,7 @@ def add_stance_time(numbers: Mapping[str, Any], walk: ContactWalkResult) -> dict
 def summary(config: ContactSimConfig, scene: ContactScene, walk: ContactWalkResult) -> dict[str, Any]:
     scuffed = require_contact(config).terrain == "plane" and walk.outcome.stumbled and not scene.walker.kneed
     strikes = walk.knee_strike_time_s
-    numbers = numbers_of(walk)
+    numbers = summarise_walk(walk)
     return {
         **numbers,
         **add_stance_time(numbers, walk),

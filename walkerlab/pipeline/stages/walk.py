@@ -254,7 +254,7 @@ def drive_measures(walk: WalkRecord) -> dict[str, Any]:
     }
 
 
-def settling(walk: WalkRecord) -> dict[str, int | None]:
+def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
     """Return how a walk on even ground settles.
 
     repeats_after  steps after which the last steps repeat, 0 if they do not
@@ -294,7 +294,7 @@ def steps_to_repeat(steps: Floats) -> int:
     return 0
 
 
-def numbers_of(walk: WalkRecord) -> dict[str, Any]:
+def summarise_walk(walk: WalkRecord) -> dict[str, Any]:
     """Summarise a walk of either model, with knee strikes for walkers with knees."""
     strikes = walk.knee_strike_time_s
     knee_strikes = (
@@ -309,7 +309,7 @@ def numbers_of(walk: WalkRecord) -> dict[str, Any]:
         "touch_times_s": walk.touch_time_s.tolist(),
         **knee_strikes,
         **last_stride(walk),
-        **settling(walk),
+        **describe_settling(walk),
         **drive_measures(walk),
         "end_time_s": walk.end_time_s,
         "rhs_evaluations": walk.work.rhs_evaluations,

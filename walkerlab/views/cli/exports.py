@@ -322,7 +322,7 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
     if kind == "mp4" and ffmpeg is None:
         raise ConfigError("an MP4 needs ffmpeg, which is not installed.", "Install it, or write a .gif.")
     # Imported here: a file that cannot be written is refused before drawing code is loaded.
-    from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, sticks_of
+    from walkerlab.views.figures.stick_diagram import FILM_NEEDS, film_times, pictures, read_sticks
 
     rigid, contact = MODEL_NAMES
     shown, *behind = [contact, rigid] if film.model == BOTH else [film.model]
@@ -332,8 +332,8 @@ def write_film(folder: RunFolder, target: Target, film: Film, console: Console) 
             why = FILM_NEEDS[model].missing_in(results, {})
             if why is not None:
                 raise StaleError(f"the walk cannot be drawn: {why}.", STORED_WITH)
-        sticks = sticks_of(walk)
-        other = sticks_of(others[0]) if others else None
+        sticks = read_sticks(walk)
+        other = read_sticks(others[0]) if others else None
         times = film_times(sticks, film.steps, film.rate, film.slower)
         line = console.begin("animate", f"{times.size} pictures")
         line.start("drawing", int(times.size))

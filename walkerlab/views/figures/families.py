@@ -181,7 +181,7 @@ def draw_branches(results: Results) -> Drawn:
     summary = results[CONTINUATION_STAGE].summary
     branches = list(branches_of(results))
     settled = list(clouds(results))
-    close = close_of(results)
+    close = closer_view(results)
     parts = {"(a) full range": None} | ({"(b) bifurcations": close} if close else {})
     if is_narrow():
         figure, stack = panels(5.6 * len(parts), 2 * len(parts))
@@ -243,7 +243,7 @@ def label_births(axes: Axes, births: Sequence[tuple[float, int]]) -> None:
         above.set_xlabel("steps per gait born in a fold")
 
 
-def close_of(results: Results) -> tuple[float, float] | None:
+def closer_view(results: Results) -> tuple[float, float] | None:
     """Return the parameter range around the bifurcations and any attractor, or None if that is no closer view."""
     summary = results[CONTINUATION_STAGE].summary
     found = [item["value"] for item in summary["bifurcations"]]

@@ -14,7 +14,7 @@ from walkerlab.pipeline.store.content import Group
 from walkerlab.views.figures.canvas import add_legend, blank, entry, error_axis, label_of, panels
 from walkerlab.views.figures.families import DASHES, MODEL_COLOURS
 from walkerlab.views.figures.illustration import Drawn, Illustration, Need, Results, paper_figure
-from walkerlab.views.figures.stick_diagram import FAINT_WIDTH, FULL, draw_postures, draw_slope, frame_view, sticks_of
+from walkerlab.views.figures.stick_diagram import FAINT_WIDTH, FULL, draw_postures, draw_slope, frame_view, read_sticks
 from walkerlab.views.figures.style import BLACK, BLUE, GREY, VERMILLION
 
 Values = NDArray[np.float64]
@@ -132,7 +132,7 @@ def push_off_or_hip(group: Group, driven: Mapping[str, NDArray[np.bool_]], _resu
 def plot_rough_ground(results: Results) -> Drawn:
     """Plot figure 18. The caption gives the models, the walk shown (roughness in m, steps) and the number of walks."""
     result = results[ROBUSTNESS_STAGE]
-    sticks = sticks_of(result, "rough_walk/")
+    sticks = read_sticks(result, "rough_walk/")
     steps = result["rough_steps"]
     across = sticks.project(sticks.landings)[:, 0]
     seen = np.concatenate((sticks.hip[:, None], sticks.top[:, None], sticks.feet), axis=1)

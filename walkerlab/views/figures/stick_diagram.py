@@ -139,7 +139,7 @@ class Sticks:
         return at_strikes, np.abs(self.time[:, None] - np.concatenate(between)).argmin(axis=0)
 
 
-def sticks_of(result: Identified, under: str = "") -> Sticks:
+def read_sticks(result: Identified, under: str = "") -> Sticks:
     """Read the joint positions of a stored walk. `under` is the prefix of its groups."""
     asked = result.identity.config_slice
     trajectory = result[f"{under}trajectory"]
@@ -156,7 +156,7 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
         tilted = trajectory["torso_angle"] + slope
         head = hip + walker["torso"]["above_hip_m"] * np.stack((-np.sin(tilted), np.cos(tilted)), axis=-1)
     knees = joints("knee") if "knee_along_m" in trajectory.variables else None
-    radii = radii_of(walker)
+    radii = sole_radii(walker)
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
         radii = 0.0, 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
     levels = ground_levels(steps)
@@ -176,7 +176,7 @@ def sticks_of(result: Identified, under: str = "") -> Sticks:
     )  # fmt: skip
 
 
-def radii_of(walker: Mapping[str, Any]) -> tuple[float, float]:
+def sole_radii(walker: Mapping[str, Any]) -> tuple[float, float]:
     """Return the radius (m) of each foot of a stored walker."""
     if "feet" in walker:
         first, second = (float(foot["radius_m"]) for foot in walker["feet"])
@@ -306,7 +306,7 @@ def draw_ground(axes: Axes, sticks: Sticks, pads: Group | None) -> list[Artist]:
 def draw_cycle(stage: str, results: Results) -> Drawn:
     """Draw one gait cycle of a stage's walk on its pads or plane (figures 2 and 6)."""
     result = results[stage]
-    sticks = sticks_of(result)
+    sticks = read_sticks(result)
     pads = result.groups.get("terrain")
     figure, axes = stick_diagram(sticks)
     add_legend(figure, [*entries(sticks), *draw_ground(axes, sticks, pads)])

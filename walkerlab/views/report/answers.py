@@ -152,7 +152,7 @@ def walk(model: str, summary: Summary) -> list[str | Table]:
     advised = summary.get("advice") and summary["outcome"] != WALKED_LABEL
     return [
         f"{head}.",
-        " ".join(settling(summary)),
+        " ".join(settling_sentences(summary)),
         side_by_side("", columns, step_rows, head="step"),
         side_by_side("", WALK_ROWS, {"": summary}, head=""),
         f"numerical error: {describe_error(error)}." if error else "",
@@ -176,7 +176,7 @@ def each_step(summary: Summary) -> dict[str, Summary]:
     }
 
 
-def settling(summary: Summary) -> Iterator[str]:
+def settling_sentences(summary: Summary) -> Iterator[str]:
     """Yield sentences about a gait that a walk leaves, and about the cycle of steps that it repeats in the end."""
     from walkerlab.views.report.sections.walks import format_step
 

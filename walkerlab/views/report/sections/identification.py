@@ -56,9 +56,9 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     verdict = verdict_of(summary)
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
-    references = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
-    masses = [estimate_in_words(row) for row in known if row["key"].endswith("mass_kg")]
-    others = [estimate_in_words(row) for row in known if not row["key"].endswith("mass_kg")]
+    references = [describe_mass(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
+    masses = [describe_estimate(row) for row in known if row["key"].endswith("mass_kg")]
+    others = [describe_estimate(row) for row in known if not row["key"].endswith("mass_kg")]
     condition = f" if {join_words(references)}" if references else ""
     determined = capitalised("; ".join([*([join_words(masses) + condition] if masses else []), *others]))
     keys = [row["key"] for row in summary["estimates"]]
@@ -74,15 +74,15 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     singular = summary["singular_values"]
     without_effect = separable and min(singular) < NO_EFFECT * max(singular)
     parameters = (determined, bool(masses and references), left_open, separable, without_effect)
-    beside = (priors_in_words(summary["prior"]), nuisances_in_words(summary["nuisance"]), is_usable(verdict))
-    quality = (other, gait_in_words(summary["gait"]), noise_in_words(summary), is_usable(verdict))
+    beside = (contradicted_priors(summary["prior"]), describe_nuisances(summary["nuisance"]), is_usable(verdict))
+    quality = (other, describe_gait(summary["gait"]), describe_noise(summary), is_usable(verdict))
     measured = summary.get("measured_spectral_radius")
     held = next(iter(sensitive_rows(summary, known)), None)
     return [
         *words.parts("identify.findings", summary, verdict, *parameters, *beside),
         *words.parts("identify.quality", summary, verdict, *quality),
-        *([radius_in_words(measured)] if measured and is_usable(verdict) else []),
-        *([change_in_words(held, known)] if held and is_usable(verdict) else []),
+        *([describe_radius(measured)] if measured and is_usable(verdict) else []),
+        *([describe_change(held, known)] if held and is_usable(verdict) else []),
     ]
 
 
@@ -152,21 +152,21 @@ def value_and_error(value: float, error: float | None, unit: str) -> str:
     return f"{fixed(value, decimals_of(error))} ± {fixed(error, decimals_of(error))}{ending}"
 
 
-def mass_in_words(key: str, text: str) -> str:
+def describe_mass(key: str, text: str) -> str:
     """Describe a mass in a phrase such as 'the hip weighs 9.8 ± 0.2 kg'."""
     body = axis_label(key).removesuffix(" mass")
     return f"the legs weigh {text} kg each" if body == "leg" else f"the {body} weighs {text} kg"
 
 
-def estimate_in_words(row: Mapping[str, Any]) -> str:
+def describe_estimate(row: Mapping[str, Any]) -> str:
     value = value_and_error(row["value"], row["standard_error"], row["unit"])
     bound = " (at its bound)" if row["at_bound"] else ""
     if row["key"].endswith("mass_kg"):
-        return mass_in_words(row["key"], value.removesuffix(" kg")) + bound
+        return describe_mass(row["key"], value.removesuffix(" kg")) + bound
     return f"the {axis_label(row['key'])} is {value}{bound}"
 
 
-def change_in_words(held: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> str:
+def describe_change(held: Mapping[str, Any], estimates: Sequence[Mapping[str, Any]]) -> str:
     """Describe how estimates change if the most influential fixed parameter is off."""
     change = quantity(held["change"], unit_by_name(held["to"]), 2)
     units = [UNITS_IN_WORDS.get(row["unit"], f" {row['unit']}") for row in estimates]
@@ -182,7 +182,7 @@ def label_combination(combination: str, keys: Sequence[str]) -> str:
     return combination
 
 
-def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
+def contradicted_priors(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, float]]:
     """Return label and value of each prior that the walk contradicts, and the distance in standard errors."""
     return [
         (axis_label(row["key"]), value_and_error(row["value"], row["standard_deviation"], row["unit"]), row["distance"])
@@ -191,7 +191,7 @@ def priors_in_words(priors: Sequence[Mapping[str, Any]]) -> list[tuple[str, str,
     ]
 
 
-def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
+def describe_nuisances(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     return capitalised(
         join_words(
             f"the {axis_label(name)}{TIME_ORIGINS.get(name, '')} is "
@@ -201,7 +201,7 @@ def nuisances_in_words(nuisances: Mapping[str, Mapping[str, float]]) -> str:
     )
 
 
-def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
+def describe_gait(gait: Mapping[str, Mapping[str, float]]) -> str:
     parts = [
         said.format(value_and_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
         for name, said in GAIT_WORDS.items()
@@ -210,7 +210,7 @@ def gait_in_words(gait: Mapping[str, Mapping[str, float]]) -> str:
     return f"The identified gait has {join_words(parts)}" if parts else ""
 
 
-def radius_in_words(radius: Mapping[str, float]) -> str:
+def describe_radius(radius: Mapping[str, float]) -> str:
     value = value_and_error(radius["value"], radius["standard_error"], "1")
     plain = fixed(radius["plain"], decimals_of(radius["standard_error"]))
     return (
@@ -218,7 +218,7 @@ def radius_in_words(radius: Mapping[str, float]) -> str:
     )
 
 
-def noise_in_words(summary: Mapping[str, Any]) -> str:
+def describe_noise(summary: Mapping[str, Any]) -> str:
     """Describe the disturbances of the walk and the noise of the measurement."""
     process = summary["noise"]["process"]
     floor, share = (number(value, 2) for value in (1e3 * process["roughness_m"], 100.0 * process["share_of_leg"]))
