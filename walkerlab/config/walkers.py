@@ -592,8 +592,10 @@ def too_light_for_contact(walker: Any) -> str:
 
 def why_no_contact(walker: Any) -> str:
     """Explain why a walker cannot have a contact block, with advice, or return '' if it can."""
-    why = too_light_for_contact(walker)
-    return f"cannot carry this walker, as {why}; leave the contact block out, or give the legs mass" if why else ""
+    reason = too_light_for_contact(walker)
+    return (
+        f"cannot carry this walker, as {reason}; leave the contact block out, or give the legs mass" if reason else ""
+    )
 
 
 def why_no_state(start: Any, walker: Any) -> str:
@@ -625,9 +627,9 @@ def why_rigid_alone(walker: Any) -> str:
 
 def contact_required_error(request: str, walker: Any, instead: str) -> ConfigError:
     """Build the error for a request that needs contact. `instead` is the advice if only the block is missing."""
-    why = too_light_for_contact(walker)
-    if why:
-        return ConfigError(f"{request} needs contact, but {why}.", "Use the rigid model, or give the legs mass.")
+    reason = too_light_for_contact(walker)
+    if reason:
+        return ConfigError(f"{request} needs contact, but {reason}.", "Use the rigid model, or give the legs mass.")
     return ConfigError(f"{request} needs a contact block, but the config has none.", instead)
 
 
@@ -640,8 +642,8 @@ def load_walkers() -> dict[str, type[Block]]:
         try:
             found[word] = load(code)
         except Exception as error:
-            why = f"{type(error).__name__}: {error}"
-            warnings.warn(f"the walker type {word} of an extension ({code}) is left out: {why}", stacklevel=2)
+            reason = f"{type(error).__name__}: {error}"
+            warnings.warn(f"the walker type {word} of an extension ({code}) is left out: {reason}", stacklevel=2)
     return found
 
 

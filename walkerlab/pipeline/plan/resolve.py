@@ -158,7 +158,7 @@ def run_at(text: str, runs: Path) -> tuple[RunFolder, ConfigFile] | None:
         return None
     config = config_text(folder)
     if config is None:
-        bad = "".join(f" {why}." for why in read_all(folder, stored_in(folder))[1].values())
+        bad = "".join(f" {reason}." for reason in read_all(folder, stored_in(folder))[1].values())
         raise ConfigError(
             f"{folder.path} has no result to take a config from.{bad}", "Give a run folder, an artifact or a file."
         )

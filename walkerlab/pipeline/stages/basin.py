@@ -171,8 +171,8 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
 def group_of(settings: Basin, window: Window, ends: WalkEnds, walking: Floats) -> Group:
     dims: tuple[str, ...] = tuple(settings.plane)
     variables: dict[str, Variable] = {
-        name: Variable(window.cell_centres(place), (name,), UNITS[axis], TEXTS[axis])
-        for place, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
+        name: Variable(window.cell_centres(index), (name,), UNITS[axis], TEXTS[axis])
+        for index, (name, axis) in enumerate(zip(dims, window.axes, strict=True))
     }
 
     def grid_variable(values: Any, text: str) -> Variable:

@@ -339,8 +339,8 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
         for end in branch.ends:
             outcome = end.reason.partition(":")[0]
             if outcome_of(outcome) is not None:
-                why = ground_causes(outcome, config, family.model == CONTACT)
-                text = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *why])
+                reason = ground_causes(outcome, config, family.model == CONTACT)
+                text = " ".join([f"At {end.value:.5g} {parameter.unit} {gait} ends ({end.reason}).", *reason])
                 yield {"period": branch.period, "value": end.value, "outcome": outcome, "said": text}
         for crossing in branch.crossings:
             if crossing.monitor.name == "tripped":
@@ -355,10 +355,10 @@ def ending_rows(family: Family, parameter: Parameter, config: ContactConfig) -> 
 def side_beyond(branch: GaitBranch, crossing: Crossing, step_map: StepMap | None) -> str:
     """Return the side of a crossing ('above' or 'below') on which the monitored quantity exceeds its limit."""
     assert step_map is not None, "a followed branch has a step map"
-    place = list(step_map.monitors).index(crossing.monitor)
+    index = list(step_map.monitors).index(crossing.monitor)
     limit = crossing.monitor.limit
     nearest = min(branch.points, key=lambda point: abs(point.value - crossing.value))
-    beyond = limit is not None and nearest.monitors[place] > limit
+    beyond = limit is not None and nearest.monitors[index] > limit
     return "Above" if beyond == (nearest.value > crossing.value) else "Below"
 
 
@@ -467,4 +467,4 @@ def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> li
         for family in families
         if second is not None and family.branches and not second.touches(family.model)
     ]
-    return [{"what": what, "why": why, "saves": ""} for what, why in entries]
+    return [{"what": what, "why": reason, "saves": ""} for what, reason in entries]

@@ -149,9 +149,9 @@ def refuse(config: DesignConfig) -> None:
     own = [parameter.value_in(config) for parameter in parameters]
     bounds = list(design.over.values())
     corners = np.column_stack((own, bounds)).T
-    for place, parameter in enumerate(parameters):
-        for bound in bounds[place]:
-            neighbours = (np.where(np.arange(len(parameters)) == place, bound, corner) for corner in corners)
+    for index, parameter in enumerate(parameters):
+        for bound in bounds[index]:
+            neighbours = (np.where(np.arange(len(parameters)) == index, bound, corner) for corner in corners)
             if all(config_with(config, parameters, x.tolist()) is None for x in neighbours):
                 raise parameter.refusal(config, bound, ("design", "over"))
 

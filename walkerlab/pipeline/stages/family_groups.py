@@ -162,9 +162,9 @@ def branch_group(
         **columns(points, {**value, **POINTS}, "point"),
         **real_and_imaginary("multiplier", multipliers, ("point", "multiplier"), "multiplier"),
     }
-    for place, monitor in enumerate(monitors):
+    for index, monitor in enumerate(monitors):
         label = Label(monitor.unit, monitor.meaning)
-        variables[monitor.name] = labelled([point.monitors[place] for point in points], label, "point")
+        variables[monitor.name] = labelled([point.monitors[index] for point in points], label, "point")
     if marks:
         labels = MARKS | {"value": Label(value["value"].unit, "value at the bifurcation", name="mark_value")}
         variables |= columns(marks, labels, "mark")

@@ -150,7 +150,7 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
 
 def smallest_decimal(values: Floats) -> float:
     """Return the smallest decimal place that the values use: 0.001 for 0.72 and 0.725, 1 for whole numbers."""
-    return next((10.0**-place for place in range(16) if np.array_equal(np.round(values, place), values)), 0.0)
+    return next((10.0**-index for index in range(16) if np.array_equal(np.round(values, index), values)), 0.0)
 
 
 def divide_angles(

@@ -117,8 +117,8 @@ def read_artifact(path: Path) -> Recording:
     for name, variable in group.variables.items():
         if variable.dims[:1] != ("time",) or name not in (*LEG_QUANTITIES, *WALKER_QUANTITIES) or name == TIME:
             continue
-        for place, values in enumerate(np.atleast_2d(np.asarray(variable.values, float).T)):
-            column = f"{name} {place + 1}" if variable.values.ndim > 1 else name
+        for index, values in enumerate(np.atleast_2d(np.asarray(variable.values, float).T)):
+            column = f"{name} {index + 1}" if variable.values.ndim > 1 else name
             columns[column], units[column] = values, variable.units
     return Recording(path, columns, units)
 

@@ -156,9 +156,9 @@ def run(
         groups |= {"rough_steps": rough_steps(config, steps), **rough_walk(config, inputs)}
     content = Content(groups, {**answer, "steps": config.robustness.steps})
     if unstable:
-        why = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
+        reason = f"the gait of the {' and the '.join(unstable)} model is unstable: it has no sensitivity norm"
         raise NoAnswer(
-            why, "Choose a slope with a stable gait: `walkerlab continuation` shows where they are.", content
+            reason, "Choose a slope with a stable gait: `walkerlab continuation` shows where they are.", content
         )
     return content
 
@@ -168,8 +168,8 @@ def refuse(config: RobustnessConfig) -> None:
     block = config.robustness
     if block.model in (CONTACT, "both") and config.contact is None:
         raise contact_required_error(f"robustness.model: {block.model}", config.walker, "Add one, or choose rigid.")
-    for place, key in enumerate(block.to or ()):
-        parameter_of(key, config, ("robustness", "to", place))
+    for index, key in enumerate(block.to or ()):
+        parameter_of(key, config, ("robustness", "to", index))
         refuse_unread("robustness.to", key, config, models_of(config))
     half = 0.5 * config.walker.leg_length_m
     for roughness in block.roughness_m:

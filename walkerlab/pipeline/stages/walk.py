@@ -149,8 +149,8 @@ def content_of_walk(
     stored = groups(result)
     answer = summary(result)
     if not result.outcome.answered:
-        why = f"{stage}: {result.outcome.label} after {result.steps} steps, {result.end_time_s:.4g} s"
-        raise NoAnswer(why, answer["advice"], Content(stored, answer))
+        reason = f"{stage}: {result.outcome.label} after {result.steps} steps, {result.end_time_s:.4g} s"
+        raise NoAnswer(reason, answer["advice"], Content(stored, answer))
     if again:
         answer["numerical_error"] = numerical_error(answer, tolerances, lambda tighter: summary(walk(tighter, False)))
     return Content(stored, answer)

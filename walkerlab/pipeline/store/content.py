@@ -134,8 +134,8 @@ class Content:
     @property
     def no_answer(self) -> NoAnswer | None:
         """Reason why the stage has no answer, with advice, or None if it has one."""
-        why = self.summary.get("no_answer", {})
-        return None if self.complete else NoAnswer(why.get("message", "no answer"), why.get("advice", ""))
+        reason = self.summary.get("no_answer", {})
+        return None if self.complete else NoAnswer(reason.get("message", "no answer"), reason.get("advice", ""))
 
     @property
     def findings(self) -> dict[str, Any]:

@@ -392,7 +392,7 @@ def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
     function, shared, name, asks, purpose, sets = offer
     typed = name or function.__name__
     # Flags such as --from cannot be names of parameters.
-    names = {f"set_{place}": option for place, option in enumerate(sets)}
+    names = {f"set_{index}": option for index, option in enumerate(sets)}
 
     def run(**arguments: Any) -> None:
         values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}

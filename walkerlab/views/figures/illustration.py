@@ -36,8 +36,8 @@ class Need:
         missing result, by stage.
         """
         if self.stage not in results:
-            why = absent.get(self.stage)
-            return f"it needs {self.stage}" + (f": {why}" if why else "")
+            reason = absent.get(self.stage)
+            return f"it needs {self.stage}" + (f": {reason}" if reason else "")
         result = results[self.stage]
         group = result.groups.get(self.group)
         there = group is not None and all(name in group.variables for name in self.variables)

@@ -156,10 +156,10 @@ def draw_upright(walker: CompassWalker | StraightLegs | Kneed) -> Figure:
     titles = len(legs) > 1
     figure = blank(sum(heights) + titles * len(legs) * TITLE)
     panels = figure.subplots(len(legs), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for place, (axes, leg, view) in enumerate(zip(panels, legs, views, strict=True)):
-        draw_panel(axes, leg, legs[-1 - place], view)
+    for index, (axes, leg, view) in enumerate(zip(panels, legs, views, strict=True)):
+        draw_panel(axes, leg, legs[-1 - index], view)
         if titles:
-            axes.set_title(f"leg {place + 1}", fontsize=SMALL)
+            axes.set_title(f"leg {index + 1}", fontsize=SMALL)
     return figure
 
 

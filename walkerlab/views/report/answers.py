@@ -186,7 +186,7 @@ def settling_sentences(summary: Summary) -> Iterator[str]:
     if left:
         yield f"It begins on an unstable gait and leaves it: step {left} is the first that differs by more than 1 %."
     if 1 < period <= MAX_CYCLE:
-        cycle = join_words(format_step(place, "step_periods_s", summary) for place in range(steps - period, steps))
+        cycle = join_words(format_step(index, "step_periods_s", summary) for index in range(steps - period, steps))
         repeats = "alternates between steps" if period == 2 else f"repeats every {period} steps,"
         yield f"In the end it {repeats} of {cycle} s."
     elif left and summary["outcome"] == WALKED_LABEL:

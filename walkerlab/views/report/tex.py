@@ -58,7 +58,7 @@ def as_tex(content: Table, columns: int = 1) -> bytes:
     columns  journal columns that the table spans; its type is as small as they require
     """
     titles, rows = flatten(content)
-    data = [[row[place].datum for row in rows] for place in range(len(titles))]
+    data = [[row[index].datum for row in rows] for index in range(len(titles))]
     layouts, cells = zip(*map(format_column, data), strict=True)
     heads = head_rows(titles, layouts, cells)
     head, body = ([" & ".join(line) + r" \\" for line in zip(*block, strict=True)] for block in (heads, cells))
@@ -135,7 +135,7 @@ def format_digits(value: float) -> str:
 def room_for(cells: Sequence[str]) -> str:
     """Return siunitx's table-format: digits before and after the decimal point, and of the exponent."""
     parts = [part.groups(default="") for cell in cells if (part := DECIMAL.fullmatch(cell))]
-    sign, before, behind, below, power = (max(len(groups[place]) for groups in parts) for place in range(5))
+    sign, before, behind, below, power = (max(len(groups[index]) for groups in parts) for index in range(5))
     return f"{'-' * sign}{before}.{behind}" + (f"e{'-' * below}{power}" if power else "")
 
 

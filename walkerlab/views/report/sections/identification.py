@@ -251,7 +251,7 @@ def goals(summary: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each target error, with the fewest steps that reach it."""
     rows = summary["measurements"]
     return [
-        goal(rows, place, summary["max_steps"]) for place, entry in enumerate(rows[0]["errors"]) if "wanted" in entry
+        goal(rows, index, summary["max_steps"]) for index, entry in enumerate(rows[0]["errors"]) if "wanted" in entry
     ]
 
 
@@ -271,10 +271,10 @@ def goal(rows: list[Mapping[str, Any]], place: int, most: int) -> str:
 def plan_tables(summary: Mapping[str, Any]) -> list[Table]:
     entries = summary["measurements"][0]["errors"]
     columns = [Column("measurement", "measurement"), Column("start", "start")]
-    for place, entry in enumerate(entries):
-        columns.append(Column(f"± {axis_label(entry['key'])} ({entry['unit']})", error_of(place), numeric=True))
+    for index, entry in enumerate(entries):
+        columns.append(Column(f"± {axis_label(entry['key'])} ({entry['unit']})", error_of(index), numeric=True))
         if "wanted" in entry:
-            columns.append(Column(f"steps for ± {number(entry['wanted'])}", steps_of(place), numeric=True))
+            columns.append(Column(f"steps for ± {number(entry['wanted'])}", steps_of(index), numeric=True))
     return [table(f"Standard errors after {summary['steps']} steps", columns, summary["measurements"])]
 
 

@@ -129,8 +129,8 @@ def steps(results: Results) -> Section | None:
     if not series:
         return None
     every = ((results.summary(stage), key, values) for (stage, key), values in series.items())
-    written = [[format_step(place, key, summary) for place in range(len(values))] for summary, key, values in every]
-    taken = [(place, *step) for place, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
+    written = [[format_step(index, key, summary) for index in range(len(values))] for summary, key, values in every]
+    taken = [(index, *step) for index, step in enumerate(zip_longest(*written, fillvalue=NONE), 1)]
     hidden = len(taken) - HEAD_STEPS - TAIL_STEPS
     rows = taken if hidden <= 0 else [*taken[:HEAD_STEPS], *taken[-TAIL_STEPS:]]
     columns = [Column("step", numeric=True), *(Column(SERIES[name], numeric=True) for name in series)]
