@@ -34,7 +34,7 @@ LOCK_OMISSION = omission(
 
 
 def compare_releases(config: ContactConfig, state: State, pitch_m: float) -> dict[str, Any] | None:
-    """Walk up to 20 steps from a gait with each knee release.
+    """Simulate up to 20 steps from a gait with each knee release.
 
     Returns None for walkers without knees, with a push-off or with legs that differ.
     """

@@ -65,7 +65,7 @@ TEXTS = ("angle of the stance leg", "angular velocity of the swing leg", "angula
 def run(
     config: BasinConfig, inputs: Mapping[str, Content], progress: Progress, *, checkpoint: Checkpoint, jobs: int = 1
 ) -> Content:
-    """Walk from every cell that the checkpoint lacks, then from the subcells of cells at the basin's edge.
+    """Simulate walks from every cell that the checkpoint lacks, then from the subcells of cells at the basin's edge.
 
     checkpoint  cells that an earlier run completed
     jobs        maximum number of processes
@@ -265,7 +265,7 @@ class RigidQuestion:
         return rows
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
-        """Walk from section coordinates z (n, 3), SI, until each walk ends or reaches an attractor."""
+        """Simulate walks from section coordinates z (n, 3), SI, until each ends or reaches an attractor."""
         scaled = z * np.array(self.scale)
         return walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
@@ -299,12 +299,12 @@ class ContactQuestion:
         return [{"period": len(gait), "period_s": period_s, "step_length_m": length_m}]
 
     def walk_to_ends(self, z: Floats) -> WalkEnds:
-        """Walk from section coordinates z (n, 3), SI."""
+        """Simulate walks from section coordinates z (n, 3), SI."""
         rows = [self.walk((float(a), float(b), float(c))) for a, b, c in z]
         return WalkEnds(*np.array(rows, np.int64).reshape(-1, 3).T)
 
     def walk(self, z: tuple[float, float, float]) -> tuple[int, int, int]:
-        """Walk from section coordinates z (3), SI, and return outcome, attractor and number of steps."""
+        """Simulate a walk from section coordinates z (3), SI. Return outcome, attractor and number of steps."""
         state = state_on_section(self.rigid, z)
         walk = self.starts.walk_from(start_state(self.scene, state))
         settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
@@ -327,7 +327,7 @@ def units_of(
 
 
 def ends_of(question: Question, window: Window, cells: Sequence[int]) -> list[float]:
-    """Walk from the centres of cells, and return their outcomes, attractors and step counts as one flat list."""
+    """Simulate walks from the centres of cells. Return their outcomes, attractors and step counts as one flat list."""
     ends = question.walk_to_ends(window.starts(np.array(cells)))
     return [float(number) for number in (*ends.outcome, *ends.attractor, *ends.steps)]
 

@@ -17,7 +17,7 @@ from walkerlab.scene.rigid import rigid_scene
 
 
 def run(config: SimulateConfig, inputs: Mapping[str, Content], progress: Progress, again: bool = True) -> Content:
-    """Walk `config.strides` strides.
+    """Simulate `config.strides` strides.
 
     again  whether to measure the numerical error by a second walk, which takes about twice as long as the first
 

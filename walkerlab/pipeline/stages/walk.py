@@ -134,7 +134,7 @@ def content_of_walk(
     progress: Progress,
     again: bool,
 ) -> Content:
-    """Walk, store samples (thinned for long walks), and repeat the walk to measure the numerical error.
+    """Simulate a walk, store samples (thinned for long walks), and repeat it to measure the numerical error.
 
     walk     takes tolerances and whether to sample, and returns a `WalkRecord` with `samples`
     groups   returns the groups of a walk to store

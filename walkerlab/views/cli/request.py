@@ -134,7 +134,7 @@ class Request:
         """Return the options, each preceded by a space, with which a command works on this run.
 
         This command repeats its own options; other stages get only those that they read, as settings, and all other
-        commands get every one. Settings by --set go to every command.
+        commands get all of them. Every command gets the settings by --set.
         """
         from walkerlab.config.reads import keys_of
 
