@@ -49,8 +49,8 @@ class Basin(Block):
     refine: int = key(
         4, "1", "parts into which cells at basin boundaries are divided along each axis; 1: no refinement", ge=1, le=32
     )
-    steps: int = key(300, "1", "steps of the rigid model after which a walk is called unsettled", ge=1, le=1_000_000)
-    contact_steps: int = key(12, "1", "steps that the contact model walks", ge=2, le=10_000)
+    steps: int = key(300, "1", "steps of the rigid model after which a walk counts as unsettled", ge=1, le=1_000_000)
+    contact_steps: int = key(12, "1", "maximum number of steps of a walk of the contact model", ge=2, le=10_000)
 
     @field_validator("plane")
     @classmethod
@@ -237,7 +237,7 @@ class Robustness(Block):
         bounds="a list of numbers above 0",
     )
     walks: int = key(400, "1", "walks per roughness", ge=2, le=1_000_000)
-    max_steps: int = key(20_000, "1", "steps after which a walk on rough ground is cut off", ge=1, le=10_000_000)
+    max_steps: int = key(20_000, "1", "maximum number of steps of a walk on rough ground", ge=1, le=10_000_000)
 
 
 FATES: Final = tuple(outcome.label for outcome in Outcome)

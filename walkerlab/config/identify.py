@@ -46,7 +46,7 @@ class Identify(Recorded):
     max_walks: int = key(
         10_000,
         "1",
-        "number of predicted walks after which a fit ends without convergence",
+        "maximum number of predicted walks before a fit ends without convergence",
         ge=1,
         le=10_000_000,
     )

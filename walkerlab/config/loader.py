@@ -134,7 +134,9 @@ def safe_name(text: str) -> str:
 
 
 def suspicious_values(config: Config, tree: BlockNode) -> Iterator[str]:
-    """Yield warnings about likely mistakes: leg mass not moved with the leg, wrong units, pad pitch without pads."""
+    """Yield warnings about likely mistakes: a leg mass that did not move with its leg, wrong units, a pitch without
+    pads.
+    """
     walker = config.walker
     block = tree.entries.get("walker")
     places = block.keys if isinstance(block, BlockNode) else {}

@@ -172,6 +172,6 @@ def refuse_one_knee(config: ContactConfig) -> None:
     if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
         raise ConfigError(
             "exports and engines need two legs of one kind, both with a knee or both without.",
-            "The models of walkerlab walk with one knee: `walkerlab contact-sim`.",
+            "Simulate this walker in walkerlab: `walkerlab contact-sim`.",
             ("walker",),
         )

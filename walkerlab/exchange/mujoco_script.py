@@ -20,7 +20,7 @@ WINDOW_CLOSES_S = 5.0
 class Walk:
     """Walk from the keyframe `gait`: a control callback for push-offs, hip torque, touchdowns and knees.
 
-    It judges by the state at each time step. A knee locks when it has been bent and comes straight, by a plastic impact
+    It reacts to the state at each time step. A knee locks when it has been bent and straightens, by a plastic impact
     or, if it has a stop, when the stop turns it back. The trailing knee is released after the next touchdown.
 
     stance  index of the stance foot, 0 or 1

@@ -55,7 +55,7 @@ class Planner:
     def decide(self, stage: Stage) -> Step:
         """Decide whether to reuse, run or leave out a stage, after the same decision for its inputs.
 
-        Optional inputs outside this plan are looked up first; a damaged one is recorded as left out.
+        Optional inputs outside this plan are looked up first. If one is damaged, it is recorded as left out.
         """
         for name in stage.if_current:
             if self.graph[name] not in self.stages:

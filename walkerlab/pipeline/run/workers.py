@@ -34,7 +34,7 @@ from walkerlab.physics.kernel_cache import cache_root
 
 SOON_S = 0.02
 CALLED_BACK = "_raw_object_cache"
-"""Prefix of the names of functions that LLVM calls after compiling or loading; errors raised in them are lost."""
+"""Prefix of the names of functions that LLVM calls after compiling or loading. Errors raised in them are lost."""
 
 STORING_PATIENCE_S = 1.0
 """Time that a command has to store finished results after its parent has ended."""

@@ -250,8 +250,8 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
 
 
 def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
-    """Build the identified and measured motions of the first steps, or return an empty mapping for kneed walkers (no
-    shank angles are read).
+    """Build the identified and measured motions of the first steps, or an empty mapping for kneed walkers,
+    because their shank angles are not read.
 
     Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
 

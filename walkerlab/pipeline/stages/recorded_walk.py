@@ -107,7 +107,7 @@ def read_artifact(path: Path) -> Recording:
         groups = artifact.read(path).groups
     except (Damaged, IsADirectoryError) as error:
         raise ConfigError(
-            f"{path} is not a stored walk: {error}.", "Name simulate.h5 or contact-sim.h5 of a run."
+            f"{path} is not a stored walk: {error}.", "Give the file simulate.h5 or contact-sim.h5 of a run."
         ) from None
     group = groups.get("trajectory")
     if group is None or "angle" not in group.variables:

@@ -39,7 +39,7 @@ MIN_REPEATED = 4
 MAX_REPEATED = 32
 """Number of steps at the end of a walk that are tested for repetition, or a quarter of all steps if that is more."""
 FEWEST_SETTLED = 8
-"""Smallest number of last steps in which repetition is looked for."""
+"""Repetition is looked for in at least this many of the last steps."""
 REPEATED = 1e-5
 """Steps repeat if they differ by less than this, relative to the first step."""
 REPEATED_AFTER_SETTLING = 1e-2

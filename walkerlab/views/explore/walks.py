@@ -32,7 +32,7 @@ FIRST: Final = (
     "slope_deg", "walker.", "push_off.impulse_N_s", "contact.stiffness", "contact.damping", "contact.static_friction",
     "contact.dynamic_friction", "contact.stiction_velocity", "contact.terrain",
 )  # fmt: skip
-"""Keys shown before any search, in this order; a trailing dot means the whole block."""
+"""Keys shown before any search, in this order. An entry that ends in a dot stands for a whole block."""
 DRIVES: Final = ("walker.hip.", "push_off.")
 """Blocks of which only non-zero keys are shown initially; keys of the knee's lock appear in searches only."""
 HIDDEN_KEYS: Final = (

@@ -1,4 +1,4 @@
-"""The type of an illustration: its name, texts, required results and drawing function."""
+"""Illustrations: their names, texts, required results and drawing functions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,6 @@
-"""Maps of cells: figure 11 (starts that walk), figure 15 (basins of attraction), and the reliability of methods."""
+"""Maps of cells: figure 11 (starts that lead to walking), figure 15 (basins of attraction), and the reliability of
+methods.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial

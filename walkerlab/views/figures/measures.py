@@ -23,7 +23,7 @@ FIGURE_HEIGHT = 4.6
 SMALL = 7.5
 """Font size of the labels (pt)."""
 SMALL_ARC = 0.02
-"""Length (leg lengths) up to which a dimension has a label but no arrow, and a sole has no mark at its centre."""
+"""Dimensions up to this length (leg lengths) have a label but no arrow, and soles no mark at their centre."""
 FAINT_GREY = "#C8C8C8"
 """Colour of the second leg."""
 SOLE_ANGLES = np.linspace(-0.6, 0.6, 41)

@@ -67,7 +67,7 @@ def answer_html(stage: str, summary: Summary) -> str:
 
 
 def further_tables(stage: str, summary: Summary) -> list[str]:
-    """Return lines that complete an answer, as `--verbose` shows them, or none if the answer is complete."""
+    """Return the lines that `--verbose` adds to an answer, or none if the answer is complete."""
     if stage != "robustness" or not summary:
         return []
     from walkerlab.views.report.sections import robustness

@@ -263,8 +263,8 @@ SectionMaker = Callable[[Results], Section | None]
 
 
 def stage_section(stage: str, needed: str = "") -> Callable[[Callable[..., Section | None]], SectionMaker]:
-    """Pass a stage's summary to the decorated function. There is no section if the summary is empty or lacks the key
-    `needed`.
+    """Make a decorator that passes the summary of a stage to a function. There is no section if the summary is empty
+    or lacks the key `needed`.
     """
 
     def section_of(make: Callable[..., Section | None]) -> SectionMaker:

@@ -171,7 +171,7 @@ def role(match: re.Match[str]) -> str:
 TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 COMMENT_LINE = re.compile(r"^ *//.*\n", re.MULTILINE)
 CODE_SPAN = re.compile(r"`([^`]*)`")
-"""Code in a text, between backticks."""
+"""Pattern of code in a text, between backticks."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ PREFIXES: Final = {"": 1.0, "m": 1e3, "µ": 1e6}
 LONGEST_CELL: Final = 100
 """Number of characters of a cell above which its column is treated as text."""
 BARE = re.compile(r"[-−+\d.e ×⁰¹²³⁴⁵⁶⁷⁸⁹⁻\xa0\u2009\u202f]+|-?(inf|nan)")
-"""A number without unit or words."""
+"""Pattern of numbers without unit or words."""
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,11 @@ CHARACTER_PT: Final = 5.0
 COLUMN_WIDTHS: Final = {1: 252.0, 2: 516.0}
 """Width (pt) of one and of two columns of a journal."""
 TITLE: Final = re.compile(r"(?P<words>.*\S)\s+(?P<unit>\([^()]*\))")
-"""Title of a column with a unit."""
+"""Pattern of column titles with a unit."""
 DECIMAL = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
-"""A number in a siunitx column: sign, digits before and after the point, sign and digits of the exponent."""
+"""Pattern of numbers in siunitx columns: sign, digits before and after the point, sign and digits of the exponent."""
 ESCAPED_POWER = re.compile(r"\\\^\{\}(-?\d+)")
-"""A power in escaped text."""
+"""Pattern of powers in escaped text."""
 SYMBOL = re.compile(rf"\b(d?)({'|'.join(LETTERS)}|[A-Za-z])\\_([A-Za-z0-9]+)\b(?!\\_)")
 r"""A spelled-out symbol with a subscript in escaped text, such as dtheta\_1."""
 IN_MATHS = {
@@ -46,7 +46,7 @@ IN_MATHS = {
 }
 SCRIPT = re.compile(r"[\^_]\{([^{}]*)\}")
 SCRIPTS = re.compile(r"([\^_])\{[^{}]*\}(?:\1\{[^{}]*\})+")
-"""Several superscripts, or subscripts, in a row, which LaTeX refuses."""
+"""Pattern of several superscripts or subscripts in a row, which LaTeX rejects."""
 SIGNS = re.compile("|".join(map(re.escape, IN_MATHS)))
 """Characters that LaTeX can set only in maths."""
 TEX = str.maketrans({letter: f"\\{letter}" for letter in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\^{}"})
