@@ -19,6 +19,7 @@ from walkerlab.physics.ground.friction import Coulomb, Frictionless
 from walkerlab.physics.ground.knees import MIN_FLEXION
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
+from walkerlab.physics.hybrid.endings import FALLEN_HIP
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.scene.contact import knee_rules
@@ -42,8 +43,6 @@ OUTPUT_S = 1e-3
 """Time between the outputs of a simulation."""
 TIME_FACTOR = 1.05
 """Maximum simulated time between events, as a multiple of the duration of walkerlab's walk."""
-SHORTEST_HIP = 0.5
-"""Height of the hip, as a fraction of the leg, below which a walker has fallen."""
 ERROR_RAD = 1e-6
 ERROR_MM = 1e-6
 """Tolerances of sensors. ADAMS's default is 1e-3 in the unit of the expression."""
@@ -542,7 +541,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
             f"{leg}_on_bent_knee": Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM, halts=True),
         }
     hip = f"{{{export.names[0]}.hinge}}"
-    lowest = SHORTEST_HIP * MM * export.config.walker.leg_length_m
+    lowest = FALLEN_HIP * MM * export.config.walker.leg_length_m
     model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
     # Leg 1 swings first, so of the locks only that of leg 2 is active at the start.
     model.inactive = ("stop_1", "stop_2", "lock_1", *(name for name in model.sensors if name != "fell"))

@@ -95,9 +95,11 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     """Return the time and leg of each candidate heel strike, where the front foot comes down to the level of the rear
     one. Noise can produce several candidates for one strike.
     """
-    # A recording may end with a heel strike, so its last two samples are continued by half an interval.
-    time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
-    angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
+    # A recording may end with a heel strike, perhaps with two samples at that instant, so it is continued by half the
+    # interval before.
+    before = int(np.searchsorted(time, time[-1] - 0.5 * float(np.median(np.diff(time))))) - 1
+    time = np.append(time, 1.5 * time[-1] - 0.5 * time[before])
+    angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[before : before + 1], axis=0)
     spread = angle[:, 0] - angle[:, 1]
     over = height(angle)
     apart = WINDOW_AHEAD * np.abs(spread).max()

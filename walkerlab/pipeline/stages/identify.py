@@ -26,8 +26,8 @@ from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, dou
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
-from walkerlab.scene.identification import identify_walk
-from walkerlab.scene.parameter import config_with, parameter_of
+from walkerlab.scene.identification import LEGS, identify_walk
+from walkerlab.scene.parameter import SLOPE, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
@@ -122,17 +122,19 @@ def identify_divided(
 def divide_again(
     config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Repeat a fit if the identified slope and sensors move heel strikes, and keep the old fit if the new
-    one is bad.
+    """Repeat a fit if the identified slope, sensors or soles move heel strikes, and keep the old fit if the new one is
+    bad.
     """
     if not before.measured.sampled:
         return before
-    slope_change = identified_config(config, before).slope_rad - config.slope_rad
-    touch_sum = 2.0 * (before.sensors[OFFSET] - slope_change)
-    if abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
+    identified = identified_config(config, before)
+    touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + config.slope_rad)
+    same_soles = rigid_walker(identified).alike
+    if same_soles and abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
         return before
+    on_slope = SLOPE.config_at(identified, config.slope_rad)
     try:
-        refit = ask(divide_at(block, config, touch_sum))
+        refit = ask(divide_at(block, on_slope or config, touch_sum))
     except (ConfigError, NoAnswer):
         return before
     return refit if refit.verdict.usable else before
@@ -170,6 +172,9 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
         "rms_residual": dict(result.rms_residual),
         "chi_square_per_dof": result.chi_square_per_dof,
         "gait": {name: asdict(value) for name, value in result.gait.items()},
+        "leg_differences": [asdict(difference) for difference in result.leg_differences],
+        "other_leg_differences": [asdict(difference) for difference in result.other_differences],
+        "first_leg": None if result.first_leg is None else asdict(result.first_leg),
         "measured_spectral_radius": None if result.measured_radius is None else asdict(result.measured_radius),
         "models": [{**asdict(model), "reason": "; ".join(model.reasons)} for model in result.models],
         "reference_masses_kg": reference_masses(config, [estimate.key for estimate in result.estimates], result.model),
@@ -257,12 +262,14 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
     config  config of the identified walker
     """
+    measured = result.measured
     walker = rigid_walker(config)
+    # the leg that swings first is shown as leg 1
+    walker = walker.exchanged if measured.first_leg == LEGS[1] else walker
     walk = result.walk
     sensors = result.sensors
-    if walker.kneed:
+    if walker.kneed or walker.exchanged.kneed:
         return {}
-    measured = result.measured
     shown = np.flatnonzero(measured.step < SHOWN_STEPS)
     sides = np.flatnonzero(np.diff(measured.step[shown])) + np.array([[0], [1]])
     every = max(1, shown.size // SHOWN_SAMPLES)

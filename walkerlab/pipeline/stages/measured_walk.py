@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -24,7 +25,7 @@ from walkerlab.exchange.columns import (
 from walkerlab.exchange.leg_angles import mend_angles
 from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
-from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
+from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible, sum_over_level
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import (
     LEG_ANGLE,
@@ -34,7 +35,6 @@ from walkerlab.physics.estimation.measurements import (
     split_into_steps,
 )
 from walkerlab.physics.estimation.prediction import OFFSET
-from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
@@ -116,8 +116,7 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
     angles = walk.both_legs("angle")
     if angles is None or not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return
-    model = rigid_walker(config)
-    sums = sums_at_jumps(walk.time_s, angles, lambda angles: np.asarray(feet_on_slope(model, *angles.T)))
+    sums = sums_at_jumps(walk.time_s, angles, partial(sum_over_level, rigid_walker(config)))
     yield from (each for each in sums if each)
 
 
@@ -169,7 +168,7 @@ def divide_angles(
     own = angles[:, ::-1] if steps.swapped else angles
     touches = np.append(0.0, steps.touch_time_s)
     measured = split_into_steps(walk.time_s - steps.origin_s, own, touches, touch_sum_rad)
-    return replace(measured, resolution={LEG_ANGLE: resolution})
+    return replace(measured, resolution={LEG_ANGLE: resolution}, first_leg=2 if steps.swapped else 1)
 
 
 def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
@@ -203,7 +202,8 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
         values["touch_angle_rad"] = values["touch_angle_rad"] - tilt
     quantities = dict(zip(STEP_KINDS, (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE), strict=True))
     resolution = {quantities[name]: smallest for name, (_, smallest) in columns.items()}
-    return MeasuredWalk(period, values.get("length_m"), values.get("touch_angle_rad"), resolution=resolution)
+    lengths, angles = values.get("length_m"), values.get("touch_angle_rad")
+    return MeasuredWalk(period, lengths, angles, resolution=resolution, first_leg=block.first_leg)
 
 
 def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, float] | None:
