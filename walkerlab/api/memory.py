@@ -391,8 +391,8 @@ def check(
     'reproduced'
     """
     start = config if isinstance(config, Config) else resolve(str(config)).loaded.config
-    known = {} if start.check is None else start.check.model_dump(mode="json", exclude_none=True, by_alias=True)
-    block = {**known, **keys, **({} if printed is None else {"printed": dict(printed)})}
+    stated = {} if start.check is None else start.check.model_dump(mode="json", exclude_none=True, by_alias=True)
+    block = {**stated, **keys, **({} if printed is None else {"printed": dict(printed)})}
     return run_in_memory("check", add_blocks(start, **({"check": block} if block else {})))
 
 
@@ -502,8 +502,8 @@ def stage_block(stage: str, keys: dict[str, Setting], **values: Setting) -> dict
     """Take the keys of a stage's block out of `keys`, and return the block with them and `values`, by its name."""
     block = block_of(Config.model_fields[stage])
     assert block is not None, "a stage with a question has a block"
-    own = {name: keys.pop(name) for name in block.model_fields if name in keys}
-    entries = {name: value for name, value in {**own, **values}.items() if value is not None}
+    block_keys = {name: keys.pop(name) for name in block.model_fields if name in keys}
+    entries = {name: value for name, value in {**block_keys, **values}.items() if value is not None}
     return {stage: entries or None}
 
 

@@ -548,10 +548,10 @@ def leg_inertia(walker: Any) -> float:
         squared = (upper.length_m + lower.mass_below_knee_m) ** 2 + lower.mass_ahead_m**2
         thigh = upper.mass_kg * (upper.mass_below_hip_m**2 + upper.mass_ahead_m**2) + upper.inertia_kg_m2
         return float(thigh + lower.mass_kg * squared + lower.inertia_kg_m2)
-    own = [body for body in walker.bodies if body.name in walker.legs[0]]
+    bodies = [body for body in walker.bodies if body.name in walker.legs[0]]
     on_them = [particle.mass_kg for particle in walker.particles if particle.body in walker.legs[0]]
-    mass = sum(on_them) + sum(body.mass_kg for body in own)
-    return float(mass * walker.leg_length_m**2 + sum(body.inertia_kg_m2 for body in own))
+    mass = sum(on_them) + sum(body.mass_kg for body in bodies)
+    return float(mass * walker.leg_length_m**2 + sum(body.inertia_kg_m2 for body in bodies))
 
 
 def why_no_push_off(walker: Any) -> str:
@@ -637,14 +637,14 @@ def load_walkers() -> dict[str, type[Block]]:
     """Import the types of walkers that extensions add, by word. Those that cannot be imported are left out, with a
     warning.
     """
-    found = {}
+    types = {}
     for word, code in declared("walkers").items():
         try:
-            found[word] = load(code)
+            types[word] = load(code)
         except Exception as error:
             reason = f"{type(error).__name__}: {error}"
             warnings.warn(f"the walker type {word} of an extension ({code}) is left out: {reason}", stacklevel=2)
-    return found
+    return types
 
 
 if TYPE_CHECKING:

@@ -138,19 +138,19 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
             motion = {"vx": vx, "vy": vy, "vz": "0", "wx": "0", "wy": "0", "wz": f"({finite(part.spin)}(rad/sec))"}
             yield command("part create rigid_body initial_velocity", part_name=full(name), **motion)
     for name, shape in model.shapes.items():
-        own = full(model.shape_name(name))
+        shape_path = full(model.shape_name(name))
         sizes = [finite(edge) for edge in shape.size]
         if shape.kind == "BOX":
             corner = {"corner_marker": full(shape.marker), "diag_corner_coords": ", ".join(sizes)}
-            yield command("geometry create shape block", block_name=own, **corner)
+            yield command("geometry create shape block", block_name=shape_path, **corner)
         else:
             scales = {f"{axis}_scale_factor": size for axis, size in zip("xyz", sizes, strict=True)}
             centre = {"center_marker": full(shape.marker)}
-            yield command("geometry create shape ellipsoid", ellipsoid_name=own, **centre, **scales)
+            yield command("geometry create shape ellipsoid", ellipsoid_name=shape_path, **centre, **scales)
     for name, ends in model.outlines.items():
-        own = full(f"{model.markers[ends[0]].part}.{name}")
+        shape_path = full(f"{model.markers[ends[0]].part}.{name}")
         points = ", ".join(full(end) for end in ends)
-        yield command("geometry create curve outline", outline_name=own, marker_name=points)
+        yield command("geometry create curve outline", outline_name=shape_path, marker_name=points)
 
 
 def format_rotation(angle: float) -> str:

@@ -193,8 +193,8 @@ def main(path: str, steps: int, view: bool) -> None:
     period = np.diff(walk.touches_s, prepend=0.0)[-1]
     length = np.diff(walk.touches_m, prepend=0.0)[-1]
     its_periods, its_lengths = walk.model.numeric("steps_in_walkerlab").data.reshape(2, -1)
-    known = min(steps, len(its_periods))
-    theirs = f"step {known} in walkerlab: {its_periods[known - 1]:.4f} s, {its_lengths[known - 1]:.4f} m"
+    compared = min(steps, len(its_periods))
+    theirs = f"step {compared} in walkerlab: {its_periods[compared - 1]:.4f} s, {its_lengths[compared - 1]:.4f} m"
     print(f"step {steps}: {period:.4f} s, {length:.4f} m; {theirs}")
 
 

@@ -140,11 +140,11 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     # `asker` is the config key that names this parameter, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
-    own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    reason = explain_non_parameter(key, config, own, stated_value)
+    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
+    reason = explain_non_parameter(key, config, fields, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
-    unit = annotation_of(own[key], "unit") or "1"
+    unit = annotation_of(fields[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 
 
@@ -153,9 +153,9 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 def parameter_keys(config: ContactConfig) -> Iterator[str]:
     """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
-    own = {".".join(path): field for path, field in leaves(Config, held=config)}
+    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
     written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
-    yield from (written.get(key, key) for key in own if not explain_non_parameter(key, config, own))
+    yield from (written.get(key, key) for key in fields if not explain_non_parameter(key, config, fields))
 
 
 def explain_non_parameter(

@@ -95,15 +95,15 @@ def edits_since(config: Config, folder: RunFolder) -> tuple[str, list[str]]:
         edited = load(file).config
     except ConfigError:
         return file.label, ["it is no longer valid"]
-    own = {key_of(change) for change in folder.changes}
+    changed_keys = {key_of(change) for change in folder.changes}
     # a setting in degrees changes the slope in radians, and angles of a start may follow from any setting
-    own |= {"slope_rad", "start"} if own else set()
+    changed_keys |= {"slope_rad", "start"} if changed_keys else set()
     dumps = (each.model_dump(mode="json", exclude={"name", "sweep"}) for each in (config, edited))
     before, after = (dict(flatten(dump)) for dump in dumps)
     return file.label, [
         f"{key} {brief(value)} -> {brief(after.get(key))}"
         for key, value in before.items()
-        if after.get(key) != value and own.isdisjoint((key, key.partition(".")[0]))
+        if after.get(key) != value and changed_keys.isdisjoint((key, key.partition(".")[0]))
     ]
 
 

@@ -274,8 +274,8 @@ def any_side_by_side(stages: Sequence[Stage], config: Config) -> bool:
     """Whether at least two of the stages are independent and can run in parallel."""
     needed: dict[str, set[str]] = {}
     for stage in stages:
-        own = {name for name in stage.results(config) if name in needed}
-        needed[stage.name] = own.union(*(needed[name] for name in own))
+        inputs = {name for name in stage.results(config) if name in needed}
+        needed[stage.name] = inputs.union(*(needed[name] for name in inputs))
     return any(len(needed[stage.name]) < index for index, stage in enumerate(stages))
 
 

@@ -217,7 +217,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
     """
     kinetic, potential, total = sample_energies(scene.walker, samples).T
     driven = samples.driven_J.T
-    lost = samples.dissipated_J
+    losses = samples.dissipated_J
     walker = scene.walker
     at_foothold = walker.mass * (walker.gravity_down * up - walker.gravity_along * foothold)
     return variables_over_time(
@@ -225,7 +225,7 @@ def energy_variables(scene: ContactScene, samples: ContactSamples, foothold: Flo
         potential_J=potential - at_foothold,
         mechanical_J=total - at_foothold,
         total_energy_J=total,
-        **{loss.variable: lost[:, place] for place, loss in SAMPLED.items()},
+        **{loss.variable: losses[:, place] for place, loss in SAMPLED.items()},
         **({"push_off_J": driven[0], "hip_J": driven[1]} if driven.any() else {}),
-        residual_J=total + lost.sum(axis=1) - driven.sum(axis=0) - total[:1],
+        residual_J=total + losses.sum(axis=1) - driven.sum(axis=0) - total[:1],
     )

@@ -50,9 +50,9 @@ class FamilyQuestion:
 
     def start_values(self) -> list[float]:
         """Return the values at which the search looks for gaits, the config's own value first."""
-        own = self.parameter.value_in(self.config)
+        current = self.parameter.value_in(self.config)
         spread = np.linspace(self.span.least, self.span.most, START_VALUES)
-        return [*([own] if own in self.span else []), *(float(value) for value in spread)]
+        return [*([current] if current in self.span else []), *(float(value) for value in spread)]
 
     @property
     def stride(self) -> int:
@@ -151,7 +151,7 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
         )
     if second is not None:
         second.refuse_ends("continuation", "second")
-        own = second.parameter.value_in(config)
+        current = second.parameter.value_in(config)
         span = second.span
         name = second.parameter.key
         if second.parameter.path == question.parameter.path:
@@ -159,9 +159,9 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
                 f"continuation.second: {name} is already the parameter that gaits are followed over",
                 "Choose another key.",
             )
-        if own not in span:
+        if current not in span:
             raise ConfigError(
-                f"continuation.second: {name} is {own:g} in the config, outside {span.least:g} to {span.most:g}",
+                f"continuation.second: {name} is {current:g} in the config, outside {span.least:g} to {span.most:g}",
                 "Curves begin at the config's own value; choose a range around it.",
             )
         second.touched("second")

@@ -165,9 +165,9 @@ def divide_angles(
     angles = walk.both_legs("angle")
     assert angles is not None, "a walk in steps has angles"
     # Only measured samples are used, because those of `steps` at heel strikes are interpolated.
-    own = angles[:, ::-1] if steps.swapped else angles
+    by_role = angles[:, ::-1] if steps.swapped else angles
     touches = np.append(0.0, steps.touch_time_s)
-    measured = split_into_steps(walk.time_s - steps.origin_s, own, touches, touch_sum_rad)
+    measured = split_into_steps(walk.time_s - steps.origin_s, by_role, touches, touch_sum_rad)
     return replace(measured, resolution={LEG_ANGLE: resolution}, first_leg=2 if steps.swapped else 1)
 
 

@@ -91,14 +91,14 @@ def step_changes(first: Values, second: Values, period: int, later: int | None) 
     """
     count = min(len(first), len(second))
     values, others = (np.array(each[:count], float) for each in (first, second))
-    apart = np.abs(values - others)
-    largest = np.where(np.isnan(apart), np.nan, np.fmax.accumulate(apart))
+    changes = np.abs(values - others)
+    largest = np.where(np.isnan(changes), np.nan, np.fmax.accumulate(changes))
     if not period or count < 2 * period:
         return largest
     end = count - 1 - (later or 0)
     steps = np.arange(count)
     last = end - (end - steps) % period  # the last step with a counterpart in the second walk
-    between = apart[0] if later is None else np.abs(values[last] - others[last + later])
+    between = changes[0] if later is None else np.abs(values[last] - others[last + later])
     return np.asarray(np.fmin(largest, np.abs(values - values[last]) + between))
 
 

@@ -265,11 +265,11 @@ def describe_settling(walk: WalkRecord) -> dict[str, int | None]:
         return {"repeats_after": 0, "leaves_gait_at": None}
     steps = np.column_stack((walk.periods_s / walk.periods_s[0], walk.lengths_m / walk.lengths_m[0]))
     off = np.abs(steps - 1.0).max(axis=1)
-    left = np.flatnonzero(off > OFF_GAIT)
+    departures = np.flatnonzero(off > OFF_GAIT)
     on_gait = off[1] < ON_GAIT
     return {
         "repeats_after": steps_to_repeat_last(steps),
-        "leaves_gait_at": int(left[0]) + 1 if on_gait and left.size else None,
+        "leaves_gait_at": int(departures[0]) + 1 if on_gait and departures.size else None,
     }
 
 
@@ -287,9 +287,9 @@ def steps_to_repeat(steps: Floats) -> int:
     """Return the number of steps after which quantities of steps (steps, n), relative to 1, repeat, or 0 if never."""
     spread = np.ptp(steps, axis=0).max()
     for period in range(1, len(steps) // 2 + 1):
-        apart = np.abs(steps[period:] - steps[:-period]).max()
+        difference = np.abs(steps[period:] - steps[:-period]).max()
         # A walk that settles slowly, alternating about its limit, almost repeats after two steps.
-        if apart < REPEATED and (period == 1 or apart < REPEATED_AFTER_SETTLING * spread):
+        if difference < REPEATED and (period == 1 or difference < REPEATED_AFTER_SETTLING * spread):
             return period
     return 0
 

@@ -79,8 +79,8 @@ class SweepVariable:
 def types_in(values: Sequence[Any]) -> set[type]:
     """Return the types of the numbers in a nested list."""
     inner = [item for value in values if isinstance(value, list) for item in value]
-    own = {type(value) for value in values if not isinstance(value, list)}
-    return own | types_in(inner) if inner else own
+    types = {type(value) for value in values if not isinstance(value, list)}
+    return types | types_in(inner) if inner else types
 
 
 class Merge:
@@ -260,9 +260,9 @@ def flat_columns(name: str, variable: Variable, dimensions: int) -> Iterable[tup
     """Split a variable into columns, one for each entry of a list. Gaps are empty."""
     values = variable.values
     points = values.shape[:dimensions]
-    own = values.shape[dimensions:]
-    rows = values.reshape((int(np.prod(points)), *own))
-    for place in np.ndindex(own):
+    inner_shape = values.shape[dimensions:]
+    rows = values.reshape((int(np.prod(points)), *inner_shape))
+    for place in np.ndindex(inner_shape):
         column = rows[(slice(None), *place)].tolist()
         ending = "".join(f"_{number}" for number in place)
         yield f"{name}{ending}", ["" if value != value else value for value in column]

@@ -244,28 +244,32 @@ def walk(question: ExploredConfig) -> Answered:
     try:
         loaded = question.loaded
         config = loaded.config
-        wanted = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
+        stages = [WALK_STAGES[model] for model in question.models if model == "rigid" or config.contact is not None]
         # Compute the walks first: they store the gait, so that it need not be found again.
-        answers = {stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*wanted, "fixedpoint")}
+        answers = {stage: answer_in_memory(config, stage, memory(), again=False) for stage in (*stages, "fixedpoint")}
     except ConfigError as error:
         return question.refusal(error)
-    commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *wanted)]
-    found: dict[str, Any] = {"command": "\n".join(commands), "warnings": list(loaded.warnings)}
+    commands = [shlex.join(["walkerlab", stage, *question.options]) for stage in ("fixedpoint", *stages)]
+    answer: dict[str, Any] = {"command": "\n".join(commands), "warnings": list(loaded.warnings)}
     walks: dict[str, Content] = {}
-    for stage in ("fixedpoint", *wanted):
-        said = answers[stage].no_answer
-        found[stage] = answers[stage].findings
-        if said is not None:
-            found[stage]["error"] = {"message": said.message, "advice": said.advice, "exit_code": said.exit_code}
+    for stage in ("fixedpoint", *stages):
+        no_answer = answers[stage].no_answer
+        answer[stage] = answers[stage].findings
+        if no_answer is not None:
+            answer[stage]["error"] = {
+                "message": no_answer.message,
+                "advice": no_answer.advice,
+                "exit_code": no_answer.exit_code,
+            }
             if stage == "fixedpoint":
                 break
         elif stage != "fixedpoint":
             walks[stage] = answers[stage]
     if (player := motion.player(Results(config, walks), MOST_STEPS_SHOWN)) is not None:
-        found["scene"] = player.scene
+        answer["scene"] = player.scene
         tracks = [{"meta": walker.meta, "floats": walker.track.pack()} for walker in player.walkers]
-        found["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
-    return 200, found
+        answer["tracks"] = dict(zip((stage for stage in WALK_STAGES.values() if stage in walks), tracks, strict=True))
+    return 200, answer
 
 
 def numbers(question: ExploredConfig) -> Answered:
@@ -306,11 +310,11 @@ def curve(branch: Group) -> dict[str, list[Any]]:
     period = branch["step_period"][:, 0]
     length = branch["step_length"][:, 0]
     multipliers = abs(branch["multiplier_real"] + 1j * branch["multiplier_imag"]).max(axis=1)
-    found = {
+    quantities = {
         "value": branch["value"], "stable": branch["stable"], "period_s": period, "step_length_m": length,
         "speed_m_s": length / period, "spectral_radius": multipliers,
     }  # fmt: skip
-    return {name: values.tolist() for name, values in found.items()}
+    return {name: values.tolist() for name, values in quantities.items()}
 
 
 def config_text(question: ExploredConfig, name: str) -> str:
@@ -324,5 +328,5 @@ def config_text(question: ExploredConfig, name: str) -> str:
     named = replace(question, changes={**question.changes, "name": name})
     base = load(Path(start)).config
     changed = named.loaded.config
-    alike = base.walker.type == changed.walker.type
-    return to_extending_yaml(start, base, changed, name) if alike else to_yaml(changed)
+    same_type = base.walker.type == changed.walker.type
+    return to_extending_yaml(start, base, changed, name) if same_type else to_yaml(changed)

@@ -40,9 +40,9 @@ class Need:
             return f"it needs {self.stage}" + (f": {reason}" if reason else "")
         result = results[self.stage]
         group = result.groups.get(self.group)
-        there = group is not None and all(name in group.variables for name in self.variables)
-        there = there and (not self.scene or self.scene in result.summary["reference"])
-        return None if there else f"{self.stage}: {self.or_else}"
+        is_complete = group is not None and all(name in group.variables for name in self.variables)
+        is_complete = is_complete and (not self.scene or self.scene in result.summary["reference"])
+        return None if is_complete else f"{self.stage}: {self.or_else}"
 
 
 @dataclass(frozen=True)

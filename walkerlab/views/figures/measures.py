@@ -257,11 +257,11 @@ def clear(dimension: Length, second: Length, length: float) -> bool:
 
 def spread(heights: Sequence[float], sizes: Sequence[float], lowest: float = -math.inf) -> list[float]:
     """Return label heights as close to the wanted ones as possible, raised where the labels below need room."""
-    found = list(heights)
-    for place in sorted(range(len(found)), key=found.__getitem__):
-        found[place] = max(found[place], lowest + 0.5 * sizes[place])
-        lowest = found[place] + 0.5 * sizes[place]
-    return found
+    spread_heights = list(heights)
+    for place in sorted(range(len(spread_heights)), key=spread_heights.__getitem__):
+        spread_heights[place] = max(spread_heights[place], lowest + 0.5 * sizes[place])
+        lowest = spread_heights[place] + 0.5 * sizes[place]
+    return spread_heights
 
 
 def draw_leg(axes: Axes, line: Sequence[Point], centre: Point, radius: float, colour: str) -> None:

@@ -141,15 +141,15 @@ class Sticks:
 
 def read_sticks(result: Identified, under: str = "") -> Sticks:
     """Read the joint positions of a stored walk. `under` is the prefix of its groups."""
-    asked = result.identity.config_slice
+    config = result.identity.config_slice
     trajectory = result[f"{under}trajectory"]
-    walker = asked["walker"]
+    walker = config["walker"]
     steps = result.groups.get(f"{under}steps", NO_STEPS)
 
     def joints(name: str) -> Array:
         return np.stack((trajectory[f"{name}_along_m"], trajectory[f"{name}_height_m"]), axis=-1)
 
-    slope = float(asked["slope_rad"])
+    slope = float(config["slope_rad"])
     hip = joints("hip")
     head = None
     if "torso_angle" in trajectory.variables:
@@ -160,7 +160,7 @@ def read_sticks(result: Identified, under: str = "") -> Sticks:
     if result.identity.stage != CONTACT_STAGE and walker["type"] == "compass":
         radii = 0.0, 0.0  # in the rigid model a compass has point feet, even if it has balls in the contact model
     levels = ground_levels(steps)
-    pushes = asked["push_off"]["impulse_N_s"] != 0.0
+    pushes = config["push_off"]["impulse_N_s"] != 0.0
     outcome = None if under else outcome_of(str(result.summary.get("outcome")))
     ending = outcome.label if outcome is not None and outcome.stumbled else ""
     landings = np.append(0.0, steps["touch_along_m"])
@@ -181,9 +181,9 @@ def sole_radii(walker: Mapping[str, Any]) -> tuple[float, float]:
     if "feet" in walker:
         first, second = (float(foot["radius_m"]) for foot in walker["feet"])
         return first, second
-    own = float(walker["foot_radius_m"])
+    radius = float(walker["foot_radius_m"])
     other = (walker.get("leg_2") or {}).get("foot_radius_m")
-    return own, own if other is None else float(other)
+    return radius, radius if other is None else float(other)
 
 
 def stick_diagram(sticks: Sticks) -> tuple[Figure, Axes]:
@@ -421,8 +421,8 @@ def pictures(
                 line.set_data(*places[index].T)
             hip.set_data(*lines[0][index, :1].T)
             leg = sticks.pushing(float(time))
-            own = lines[leg or 0][index]
-            mark = np.stack((own[-1], own[-1] + PUSH_SHARE * (own[0] - own[-1])))
+            leg_line = lines[leg or 0][index]
+            mark = np.stack((leg_line[-1], leg_line[-1] + PUSH_SHARE * (leg_line[0] - leg_line[-1])))
             push.set_data(*(([], []) if leg is None else mark.T))
             over = sticks.ending and time >= sticks.time[-1]
             clock.set_text(f"{time:.2f} s: {sticks.ending}" if over else f"{time:.2f} s")

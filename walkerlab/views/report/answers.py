@@ -182,14 +182,14 @@ def settling_sentences(summary: Summary) -> Iterator[str]:
 
     steps = summary["steps"]
     period = summary.get("repeats_after") or 0
-    left = summary.get("leaves_gait_at")
-    if left:
-        yield f"It begins on an unstable gait and leaves it: step {left} is the first that differs by more than 1 %."
+    first = summary.get("leaves_gait_at")
+    if first:
+        yield f"It begins on an unstable gait and leaves it: step {first} is the first that differs by more than 1 %."
     if 1 < period <= MAX_CYCLE:
         cycle = join_words(format_step(index, "step_periods_s", summary) for index in range(steps - period, steps))
         repeats = "alternates between steps" if period == 2 else f"repeats every {period} steps,"
         yield f"In the end it {repeats} of {cycle} s."
-    elif left and summary["outcome"] == WALKED_LABEL:
+    elif first and summary["outcome"] == WALKED_LABEL:
         yield (
             "In the end all its steps are equal." if period == 1 else "Its last steps do not repeat; a longer walk may."
         )
@@ -208,9 +208,9 @@ def tune(summary: Summary) -> list[str | Table]:
 
     gait = summary["gait"]
     missing = "" if gait["found"] else f"No own gait: {gait['reason']}."
-    own = missing or side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
+    gait_table = missing or side_by_side("", adjustment.GAIT_LINES, {"own gait": gait})
     sentences = (*words.parts("adjustment.answer", summary), *words.parts("basin.grounds", summary["map"]))
-    return [*sentences, own, adjustment.margins_table(summary)]
+    return [*sentences, gait_table, adjustment.margins_table(summary)]
 
 
 LAST_STEP = (

@@ -142,8 +142,8 @@ def markup(element: ET.Element, used: set[str]) -> Markup:
     attributes = Markup("")
     for key, value in element.attrib.items():
         local = "href" if key in (f"{XLINK}href", "href") else key
-        wanted = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
-        if wanted and (local != "id" or value in used) and not EXTERNAL_REFERENCE.search(value):
+        is_copied = value.startswith(("#", "data:image/png;base64,")) if local == "href" else local in ATTRIBUTES
+        if is_copied and (local != "id" or value in used) and not EXTERNAL_REFERENCE.search(value):
             attributes += Markup(' {}="{}"').format(Markup(local), shorten_attribute(local, value))
     return Markup("<{0}{1}>{2}</{0}>").format(Markup(name), attributes, inside)
 
@@ -198,8 +198,8 @@ def render(page: Page) -> str:
         raise ValueError(f"two sections of the report share an anchor: {anchors}")
     script = f"\n{source('page.js')}\n{source('player.js')}\n"
     # Markup only for the package's own files; all other texts are escaped.
-    own = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
-    return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **own)
+    trusted = {"style": Markup(source("style.css")), "script": Markup(script), "script_digest": digest_of(script)}
+    return environment(page.run).get_template("page.html.j2").render(page=page, home=MAIN, stopped=STOPPED, **trusted)
 
 
 def digest_of(script: str) -> str:

@@ -98,9 +98,9 @@ def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]
     # the innermost reason is the last part: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
     for reason in dict.fromkeys(causes.values()):
-        alike = [absent for absent in missing if absent.why == reason]
-        first = join_words(absent.what for absent in alike)
-        yield first, reason, "; ".join(dict.fromkeys(absent.saves for absent in alike if absent.saves))
+        same_reason = [absent for absent in missing if absent.why == reason]
+        first = join_words(absent.what for absent in same_reason)
+        yield first, reason, "; ".join(dict.fromkeys(absent.saves for absent in same_reason if absent.saves))
         dependents = join_words(
             absent.what for absent in missing if absent.why != reason and causes[absent.why] == reason
         )

@@ -233,8 +233,8 @@ def describe_nuisances(nuisances: Mapping[str, Mapping[str, float]]) -> str:
 
 def describe_gait(gait: Mapping[str, Mapping[str, float]]) -> str:
     parts = [
-        said.format(value_and_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
-        for name, said in GAIT_WORDS.items()
+        phrase.format(value_and_error(gait[name]["value"], gait[name]["standard_error"], unit_by_name(name)))
+        for name, phrase in GAIT_WORDS.items()
         if name in gait
     ]
     return f"The identified gait has {join_words(parts)}" if parts else ""
