@@ -22,7 +22,7 @@ from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
-from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, doubts_about, read_divisions, read_measured
+from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, MeasuredFile
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
@@ -51,11 +51,10 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
 
     Raises ConfigError for an invalid config or file, NoAnswer if no fit converges.
     """
-    refuse(config)
-    block = config.identify
-    assert block is not None, "refuse rejects a config without the block"
+    file = read_data(config)
+    block = file.block
     gait = inputs["fixedpoint"].summary
-    for doubt in doubts_about(block, config) if block.level == "angles" else ():
+    for doubt in file.doubts():
         progress.note(doubt)
 
     def begin(label: str, rounds: int) -> Callable[[], None]:
@@ -65,7 +64,7 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     def ask(measured: MeasuredWalk) -> Identification:
         return identify_walk(cast("Config", config), measured, gait, block, progress.note, begin)
 
-    result = identify_divided(config, block, ask)
+    result = identify_divided(file, ask)
     content = content_of(config, result)
     verdict = result.verdict
     if verdict.fit == "not-converged":
@@ -77,6 +76,14 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
 
 def refuse(config: IdentifyConfig) -> None:
     """Raise ConfigError for an invalid `identify` block, or a file without a walk."""
+    read_data(config)
+
+
+def read_data(config: IdentifyConfig) -> MeasuredFile:
+    """Read the file of the `identify` block.
+
+    Raises ConfigError for an invalid block, or a file without a walk.
+    """
     block = config.identify or Identify()
     if not block.data or not block.fit:
         raise ConfigError(
@@ -91,24 +98,24 @@ def refuse(config: IdentifyConfig) -> None:
             ("identify", "nuisance"),
         )
     refuse_keys(config, block)
-    measured = read_measured(block, config)
+    file = MeasuredFile(block, config)
+    measured = next(file.divisions())
     values_count = measured.count * len(measured.channels()) + measured.step.size
     if values_count + len(block.prior) <= len(block.fit):
         raise ConfigError(
             f"{block.data} holds {values_count} values, too few for {len(block.fit)} parameters.",
             "Measure more steps, or fit fewer parameters.",
         )
+    return file
 
 
-def identify_divided(
-    config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification]
-) -> Identification:
+def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification]) -> Identification:
     """Try divisions of the walk into steps, and return the first that fits or, if none does, the most usable one."""
     answers = list[Identification]()
     problems = list[NoAnswer]()
-    for measured in read_divisions(block, config):
+    for measured in file.divisions():
         try:
-            answers.append(divide_again(config, block, ask, ask(measured)))
+            answers.append(divide_again(file, ask, ask(measured)))
         except NoAnswer as error:
             problems.append(error)
             continue
@@ -120,21 +127,21 @@ def identify_divided(
 
 
 def divide_again(
-    config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification], before: Identification
+    file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
     """Repeat a fit if the identified slope, sensors or soles move heel strikes, and keep the old fit if the new one is
     bad.
     """
     if not before.measured.sampled:
         return before
-    identified = identified_config(config, before)
-    touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + config.slope_rad)
+    identified = identified_config(file.config, before)
+    touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + file.config.slope_rad)
     same_soles = rigid_walker(identified).alike
     if same_soles and abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
         return before
-    on_slope = SLOPE.config_at(identified, config.slope_rad)
+    on_slope = SLOPE.config_at(identified, file.config.slope_rad)
     try:
-        refit = ask(divide_at(block, on_slope or config, touch_sum))
+        refit = ask(file.divide_at(touch_sum, on_slope))
     except (ConfigError, NoAnswer):
         return before
     return refit if refit.verdict.usable else before
