@@ -5,8 +5,8 @@ The results are in docs/exchange-details.md and docs/legs.md.
 
 Usage: python scripts/mujoco_walks.py [CONFIG [KEY=VALUE ...]], by default the walkers of both tables
 
-Printed for each walker: periods and lengths of the last two steps here and in MuJoCo, and the largest difference of any
-step.
+For each walker the script prints periods and lengths of the last two steps here and in MuJoCo, and the largest
+difference in any step.
 """
 
 import sys

@@ -139,7 +139,7 @@ class Entry:
 
 
 def entry_of(file: Path) -> Entry:
-    """Check a printed gait, and return what the pages say of it."""
+    """Check a printed gait, and return its entry on the pages."""
     summary = check_gait(load(file).config)
     source = summary["source"]
     rows = summary["values"]
@@ -172,7 +172,7 @@ def table_of(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def finding_of(summary: Mapping) -> str:
-    """Return what was found; partly explained if a cause gives some of the values that differ."""
+    """Return the finding. It is 'partly explained' if a cause gives some of the values that differ."""
     unexplained = summary["finding"] not in ("explained", "reproduced")
     return "partly explained" if unexplained and summary["explanations"] else summary["finding"]
 

@@ -370,7 +370,7 @@ def test_dates_and_times_of_polars_are_seconds(tmp_path):
 # C3D and OpenSim
 
 
-def test_a_walk_of_ezc3d_in_millimetres_is_read(tmp_path):
+def test_c3d_file_in_millimetres_is_read(tmp_path):
     ezc3d = pytest.importorskip("ezc3d", reason="ezc3d is not installed")
     content = ezc3d.c3d()
     for name, value in {"RATE": [FPS], "LABELS": ["HIP", "FOOT1", "FOOT2"], "UNITS": ["mm"]}.items():

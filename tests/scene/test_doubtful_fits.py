@@ -226,7 +226,7 @@ def fitted_with_sensitivities(key):
     return values(result), {entry.estimate: entry for entry in result.sensitivities if entry.to == key}
 
 
-def test_one_percent_of_a_zero_inertia_is_taken_of_leg_mass_times_length_squared():
+def test_one_percent_of_a_zero_inertia_is_relative_to_leg_mass_times_length_squared():
     _, entries = fitted_with_sensitivities("walker.leg_inertia_kg_m2")
     assert [entry.change for entry in entries.values()] == pytest.approx([0.01 * 5.0 * 1.0**2] * 2)
     assert fitted_with_sensitivities("walker.hip.torque_N_m")[1] == {}
@@ -297,7 +297,7 @@ def test_correlated_angle_noise_shows_in_the_residuals():
     assert "residuals of successive angles are correlated" in " ".join(result.verdict.reasons)
 
 
-def test_errors_hold_where_successive_angles_share_their_noise():
+def test_stated_errors_hold_for_correlated_angle_noise():
     fitted = identify(measured_angles(3, 0.0), fit={"slope_deg": None, HIP: None}).fitted
     noise = Noise(fitted.noise.measurement, 0.0)
     rng = np.random.default_rng(0)

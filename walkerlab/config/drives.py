@@ -22,7 +22,7 @@ class Hip(Block):
     torque_N_m: float = key(
         0.0,
         "N m",
-        "constant torque on the swing leg, its opposite on the stance leg; above 0 it swings the free leg forward",
+        "constant torque on the swing leg, with its reaction on the stance leg; above 0 it swings the free leg forward",
         ge=-STRONGEST,
         le=STRONGEST,
     )

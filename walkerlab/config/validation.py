@@ -55,7 +55,7 @@ NAMES_OF_BODIES: Final = {
     "couplings": ("body",),
 }
 MOVED_RAD: Final = 1e-12
-FAR_OFF: Final = 0.01  # rad or rad/s; a stated value of a start that is off by more is refused
+FAR_OFF: Final = 0.01  # rad or rad/s; a start is rejected if one of its stated values is off by more than this
 BY_UNITS: Final = {"units": "si, and set the other values of the block too"}
 JUDGED_BY: Final = {
     **dict.fromkeys(BOUNDS_SI, BY_UNITS),
@@ -109,7 +109,7 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
     stated: Sequence[float | None] = config.start.state if isinstance(config.start, MidStep) else config.start
     where = tree.entries["start"].position
     start = list(stated)
-    moved = list[str]()
+    adjustments = list[str]()
     following = following_values(config, stated)
     for place, value in enumerate(stated):
         if value is None and place not in following:
@@ -125,13 +125,13 @@ def align_start(config: Config, tree: BlockNode) -> tuple[Config, tuple[str, ...
             midway = f", or start: {{instant: mid-step, state: [{as_it_is}]}} to walk this state as it is"
             advice = f"Write null for {name} to compute it{midway if name.startswith('theta_1') else ''}."
             raise problem_error(where, change.format("is", "but must be"), advice=advice)
-        moved.append(str(Problem(where, change.format("moved from", "to"))))
+        adjustments.append(str(Problem(where, change.format("moved from", "to"))))
     if not isinstance(config.start, MidStep):
-        return config.model_copy(update={"start": tuple(start)}), tuple(moved)
+        return config.model_copy(update={"start": tuple(start)}), tuple(adjustments)
     if isinstance(config.walker, Kneed) and config.start.state[2] > config.start.state[0] + MOVED_RAD:
         raise problem_error(where, "start: theta_1_shank is above theta_1, but knees do not bend beyond straight")
     midway_start = config.start.model_copy(update={"state": tuple(start)})
-    return config.model_copy(update={"start": midway_start}), tuple(moved)
+    return config.model_copy(update={"start": midway_start}), tuple(adjustments)
 
 
 def following_values(config: Config, stated: Sequence[float | None]) -> dict[int, FollowingValue]:
@@ -231,10 +231,10 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
     value = format_node(node) if node else f"{detail['input']} (its default)"
     reason = _REASONS.get(what, detail["msg"])
     for judge, instead in JUDGED_BY.get(path[-1], {}).items() if what not in _REASONS and path[0] == "contact" else ():
-        given, where = node_at(tree, ("contact", judge))
-        if given is not None and node is None:
+        bound, where = node_at(tree, ("contact", judge))
+        if bound is not None and node is None:
             position = where
-        elif given is not None and where.source != position.source and _is_later(where, position):
+        elif bound is not None and where.source != position.source and _is_later(where, position):
             text = f"contact.{judge}: {key} is still {value} (from {position.source}) and {reason}"
             return Problem(where, text, instead)
     word = node.value if isinstance(node, Scalar) and isinstance(node.value, str) else ""

@@ -128,7 +128,7 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
     centres: list[Floats] = []
     mass_matrix = np.zeros((model.size, model.size))
     for number, link in enumerate(model.links):
-        # rates along the ground, normal to it and of turning (3, coordinates), of the link's material at its hinge
+        # velocity along the ground and normal to it, and rate of turning (3, coordinates), of each link at its hinge
         hinge = np.zeros((3, model.size))
         if link.parent < 0:
             hinge[:, : len(model.freedoms)] = base_rates

@@ -70,7 +70,7 @@ SEGMENTS: Final = "Sports2D (angles)"
 SEGMENT_NAMES: Final = frozenset({"right thigh", "left thigh"})
 """Names of segments, in a table of angles that Sports2D wrote."""
 NO_FILE: Final = "there is no such file"
-LONGEST_PATH: Final = 200  # characters of a path that messages show
+LONGEST_PATH: Final = 200  # maximum number of characters of a path in a message
 HEADER_LINES: Final = 60
 """Number of lines at the top of a file that are searched for the header."""
 ACCEPTED_FORMATS: Final = (
@@ -132,7 +132,8 @@ class Recording:
 
 
 def read_recording(path: Path, key: tuple[str, ...] = ()) -> Recording:
-    """Read the columns of a file, in the format of its extension. `key` is the config key that names it, if one does.
+    """Read the columns of a file, in the format of its extension. `key` is the config key that names the file, if there
+    is one.
 
     Raises ConfigError if the file cannot be read, is damaged, or has an unknown format.
     """

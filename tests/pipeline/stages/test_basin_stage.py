@@ -193,7 +193,7 @@ def test_no_stage_needs_the_basin_and_drawings_use_it_if_current():
 NEARLY_EQUAL = "walker.leg_2={leg_mass_kg: 5.000001}"
 
 
-def test_basin_of_nearly_equal_legs_is_that_of_equal_legs(whole, tmp_path):
+def test_basin_of_nearly_equal_legs_equals_that_of_equal_legs(whole, tmp_path):
     content = run(tmp_path, *SMALL, NEARLY_EQUAL)
     (row,), (equal,) = content.summary["attractors"], whole.summary["attractors"]
     assert (row["period"], equal["period"]) == (2, 1)

@@ -28,12 +28,14 @@ def groups(scene: RigidScene, walk: RigidWalkResult) -> dict[str, Group]:
 
 
 def rolled_distance(walker: RigidModel, turned: Any) -> Any:
-    """Return distances (m) rolled by the stance foot as its leg turns back by angles (rad)."""
+    """Return the distances (m) that the stance foot has rolled when its leg has turned back by angles (rad)."""
     return walker.radius * turned
 
 
 def trajectory_group(scene: RigidScene, walk: RigidWalkResult, samples: Samples) -> Group:
-    """Build the group of the sampled quantities that `outputs` select, with both sides of each heel strike."""
+    """Build the group of the sampled quantities that `outputs` select, with a sample just before and just after each
+    heel strike.
+    """
     stance = stance_leg(samples)
     variables = {**variables_over_time(time=samples.time_s, stance_leg=stance + 1, step=samples.step), **legs()}
     if "states" in scene.outputs:

@@ -134,7 +134,7 @@ class Request:
         """Return the options, each preceded by a space, with which a command works on this run.
 
         This command repeats its own options; other stages get only those that they read, as settings, and all other
-        commands get every one. Settings by --set go to every command.
+        commands get all of them. Every command gets the settings by --set.
         """
         from walkerlab.config.reads import keys_of
 
@@ -392,7 +392,7 @@ def add_command(app: typer.Typer, graph: Graph, offer: Offer) -> None:
     function, shared, name, asks, purpose, sets = offer
     typed = name or function.__name__
     # Flags such as --from cannot be names of parameters.
-    names = {f"set_{place}": option for place, option in enumerate(sets)}
+    names = {f"set_{index}": option for index, option in enumerate(sets)}
 
     def run(**arguments: Any) -> None:
         values = {option.flag: arguments.pop(parameter) for parameter, option in names.items()}
