@@ -13,9 +13,8 @@ from pathlib import Path
 from walkerlab.config.check import Check
 from walkerlab.config.loader import load
 from walkerlab.evidence.check.answer import Checked, check_gait
-from walkerlab.evidence.check.causes import generate_families, generate_mistakes
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
-from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker
+from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker, list_mistakes
 from walkerlab.evidence.check.section import COLUMNS, headline, is_short, remarks, source_of
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
@@ -215,8 +214,7 @@ def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, Plain
     """Return the right gait of a config's walker, and its walkers with mistakes."""
     config = load(Path(name)).config
     right = Checked(config, Check(), find_gaits(rigid_walker(config))).right
-    known = [(each.what, each.walker) for each in generate_mistakes(right.walker)]
-    known += [(each.what.format(f"{TYPICAL:g}"), each.of_size(TYPICAL)) for each in generate_families(right.walker)]
+    known = [(each.what.format(f"{TYPICAL:g}"), each.of_size(TYPICAL)) for each in list_mistakes(right.walker)]
     return right, known
 
 
