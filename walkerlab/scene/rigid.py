@@ -83,6 +83,7 @@ def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
         {"push_off": push} | ({"knees": damper(damping)} if any(dampings) else {})
         for push, damping in zip(push_offs(config.push_off), dampings, strict=True)
     ]
+    # Equal drives leave equal legs a single model.
     if drives[0] == drives[1]:
         return driven.changed(**drives[0])
     return pair(
@@ -104,16 +105,6 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
 def have_different_legs(config: RigidConfig) -> bool:
     return rigid_walker(config).legs_differ
-
-
-def refuse_different_legs(config: RigidConfig, request: str) -> None:
-    """Raise ConfigError for a request that needs two equal legs, if those of the config's walker differ."""
-    if have_different_legs(config):
-        raise ConfigError(
-            f"{request} needs two equal legs, but those of this walker differ.",
-            "Leave out walker.leg_2, or run `walkerlab report`, which shows the walk of legs that differ.",
-            ("walker",),
-        )
 
 
 def state_names(config: RigidConfig) -> tuple[str, ...]:

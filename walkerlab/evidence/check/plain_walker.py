@@ -26,6 +26,7 @@ from scipy.linalg.lapack import dposv
 
 from walkerlab.config.check import Instant
 from walkerlab.config.reads import RigidConfig
+from walkerlab.config.second_leg import describe_second_leg
 from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
 
 Floats = NDArray[np.float64]
@@ -405,7 +406,7 @@ class PlainStep(NamedTuple):
 
 def why_not_plain(config: RigidConfig) -> str:
     """Explain why the plain model does not describe a config's walker, or return '' if it does."""
-    if getattr(config.walker, "leg_2", None) is not None:
+    if describe_second_leg(config.walker):
         return "the plain model has two equal legs"
     if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
         return "the plain model has no walkers of type parts"
