@@ -13,12 +13,12 @@ from pathlib import Path
 from walkerlab.config.check import Check
 from walkerlab.config.loader import load
 from walkerlab.evidence.check.answer import Checked, check_gait
-from walkerlab.evidence.check.causes import generate_families, generate_mistakes
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
-from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker
+from walkerlab.evidence.check.plain_walker import STANCE, PlainWalker, list_mistakes
 from walkerlab.evidence.check.section import COLUMNS, headline, is_short, remarks, source_of
 from walkerlab.physics.orbits.fixed_point import find_gaits
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.views.report.numbers import number
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -43,8 +43,8 @@ at most the first four are right:
 The cause is one term. In the heel strike of the script, the balance of the trailing leg about the hip subtracts a
 term that should not be there: the leg's moment of inertia about its centre of mass, I, times the rate at which the
 angle between the legs changes. With this mistake all digits follow. A later script of the same hand has the right
-strike ([passivewalker-sim](published-right.md#passivewalker-sim)). Type this to see it for yourself, or any other
-name from the table below:
+strike ([passivewalker-sim](published-right.md#passivewalker-sim)). Type this to see it for yourself. For another gait
+of the table below, put its name in the place of `passivewalker-2009`:
 
 ```
 walkerlab check published/passivewalker-2009.yaml
@@ -63,11 +63,13 @@ digit is right](check.md).
 {overview}
 
 *Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
-one that shares no equations with it. For each value there is a verdict:
+one that shares no equations with it. For all {all} gaits they agree: after a step of the plain model from the gait of
+the compiled one, the state and the period differ by {routes} at most (angles in rad, rates and the period scaled with
+sqrt(L/g)). For each value there is a verdict:
 
-- *Reproduced*: the printed and the right value are equal after both are rounded, or cut off, to all printed digits,
-  or to at least three that are at least half of them. If not all digits agree, the table shows how many do, and how
-  far off the printed value is, in units of its last digit. Otherwise the value is *different*.
+- *Reproduced*: the right value, rounded or cut off, has all printed digits. A value also counts as reproduced if at
+  least three of its digits agree, and at least half of them. The table then shows how many do, and how far off the
+  printed value is, in units of its last digit. All other values are *different*.
 - If values differ, the program looks for one cause that gives all of them: a convention, a mistake that is known
   from programs, or a misprint. The gait is *explained* if there is one, and *partly explained* if a cause gives
   some of the values to their last digit.
@@ -128,12 +130,13 @@ def comment_of(file: Path) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """A printed gait: its name, source, finding, count of reproduced values, table and paragraphs."""
+    """A printed gait: name, source, finding, count of reproduced values, difference of both routes, and texts."""
 
     name: str
     source: str
     finding: str
     reproduced: str
+    routes: float
     table: str
     paragraphs: tuple[str, ...]
 
@@ -155,6 +158,7 @@ def entry_of(file: Path) -> Entry:
         source=", ".join(str(source[key]) for key in ("authors", "year") if source[key]) or source["title"],
         finding=finding_of(summary),
         reproduced=f"{len(reproduced)} of {len(rows)}{note}",
+        routes=difference_of_routes(summary),
         table=table,
         paragraphs=(
             comment_of(file),
@@ -164,6 +168,14 @@ def entry_of(file: Path) -> Entry:
             source_of(source),
         ),
     )
+
+
+def difference_of_routes(summary: Mapping) -> float:
+    """Return the difference of both models. Exits with a message if they do not agree."""
+    routes = summary["routes"]
+    if routes is None or not routes["agree"]:
+        sys.exit(f"the two routes do not agree on {summary['source']['title']}: {routes}")
+    return routes["difference"]
 
 
 def table_of(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -184,6 +196,7 @@ def pages() -> dict[str, str]:
     right = [entry for entry in entries if entry.finding == REPRODUCED]
     wrong = [entry for entry in entries if entry.finding != REPRODUCED]
     counts = {"all": len(entries), "right": len(right), "wrong": len(wrong), "made": MADE}
+    counts["routes"] = number(max(entry.routes for entry in entries), 1)
     story = next(entry.table for entry in entries if entry.name == STORY)
     compass, round_feet = mistakes()
     texts = {
@@ -215,8 +228,7 @@ def walkers_with_mistakes(name: str) -> tuple[CheckedStep, list[tuple[str, Plain
     """Return the right gait of a config's walker, and its walkers with mistakes."""
     config = load(Path(name)).config
     right = Checked(config, Check(), find_gaits(rigid_walker(config))).right
-    known = [(each.what, each.walker) for each in generate_mistakes(right.walker)]
-    known += [(each.what.format(f"{TYPICAL:g}"), each.of_size(TYPICAL)) for each in generate_families(right.walker)]
+    known = [(each.what.format(f"{TYPICAL:g}"), each.of_size(TYPICAL)) for each in list_mistakes(right.walker)]
     return right, known
 
 

@@ -125,6 +125,12 @@ def value_at(config: Any, path: Iterable[str]) -> Any:
     return reduce(lambda block, name: getattr(block, name, None), path, config)
 
 
+def replace_key(block: Any, path: str, value: Any) -> Any:
+    """Return a copy of a block with another value at a dotted path. It is not validated."""
+    name, _, tail = path.partition(".")
+    return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})
+
+
 def annotation_of(field: FieldInfo, name: str) -> str:
     """Return the annotation `unit`, `source`, `bounds` or `default_in_words` of a key, or '' if it has none."""
     extra = field.json_schema_extra

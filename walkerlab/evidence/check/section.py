@@ -5,17 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from walkerlab.evidence.check.printed import (
-    CONTRADICTED,
-    DIFFERENT,
-    EXPLAINED,
-    INPUT,
-    NOT_COMPARABLE,
-    NOT_REPRODUCED,
-    REPRODUCED,
-    format_units,
-    spell_name,
-)
+from walkerlab.evidence.check.printed import Verdict, format_units, spell_name
 from walkerlab.labels import add_unit, join_words, unit_by_name
 from walkerlab.views.report.blocks import PageBlock, Paragraph, Section, stage_section
 from walkerlab.views.report.numbers import count, number
@@ -23,8 +13,8 @@ from walkerlab.views.report.tables import Cell, Column, Table, Tone, table
 
 Row = Mapping[str, Any]
 TONES: Mapping[str, Tone] = {
-    INPUT: "given", REPRODUCED: "good", EXPLAINED: "fair", CONTRADICTED: "bad", DIFFERENT: "bad",
-    NOT_REPRODUCED: "plain", NOT_COMPARABLE: "plain",
+    Verdict.INPUT: "given", Verdict.REPRODUCED: "good", Verdict.EXPLAINED: "fair", Verdict.CONTRADICTED: "bad",
+    Verdict.DIFFERENT: "bad", Verdict.NOT_REPRODUCED: "plain", Verdict.NOT_COMPARABLE: "plain",
 }  # fmt: skip
 """Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
 MANY_UNITS = 1e5
@@ -40,7 +30,7 @@ COLUMNS = (
 
 def is_short(row: Row) -> bool:
     """Whether a value is reproduced, but not in all of its digits."""
-    return bool(row["verdict"] == REPRODUCED and row["digits"] < row["of_digits"])
+    return bool(row["verdict"] == Verdict.REPRODUCED and row["digits"] < row["of_digits"])
 
 
 def digits_of(row: Row) -> str:
@@ -49,7 +39,7 @@ def digits_of(row: Row) -> str:
 
 
 def verdict_of(row: Row) -> str:
-    return f"{REPRODUCED} to {row['digits']} digits" if is_short(row) else row["verdict"]
+    return f"{Verdict.REPRODUCED} to {row['digits']} digits" if is_short(row) else row["verdict"]
 
 
 def answer(summary: Row) -> list[str | Table]:
@@ -79,23 +69,23 @@ def headline(summary: Row) -> str:
     finding = summary["finding"]
     cause = follow(explanations[0], rows) if len(explanations) == 1 else ""
     verdicts = [row["verdict"] for row in rows]
-    if finding == NOT_COMPARABLE:
+    if finding == Verdict.NOT_COMPARABLE:
         return f"Nothing can be compared: {summary.get('reason') or 'the file prints no values'}."
-    if finding == REPRODUCED:
-        compared = count(verdicts.count(REPRODUCED), "printed value")
+    if finding == Verdict.REPRODUCED:
+        compared = count(verdicts.count(Verdict.REPRODUCED), "printed value")
         short = sum(map(is_short, rows))
         if not short:
             return f"Right: {compared} reproduced to the last digit."
         verb = "agrees" if short == 1 else "agree"
         return f"Reproduced, but not to the last digit: {short} of {compared} {verb} in fewer digits than are printed."
-    if finding == EXPLAINED:
+    if finding == Verdict.EXPLAINED:
         many = f"Explained, but by more than one cause: each of {len(explanations)} fits the printed digits."
         return f"Explained: {cause}." if cause else many
     if len(rows) == 1:
         return "Different, unexplained: the printed value differs, and one value is too little to find the cause."
     if cause:
         return f"Different, partly explained: {cause}."
-    what = f"{verdicts.count(DIFFERENT)} of {len(rows)} printed values differ"
+    what = f"{verdicts.count(Verdict.DIFFERENT)} of {len(rows)} printed values differ"
     if explanations:
         return f"Different, partly explained: {what}, and no cause found reproduces more than some of them."
     return f"Different, unexplained: {what}, and no known convention, mistake or misprint reproduces them all."
