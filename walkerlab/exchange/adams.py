@@ -55,6 +55,7 @@ def statements(model: AdamsModel) -> Iterator[str]:
     for name, function in model.variables.items():
         yield from named_statement(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
     for name, force in model.forces.items():
+        # Of several functions in a statement, all but the last end in a backslash.
         yield from named_statement(
             name, f"GFORCE/{ids[name]}", f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
             f"RM = {ids[ORIGIN]}", f"FX = {expression(force.x)}\\", f"FY = {expression(force.y)}\\",
@@ -97,6 +98,7 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
     yield from (f"QG = {values(x, y, 0)}", f"REULER = {values(part.angle, 0, 0)}")
     yield from (f"VX = {values(vx)}", f"VY = {values(vy)}", "VZ = 0", "WX = 0", "WY = 0", f"WZ = {values(part.spin)}")
     yield from (f"MASS = {values(part.mass)}", f"CM = {ids[part.centre]}")
+    # Only the moment about the plane's normal matters to the walk. Three equal moments are those of a possible body.
     yield f"IP = {values(part.inertia, part.inertia, part.inertia)}"
 
 

@@ -292,6 +292,8 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         part, (x, y, _) = model.parts[foot_on_ground.part], model.markers[foot_on_ground.marker].place
         place = MovingFrame(part.place, part.angle, part.velocity, part.spin).moved_to((x, y)).place
         model.markers[f"{GROUND}.pin"] = Marker(GROUND, (*place, 0.0))
+        # Together with the planar joint of the base, a hinge would hold the foot in the plane twice. INLINE only fixes
+        # the point.
         model.joints["pin"] = Joint("INLINE", foot_on_ground.marker, f"{GROUND}.pin")
 
 
@@ -343,6 +345,7 @@ class FootTerms:
         lane = round(terrain.lanes[self.foot] / terrain.pitch)
         shift = MM * self.export.lane_shift_m(self.foot)
         along = f"(DX({self.place()}){-shift:+.17g})" if shift else f"DX({self.place()})"
+        # The cosine is positive on the pads, which are one pitch long and two pitches apart.
         wave = f"{'-' if lane % 2 else ''}COS(PI*{along}/{finite(pitch)})"
         return f"IF({wave}:{elsewhere},{elsewhere},{expression})"
 
@@ -429,6 +432,7 @@ def friction_function(leg: str, law: Coulomb) -> str:
     slip = f"VARVAL({{{leg}_slip}})"
     normal = f"VARVAL({{{leg}_normal}})"
     mu, less, v, w = map(finite, law)
+    # Beyond v the rise stays at mu or -mu, and the second STEP adds the fall to the dynamic coefficient.
     rise = f"STEP({slip},-{v},-{mu},{v},{mu})"
     return f"-{normal}*({rise}+SIGN(1,{slip})*(STEP(ABS({slip}),{v},{mu},{w},{less})-{mu}))"
 
@@ -473,6 +477,8 @@ def add_forces(model: AdamsModel, export: Exported) -> None:
         reaction = f"{GROUND}.reaction_{number + 1}"
         model.markers[reaction] = Marker(GROUND, floating=True)
         along = "+".join(x)
+        # The forces act at the ball's lowest point, so friction has the radius as its arm about the marker at the
+        # centre.
         torque = f"{finite(foot.radius)}*({along})" if foot.radius else "0"
         model.forces[f"force_{number + 1}"] = Force(foot.marker, reaction, along, "+".join(y), torque)
 
@@ -488,6 +494,7 @@ def add_hip(model: AdamsModel, export: Exported) -> None:
     if hip.damping_N_m_s_per_rad:
         terms.append(f"-{finite(MM * hip.damping_N_m_s_per_rad)}*WZ({{{i}}},{{{j}}},{{{j}}})")
     if hip.torque_N_m:
+        # Each factor changes its sign at its touchdown.
         factors = [f"SIGN(1,{finite(time)}-TIME)" for time in export.touches_s]
         groups = ["*".join(factors[k : k + 4]) for k in range(0, len(factors), 4)]
         for number, group in enumerate(groups):
@@ -506,6 +513,8 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     """
     law = knee_rules(export.config.walker).stop
     assert isinstance(law, Impact), "the export has a compliant stop"
+    # IMPACT acts where its argument is below the free length. With a free length of 1 rad and the argument 1 - angle,
+    # that is where the knee is beyond straight.
     stop = ",".join(finite(value) for value in (1.0, MM * law.stiffness, *law[1:2], MM * law.damping, law[3]))
     for number, leg in enumerate(LEGS):
         shank = export.names[export.knee_links[number]]
@@ -519,6 +528,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         if damping := knee_dampings(export.config.walker)[number]:
             model.torques[f"knee_damper_{number + 1}"] = Torque(i, j, f"-{finite(MM * damping)}*{rate}")
         place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
+        # Over a gap the sensor must not reach zero.
         down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
         sinking = f"VY({foot.motion})"
         if f"{other}_pulses" in model.variables:
@@ -534,6 +544,7 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     hip = f"{{{export.names[0]}.hinge}}"
     lowest = SHORTEST_HIP * MM * export.config.walker.leg_length_m
     model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
+    # Leg 1 swings first, so of the locks only that of leg 2 is active at the start.
     model.inactive = ("stop_1", "stop_2", "lock_1", *(name for name in model.sensors if name != "fell"))
     for step in range(export.walk.steps):
         model.events += step_events(export, step % 2)
@@ -557,6 +568,7 @@ def step_events(export: Exported, swing: int) -> Iterator[Event]:
 
 def add_requests(model: AdamsModel, export: Exported, law: str) -> None:
     """Add requests named after the quantities of a walk. Angles are from the vertical, lengths in mm."""
+    # ADAMS measures angles from the slope's normal.
     tilt = f"{-export.scene.ours.slope:+.17g}" if export.scene.ours.slope else ""
     uppers = export.names[export.hip_link], export.names[0]
     for foot, (leg, part) in enumerate(zip(LEGS, uppers, strict=True)):

@@ -119,6 +119,7 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
                 "part create rigid_body name_and_position", part_name=full(name), adams_id=str(number),
                 location=values(*part.place, 0.0), orientation=format_rotation(part.angle),
             )  # fmt: skip
+        # Locations of markers are relative to the part that carries them.
         yield command("defaults coordinate_system", default_coordinate_system=full(name))
         for marker_name, marker in model.markers.items():
             if marker.part == name and marker.floating:

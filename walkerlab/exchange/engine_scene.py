@@ -22,7 +22,8 @@ from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.parts import assembly_of
 
-CREEP_LOAD = 0.1  # ratio of tangential to normal force of a standing foot; about the mean over a walk
+# ratio of tangential to normal force of a standing foot; about the mean over a walk
+CREEP_LOAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,7 @@ class EngineScene:
         shift, drift = self._centre(angles, rates)
         position = np.array(y[:2]) - shift
         velocity = np.array(y[2 + n : 4 + n]) - drift
+        # Bodies of a locked leg have equal rows, so there may be more equations than angles. They agree.
         relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
@@ -123,6 +125,7 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
     d = np.zeros((2, MAX_BODIES, 2))
     for foot, part in enumerate(assembly.feet):
         d[foot, : len(assembly.bodies)] = levers(assembly, base, Anchor(part.body, part.centre_m))
+    # The base is the hip, so the levers to the hip are zero.
     walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1], hip_x=0.0, hip_y=0.0)
     return EngineScene(assembly, base, scene.walker, walker, scene.ground, start)
 

@@ -103,6 +103,7 @@ class Exported:
     @property
     def knee_links(self) -> tuple[int, ...]:
         """Index of each leg's shank, or () for straight legs."""
+        # The first two coordinates are the position of the base.
         return tuple(index - 2 for index in self.scene.knee_indices)
 
     @cached_property
@@ -110,6 +111,7 @@ class Exported:
         """Weights, by link, of the hinge angles of bodies that follow other bodies. Each weighted sum is zero."""
         weights = []
         for row in coupling_rows(self.scene.assembly, self.model):
+            # Only if the weights add up to 1 does the base's angle drop out, so that relative angles suffice.
             if abs(row[0]) > MIN_WEIGHT:
                 raise ConfigError(
                     "A body whose coupling weights do not add up to 1 cannot be exported.",

@@ -61,14 +61,18 @@ class Walk:
         self.sinks = self.pushes = False
         self.bent = [False, False]
         for leg in range(len(self.knees)):
+            # A stop acts only after its knee has bent.
             self.model.jnt_limited[self.knees[leg]] = 0
 
     def control(self, _model: Any, data: Any) -> None:
         """Apply push-off and hip torque. Once in a time step, look for a touchdown and turn the knees."""
+        # MuJoCo's control callback is global, so it also runs for other data.
         if data is not self.data:
             return
+        # The time falls when somebody resets the walk, as in the viewer.
         if data.time < self.time_s:
             self.begin()
+        # A callback at the same time again, as from `mj_forward`, is no new time step.
         if data.time > self.time_s:
             self.time_s = data.time
             if data.ncon > 0:
@@ -100,6 +104,7 @@ class Walk:
     def drive(self, swing: int) -> None:
         """Apply the hip torque, and push the trailing foot during a pulse."""
         self.data.qfrc_applied[:] = 0.0
+        # The hip turns leg 1 against leg 2, so the torque on the swing leg changes its sign with the legs' roles.
         self.data.qfrc_applied[self.hip.dofadr[0]] = self.torque if swing == 0 else -self.torque
         share = (self.data.time - self.touches_s[-1]) / self.duration if self.touches_s else 0.0
         if self.pushed and 0.0 < share < 1.0:
@@ -109,6 +114,7 @@ class Walk:
         """Push a foot towards the hip. `share` is the elapsed fraction of the pulse."""
         point = self.data.geom_xpos[foot] - self.model.geom_size[foot, 0] * self.up
         line = self.data.xanchor[self.hip.id] - point
+        # Each foot walks in a lane to one side of the hip, but the push acts in the plane of the walk.
         line[1] = 0.0
         force = 30.0 * (share * (1.0 - share)) ** 2 * impulse / self.duration * line / np.linalg.norm(line)
         body = self.model.geom_bodyid[foot]
@@ -146,6 +152,8 @@ class Walk:
         # a knee that locks by its stop keeps the stop's compression
         model.eq_data[self.locks[leg], 0] = data.qpos[model.jnt_qposadr[knee]] if self.stops[leg] else 0.0
         data.eq_active[self.locks[leg]] = 1
+        # With so few degrees of freedom MuJoCo's Jacobian is dense. The lock, active only from now on, is not in it
+        # yet.
         held = data.efc_J.reshape(-1, model.nv)[data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]
         rows = np.vstack((held, np.eye(model.nv)[model.jnt_dofadr[knee]]))
         columns = np.zeros_like(rows)

@@ -52,6 +52,7 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
+    # Any step length will do to see whether two scenes differ.
     make: Callable[[ContactConfig], Any] = rigid_walker if model == "rigid" else scene_for(1.0)
     first, last = ([*iterate_values(parameter.vary(config, make)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))

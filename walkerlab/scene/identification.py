@@ -33,14 +33,15 @@ from walkerlab.physics.estimation.result import (
     Uncertain,
 )
 from walkerlab.physics.orbits.family_search import RIGID
+from walkerlab.physics.orbits.gradients import sensitivity_norms
 from walkerlab.physics.orbits.newton import Effort
 from walkerlab.physics.orbits.rigid_map import RigidMap
-from walkerlab.physics.orbits.robustness import GaitOnMap, derivative, response
+from walkerlab.physics.orbits.robustness import GaitOnMap, derivative
 from walkerlab.physics.orbits.similarity import Units
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.families import model_reads, scene_for
+from walkerlab.scene.families import model_reads, scene_for, steps_of_stride
 from walkerlab.scene.parameter import R, config_with, parameter_keys, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
@@ -68,7 +69,8 @@ SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
 AT_BOUND: Final = 1e-6  # distance from a bound, relative to the parameter's scale, that counts as zero
 SPREAD_OF_STARTS: Final = 0.1  # largest relative difference of a random start from the config's value
 RIGID_WALKS: Final = Tolerances("dop853", 1e-11, 1e-11, 20_000)
-CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)  # walk errors are near 1e-10, far below noise
+# Walk errors are near 1e-10, far below noise.
+CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)
 MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
@@ -89,6 +91,7 @@ class ConfigFamily:
         self.start: Values = tuple(parameter.value_in(config) for parameter in self.parameters)
         self.at = lru_cache(KEPT_CONFIGS)(partial(config_with, config, self.parameters))
         self.rigid_walker = lru_cache(KEPT_CONFIGS)(self.vary(rigid_walker))
+        self.stride = max((steps_of_stride(config, each) for each in self.parameters), default=1)
 
     def admits(self, values: Values) -> bool:
         return self.rigid_walker(values) is not None
@@ -109,14 +112,35 @@ class ConfigFamily:
         return np.array([abs(value) or SCALE_OF_ZERO for value in self.start])
 
 
-def step_map_of(subject: ModelUnderTest, family: ConfigFamily) -> StepMap:
-    """Return a model's step map as a function of the family's parameter values."""
-    if subject.model == RIGID:
-        return RigidMap(family.rigid_walker, 1.0, rigid_walker(subject.config), RIGID_WALKS)
-    from walkerlab.physics.orbits.contact_map import ContactMap
+def step_map_of(subject: ModelUnderTest, family: ConfigFamily, leg: int | None = None) -> StepMap:
+    """Return a model's step map as a function of the family's parameter values.
 
-    scene = scene_for(subject.length_m)
-    return ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, scene(subject.config))
+    leg  the one that swings in the first complete step; by default that from the subject's state
+    """
+    swing = steps_before(subject, family, leg)
+    step_map: StepMap
+    if subject.model == RIGID:
+        walker_at = family.vary(lambda config: rigid_walker(config).exchanged) if swing else family.rigid_walker
+        step_map = RigidMap(walker_at, 1.0, rigid_walker(subject.config), RIGID_WALKS)
+    else:
+        from walkerlab.physics.orbits.contact_map import ContactMap
+
+        scene = scene_for(subject.length_m)
+        site = scene(subject.config)
+        step_map = ContactMap(family.vary(scene), 1.0, CONTACT_WALKS, subject.length_m, site, swing)
+    step_map.stride = family.stride
+    return step_map
+
+
+def steps_before(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> int:
+    """Return the number of steps from the subject's state to the start of its `step_map_of`."""
+    return ((leg or subject.first_leg) - subject.first_leg) % family.stride
+
+
+def gait_start(subject: ModelUnderTest, family: ConfigFamily, leg: int | None) -> Floats:
+    """Return the gait's section coordinates (d,) at the start of `step_map_of`."""
+    p: Any = family.start
+    return step_map_of(subject, family).step(subject.z, p).z if steps_before(subject, family, leg) else subject.z
 
 
 def identify_walk(
@@ -162,6 +186,7 @@ def identify_with(
     """Fit one model, or return the reason as text if no walk of the model can be fitted."""
     subject = find_model_gait(model, config, gait, note)
     problem = problem_of(subject, measured, question)
+    # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
@@ -195,9 +220,10 @@ def refit_in_time(first: Fitted, begin: Begin) -> Fitted | None:
 
 def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify) -> FitProblem:
     family = ConfigFamily(subject.config, question.keys)
-    walks = step_map_of(subject, family)
-    directions = felt_directions(walks, subject.z, family.start)
-    forecast = Forecast(walks, family.admits, family.scales(), subject.z, directions, measured, question.sensors)
+    walks = step_map_of(subject, family, measured.first_leg)
+    z = gait_start(subject, family, measured.first_leg)
+    directions = felt_directions(walks, z, family.start)
+    forecast = Forecast(walks, family.admits, family.scales(), z, directions, measured, question.sensors)
     free = (-math.inf, math.inf)
     bounds = [question.fit.get(key) or free for key in question.keys]
     priors = {index: question.prior[key] for index, key in enumerate(question.keys) if key in question.prior}
@@ -296,6 +322,7 @@ def pulls_of_priors(fitted: Fitted, keys: Sequence[str], priors: Mapping[str, Se
     for key, u, error, scale in zip(keys, fitted.u, independent_errors(fitted), fitted.forecast.scales, strict=False):
         if key in priors:
             value, sigma = priors[key]
+            # The difference between a prior and the estimate that includes it has this variance.
             free = sigma**2 - (error * scale) ** 2
             distance = abs(u * scale - value) / math.sqrt(free) if free > MIN_PRIOR_GAIN * sigma**2 else 0.0
             yield Pull(key, "prior", value, float(distance))
@@ -330,6 +357,7 @@ def suggest_parameter(
         if gains[index] < PROMISING_GAIN:
             return
         gain, change = gain_of_freeing(subject, keys, other, widened[index], fitted)
+        # With a fitted noise, a gain of the log-likelihood is a monotonic function of an F statistic.
         rare = fdtrc(1, freedom, freedom * math.expm1(2.0 * max(gain, 0.0) / values)) < RARE_GAIN
         if gain > DECISIVE_GAIN and rare and abs(change) > SMALLEST_CHANGE:
             before = NUISANCES.get(other.name, (other.value, 0.0))[0]
@@ -375,9 +403,9 @@ def gain_of_freeing(
 def free_parameter(subject: ModelUnderTest, keys: Sequence[str], problem: FitProblem) -> FitProblem:
     """Return a problem that fits one more parameter, the last of `keys`."""
     family = ConfigFamily(subject.config, keys)
-    forecast = replace(
-        problem.forecast, walks=step_map_of(subject, family), admits=family.admits, scales=family.scales()
-    )
+    forecast = problem.forecast
+    walks = step_map_of(subject, family, forecast.measured.first_leg)
+    forecast = replace(forecast, walks=walks, admits=family.admits, scales=family.scales())
     bounds = [*problem.bounds, (-math.inf, math.inf)]
     return replace(problem, forecast=forecast, start=family.start, bounds=bounds)
 
@@ -424,7 +452,7 @@ def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted
     family = ConfigFamily(config, (*question.keys, *fixed))
     wide = replace(
         forecast,
-        walks=step_map_of(subject, family),
+        walks=step_map_of(subject, family, forecast.measured.first_leg),
         admits=family.admits,
         scales=family.scales(),
         nuisances=(*forecast.nuisances, *sensors),
@@ -437,6 +465,7 @@ def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted
     for name, value, scale, unit, index in zip(
         (*fixed, *sensors), (*values.tolist(), *[0.0] * len(sensors)), scales, units, indices, strict=True
     ):
+        # Only the exact differences may be one-sided, where a walk on one side ends early.
         for exact in (False, True):
             slope = wide.slope_along(u, np.eye(u.size)[index], fitted.heights_m, exact)
             if slope is not None:
@@ -512,7 +541,7 @@ def step_tables(fitted: Fitted) -> tuple[StepTable, ...]:
 def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) -> dict[str, Uncertain]:
     """Return period, step length and spectral radius of the identified gait, with errors propagated from the estimates.
 
-    Returns nothing if the identified walker has no one-step gait near the fitted start.
+    Returns nothing if the identified walker has no gait near the fitted start.
 
     units  units of the walker, or None to leave out the sensitivity of the gait to a drop of the floor
     """
@@ -523,14 +552,16 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
         if not forecast.admits(parameters):
             return None
         z = forecast.walks.rest_on_ground(fitted.predicted.walk.z, parameters)
-        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT)  # type: ignore[arg-type]
+        stride = forecast.walks.stride
+        gait = gait_near(forecast.walks, z, parameters, GAIT_EFFORT, stride)  # type: ignore[arg-type]
         if not isinstance(gait, Cycle):
             return None
-        values = (gait.period_s, gait.step.length_m, float(np.abs(gait.multipliers).max()))
+        radius = float(np.abs(gait.multipliers).max()) ** (1.0 / stride)
+        values = (gait.period_s / stride, math.fsum(gait.lengths_m) / stride, radius)
         if units is None:
             return np.array(values)
-        responses = response(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units), "floor-drop")  # type: ignore[arg-type]
-        return None if responses is None else np.array((*values, responses[0][0]))
+        norms = sensitivity_norms(GaitOnMap(forecast.walks, parameters, gait.z, gait.DP, units))  # type: ignore[arg-type]
+        return None if norms is None else np.array((*values, norms[0]))
 
     centre = quantities(0.0 * fitted.u)
     if centre is None:

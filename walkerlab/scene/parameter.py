@@ -58,6 +58,7 @@ class Parameter:
         except ValidationError as error:
             first = error.errors()[0]
             (*_, name), reason = first["loc"], first["msg"]
+            # The schema's limits are in radians.
             if self.key == SLOPE_DEG and first["type"] in ("less_than", "greater_than"):
                 reason = "Input should be between -90 and 90, both excluded"
             subject = "it" if name == self.path[-1] else name
@@ -91,6 +92,7 @@ def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Seq
     for parameter, value in zip(parameters, values, strict=True):
         block = data
         for name in parameter.path[:-1]:
+            # A second leg like the first has no block of its own yet.
             block[name] = block.get(name) or {}
             block = block[name]
         block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value
@@ -110,6 +112,7 @@ def _keys_set(value: Any) -> Any:
     if not isinstance(value, Block):
         return value
     keys = value.model_dump(exclude_unset=True)
+    # The type is needed even where it is a default, because it decides which keys a block has.
     return {**keys, "type": value.type} if hasattr(value, "type") else keys
 
 
@@ -127,9 +130,7 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    # `identify` does not support legs that differ; all others may vary a key that leg 2 takes from leg 1.
-    left_out = SECOND_LEG in key.split(".") and asker[:1] != ("identify",)
-    reason = why_no_parameter(key, config, own, stated_value if left_out else value_at)
+    reason = why_no_parameter(key, config, own, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
     unit = annotation_of(own[key], "unit") or "1"

@@ -83,6 +83,7 @@ def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
         {"push_off": push} | ({"knees": damper(damping)} if any(dampings) else {})
         for push, damping in zip(push_offs(config.push_off), dampings, strict=True)
     ]
+    # Equal drives leave equal legs a single model.
     if drives[0] == drives[1]:
         return driven.changed(**drives[0])
     return pair(

@@ -17,7 +17,6 @@ from walkerlab.errors import ConfigError
 from walkerlab.evidence.check.conventions import (
     Convention,
     coordinates_of,
-    full_state,
     put_feet_on_slope,
     start_from,
     stated,
@@ -188,7 +187,7 @@ class Checked:
         if not self.items:
             return max(self.walks, key=lambda walk: bool(walk.measured[CHOSEN]))
         nearest = min(self.walks, key=self.distance)
-        state = self.printed_state("state", full_state(nearest.start, self.walker.kneed))
+        state = self.printed_state("state", self.walker.full_state(nearest.start))
         start = None if state is None else start_from(self.walker, state, self.convention.instant)
         if start is None or np.abs(start - nearest.start).max() < SAME_GAIT:
             return nearest
@@ -223,7 +222,7 @@ class Checked:
         plain = CheckedStep(right.walker, right.start, right.step)
         values = plain.values(self.items, self.convention)
         items = [item for item in self.items if item.quantity in PLAIN and values[item.name] is not None]
-        state = self.printed_state("state", full_state(right.start, self.walker.kneed))
+        state = self.printed_state("state", self.walker.full_state(right.start))
         return Question(self.config, items, self.convention, plain, state, self.walks)
 
 
@@ -342,7 +341,7 @@ def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
     if start is None or step is None:
         return {"residual": None, "digits": 0, "is_periodic": False}
     unit = scales(walker, len(start))
-    known = full_state(right.start, walker.kneed)
+    known = walker.full_state(right.start)
     residual = np.abs(step.after - start)
     # change of the state just after a strike that is due to the rounding of the printed state alone
     rounding = coordinates_of(walker, checked.rounding("state", known))
@@ -357,7 +356,7 @@ def periodicity(checked: Checked, question: Question) -> dict[str, Any] | None:
         "is_periodic": bool(np.all(residual <= left)),
         "distance_from_gait": before,
         "distance_after_a_step": float((np.abs(step.after - right.start) / unit).max()),
-        "state_after_step": checked.convention.write(walker, full_state(step.after, walker.kneed)),
+        "state_after_step": checked.convention.write(walker, walker.full_state(step.after)),
     }
     if question.convention.origin == "vertical" and question.convention.instant == "after-strike":
         # both feet stand on the slope that the legs' angles have
@@ -371,13 +370,13 @@ def momenta(checked: Checked) -> list[dict[str, Any]]:
         return []
     walker = checked.walker
     right = checked.right
-    known = full_state(right.start, walker.kneed)
+    known = walker.full_state(right.start)
     state = checked.printed_state("state", known)
     if state is None:
         return []
     start = coordinates_of(walker, state)
     rounding = coordinates_of(walker, checked.rounding("state", known))
-    known = full_state(right.step.before, walker.kneed)
+    known = walker.full_state(right.step.before)
     printed = checked.printed_state("state_before", known)
     if printed is None:
         step = walker.step(start)

@@ -182,14 +182,6 @@ def alternatives(convention: Convention) -> Iterator[Convention]:
     yield from sorted(found, key=lambda other: len(list(other.differences(convention))))[1:]
 
 
-def full_state(coordinates: Floats, kneed: bool) -> Floats:
-    """Return angles, then rates, of all bodies from coordinates with a straight swing leg."""
-    if not kneed:
-        return coordinates[:4]
-    shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
-    return np.array([*coordinates[:2], coordinates[0], *coordinates[2:4], shank])
-
-
 def coordinates_of(walker: PlainWalker, state: Floats) -> Floats:
     """Return the coordinates just after a heel strike from the state of all bodies."""
     n = len(state) // 2
@@ -202,9 +194,9 @@ def state_at(walker: PlainWalker, start: Floats, step: PlainStep, instant: Insta
     vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
     """
     if instant == "after-strike":
-        return full_state(start, walker.kneed)
+        return walker.full_state(start)
     if instant == "before-strike":
-        return full_state(step.before, walker.kneed)
+        return walker.full_state(step.before)
     upright = walker.slope if vertical else 0.0
 
     def lean(state: Floats) -> float:
@@ -214,7 +206,7 @@ def state_at(walker: PlainWalker, start: Floats, step: PlainStep, instant: Insta
         if piece.start[STANCE] > upright >= piece.end[STANCE]:
             middle = walker.swing(piece.phase, piece.start, lean, lambda _: True, EXACT)
             if middle is not None:
-                return middle.end if middle.phase == BENT else full_state(middle.end, walker.kneed)
+                return middle.end if middle.phase == BENT else walker.full_state(middle.end)
     return None
 
 

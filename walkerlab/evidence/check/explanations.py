@@ -19,7 +19,7 @@ import numpy as np
 from walkerlab.config.reads import RigidConfig
 from walkerlab.evidence.check import causes
 from walkerlab.evidence.check.causes import Candidate, MistakeFamily
-from walkerlab.evidence.check.conventions import Convention, alternatives, full_state, start_from
+from walkerlab.evidence.check.conventions import Convention, alternatives, start_from
 from walkerlab.evidence.check.gaits import CheckedStep, gait_near
 from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
 from walkerlab.evidence.check.printed import Item, spell_name
@@ -196,7 +196,7 @@ def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
     near = NEARLY * min(readings)
     closest = [other for miss, other in readings.items() if miss <= near and miss < far]
     numbers = [item.printed.value.real for item in question.items if item.quantity == "state"]
-    known = full_state(question.right.start, question.walker.kneed)
+    known = question.walker.full_state(question.right.start)
     for other in closest[:READINGS]:
         state = other.read(question.walker, numbers, known)
         changes = join_words([*other.differences(question.convention)])

@@ -16,6 +16,7 @@ from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
 from walkerlab.evidence.check.conventions import Convention, state_at
 from walkerlab.evidence.check.plain_walker import (
     EXACT,
+    NO_PART,
     STANCE,
     STRAIGHT,
     SWING,
@@ -66,10 +67,10 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
         # the compass rolls on its ball feet in the contact model only
         radius = 0.0
         centre = -1j * walker.mass_to_hip_m
-        parts: tuple[LegPart, ...] = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
+        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART)
     elif isinstance(walker, StraightLegs):
         centre = walker.leg_mass_ahead_m - 1j * walker.leg_mass_below_hip_m
-        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
+        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART)
     else:
         thigh = walker.thigh
         shank = walker.shank
@@ -88,7 +89,7 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
         radius=radius,
         gravity=config.gravity_m_s2,
         slope=config.slope_rad,
-        torso=None if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
+        torso=NO_PART if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
         hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
         push_off=config.push_off.impulse_N_s,
         free_at_strike=free,

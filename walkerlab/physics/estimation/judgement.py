@@ -18,10 +18,12 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
 MAX_ROUGHNESS: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
-SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; the residual of a missed heel strike is far larger
+# fraction of a quantity's size; the residual of a missed heel strike is far larger
+SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
 PHASE_BINS: Final = 20
-UNUSUALLY_ROUGH: Final = 0.003  # fraction of the leg length; the floor of a laboratory is rough by about 0.001
+# fraction of the leg length; the floor of a laboratory is rough by about 0.001
+UNUSUALLY_ROUGH: Final = 0.003
 UNUSUAL_KICK: Final = 0.05  # fraction of the rates
 # largest acceptable scatter of averaged residuals, as a normal deviate; 0.8 % of walks that the model explains exceed
 # it
@@ -101,6 +103,7 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     sums = np.bincount(groups, whitening(fitted.data, fitted.noise)(fitted.data.residuals))
     squares = float((sums**2 / counts).sum())
     freedom = max(1, counts.size - fitted.u.size)
+    # As a normal deviate, so that the limit does not depend on the number of averages.
     if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > MAX_DEPENDENCE:
         yield (
             f"residuals of successive angles are correlated (averages over half a step scatter "

@@ -38,6 +38,7 @@ def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | Non
     fitted_radius  spectral radius of the fitted walker
     """
     forecast = fitted.forecast
+    # The seed is fixed, so that the same walk always gives the same error.
     rng = np.random.default_rng(0)
     count = forecast.measured.count
     channels = len(forecast.channels)

@@ -106,9 +106,12 @@ def coulomb_coefficient(law: Coulomb, slip: float) -> tuple[float, float]:
     v = abs(slip)
     v_s = law.stiction_velocity
     if v < v_s:
+        # One cubic, odd in the slip, covers both directions. It falls from mu_s to -mu_s, because friction opposes
+        # slip.
         mu, slope = smooth_step(slip, -v_s, law.static, v_s, -law.static)
         return mu, slope
     mu, slope = smooth_step(v, v_s, law.static, law.friction_velocity, law.dynamic)
+    # The sign of the force and the derivative of |slip| are opposite on both sides, so the derivative is always -slope.
     return (-mu if slip > 0.0 else mu), -slope
 
 
@@ -120,6 +123,8 @@ def coulomb_switching_count(law: Coulomb) -> int:
 
 @sample_switching.case(Coulomb)
 def sample_coulomb_switching(law: Coulomb, slip: float, values: Any, first: int, j: int) -> None:
+    # These are smooth in the slip. |slip| - v_s would have a kink at zero, which the polynomials of events.py cannot
+    # follow.
     values[first, j] = slip - law.stiction_velocity
     values[first + 1, j] = slip + law.stiction_velocity
     values[first + 2, j] = slip - law.friction_velocity
