@@ -76,8 +76,8 @@ STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior co
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
 DECISIVE_GAIN: Final = 3.0  # of the log-likelihood, beyond which one more parameter explains the walk better
 PROMISING_GAIN: Final = 1.0  # of the log-likelihood with the noise as it is, below which one more is not pursued
-MOST_FREED: Final = 3  # number of parameters that are freed in turn
-SMALLEST_CHANGE: Final = 1e-4  # of a freed parameter, in its scale, that explains anything
+MAX_FREED: Final = 3  # number of parameters that are freed in turn
+SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
 RARE_GAIN: Final = 0.03  # probability of a gain in right walks, with as many values, above which it is no surprise
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
@@ -334,7 +334,7 @@ def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
 
 def describe_pull(pull: Pull) -> str:
     return (
-        f"the walk pulls {pull.key} against its {pull.against} of {pull.value:g} by {pull.standard_deviations:.2g} "
+        f"the walk contradicts the {pull.against} of {pull.value:g} for {pull.key} by {pull.standard_deviations:.2g} "
         "standard deviations"
     )
 
@@ -352,7 +352,7 @@ def suggest_parameter(
     gains = [evaluate(rows, fitted.noise).likelihood - fitted.evaluation.likelihood for rows in widened]
     values = data.residuals.size
     freedom = max(1, values - fitted.u.size - 1)
-    for index in np.argsort(gains)[: -MOST_FREED - 1 : -1].tolist():
+    for index in np.argsort(gains)[: -MAX_FREED - 1 : -1].tolist():
         other = others[index]
         if gains[index] < PROMISING_GAIN:
             return

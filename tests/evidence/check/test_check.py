@@ -227,7 +227,7 @@ def test_a_misprinted_parameter_is_found():
     told = [each["what"] for each in answer.explanations]
     # with point feet, a slope and a window of the touch are the same
     assert told[0] == "slope_rad is 0.0147 (two digits are transposed)"
-    assert all("a touch counts already" in what for what in told[1:])
+    assert all("is accepted as soon as" in what for what in told[1:])
 
 
 def test_a_lost_sign_and_transposed_digits_are_misprints():

@@ -22,7 +22,7 @@ from walkerlab.evidence.check.plain_walker import BENT, SHANK, STANCE, STRAIGHT,
 EXTRA_TERMS = {
     (1.0, 0.0): "the trailing leg's rate",
     (0.0, 1.0): "the leading leg's rate",
-    (1.0, -1.0): "the rate between the legs",
+    (1.0, -1.0): "(trailing leg's rate − leading leg's rate)",
 }
 SLOPE = "slope_rad"
 GRAVITY = "gravity_m_s2"
@@ -58,17 +58,17 @@ def generate_mistakes(right: PlainWalker) -> Iterator[Candidate]:
         yield mistake(what, signs={**right.signs, **product})
     if right.leg_inertia:
         for weights, rate in EXTRA_TERMS.items():
-            for sign, verb in ((1.0, "subtracts"), (-1.0, "adds")):
-                term = f"the leg's inertia I times {rate}"
-                what = f"the strike, in the balance of the trailing leg about the hip, also {verb} {term}"
+            for sign, term in ((1.0, f"−I × {rate}"), (-1.0, f"+I × {rate}")):
+                momentum = "the trailing leg's angular momentum about the hip before the heel strike"
+                what = f"{momentum} has an extra term {term}, where I is the leg's inertia"
                 yield mistake(what, extra_inertia=(sign * weights[0], sign * weights[1]))
         massless = tuple(part._replace(inertia=0.0) for part in right.parts)
         yield mistake("the legs' inertia is left out", parts=massless)
-        yield mistake("the legs' inertia is left out of the strike", strike_inertia=0.0)
-    yield mistake("the trailing leg keeps its rate through the strike", keeps_trailing_rate=True)
+        yield mistake("the legs' inertia is left out of the heel strike", strike_inertia=0.0)
+    yield mistake("the trailing leg keeps its rate through the heel strike", keeps_trailing_rate=True)
     if right.radius:
         for point, name in ((right.foot, "the arc's centre"), (right.foot - 1j * right.radius, "the sole's middle")):
-            what = f"the strike leaves out the foot's rolling: the leading leg turns about {name}"
+            what = f"the heel strike leaves out the foot's rolling: the leading leg turns about {name}"
             yield mistake(what, strike_foot=point)
             yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_on_it=True)
     if right.hip_mass:
@@ -94,7 +94,7 @@ def wrong_signs(kneed: bool) -> Iterator[tuple[str, dict[tuple[str, int, int], f
 
 def generate_families(right: PlainWalker) -> Iterator[MistakeFamily]:
     """Yield the mistakes that have a size."""
-    early = "a touch counts already when the sum of the legs' angles is within {} rad of a touch"
+    early = "the heel strike is accepted as soon as the sum of the legs' angles is within {} rad of it"
     angles = (1e-5, 0.3)
     yield MistakeFamily(early, angles, 1e-3, lambda size: replace(right, window=size))
     evened = f"{early}, and both feet are then put on the slope"
@@ -103,7 +103,7 @@ def generate_families(right: PlainWalker) -> Iterator[MistakeFamily]:
     times = (2e-5, 0.2)
     first = 4e-3 * right.pendulum_time
     yield MistakeFamily(step, times, first, lambda size: replace(right, euler_step=size))
-    late = f"{step} that ends a step after the strike"
+    late = f"{step}, and the swing ends at the first time step after the heel strike"
     yield MistakeFamily(late, times, first, lambda size: replace(right, euler_step=size, interpolates=False))
 
 

@@ -45,7 +45,7 @@ class Convention:
     steps: int = 1  # steps that a printed period, length or multiplier belongs to
 
     def rows(self, bodies: int) -> Floats:
-        """Return the matrix (printed angles, bodies) from absolute angles to printed ones, without their origin."""
+        """Return the matrix (printed angles, bodies) from absolute angles to printed ones of the same origin."""
         sign = (1.0 if self.positive == "counter-clockwise" else -1.0) * (
             math.degrees(1.0) if self.unit == "deg" else 1.0
         )

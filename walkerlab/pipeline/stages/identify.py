@@ -108,7 +108,7 @@ def identify_divided(
     problems = list[NoAnswer]()
     for measured in read_divisions(block, config):
         try:
-            answers.append(divide_again(config, block, ask, ask(measured)))
+            answers.append(refit_with_new_strikes(config, block, ask, ask(measured)))
         except NoAnswer as error:
             problems.append(error)
             continue
@@ -119,12 +119,10 @@ def identify_divided(
     return max(answers, key=lambda answer: answer.verdict.usable)
 
 
-def divide_again(
+def refit_with_new_strikes(
     config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Repeat a fit if the identified slope and sensors move heel strikes, and keep the old fit if the new
-    one is bad.
-    """
+    """Fit again if the identified slope and sensors move the heel strikes, or keep the old fit if this one is bad."""
     if not before.measured.sampled:
         return before
     slope_change = identified_config(config, before).slope_rad - config.slope_rad
