@@ -17,7 +17,7 @@ from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.labels import add_unit, unit_by_name
 from walkerlab.physics.estimation.fit import MAX_ROUNDS, FitEnd, FitProblem, Fitted, evaluate_at, fit
 from walkerlab.physics.estimation.information import information_on, open_combinations, robust_covariance
-from walkerlab.physics.estimation.judgement import judge
+from walkerlab.physics.estimation.judgement import LIMP, alternates, judge
 from walkerlab.physics.estimation.measured_multipliers import measure_radius
 from walkerlab.physics.estimation.measurements import MeasuredWalk
 from walkerlab.physics.estimation.mixed_model import Reduced, estimate_noise, evaluate, reduce
@@ -26,7 +26,10 @@ from walkerlab.physics.estimation.result import (
     USABLE,
     Estimate,
     EstimateSensitivity,
+    FirstLeg,
     Identification,
+    Information,
+    LegDifference,
     ModelFit,
     Pull,
     StepTable,
@@ -42,7 +45,14 @@ from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.scene.families import model_reads, scene_for, steps_of_stride
-from walkerlab.scene.parameter import R, config_with, parameter_keys, parameter_of
+from walkerlab.scene.parameter import (
+    R,
+    config_with,
+    first_leg_path,
+    mass_of_second_leg,
+    parameter_keys,
+    parameter_of,
+)
 from walkerlab.scene.rigid import rigid_walker
 from walkerlab.scene.subject import ModelUnderTest, find_model_gait
 
@@ -63,6 +73,7 @@ class Fixed(NamedTuple):
     slope: Floats  # (values,) derivative of the predicted values with respect to a change by the scale
 
 
+LEGS: Final = (1, 2)
 Begin = Callable[[str, int], Callable[[], None]]
 KEPT_CONFIGS: Final = 512  # numbers of changed configs and of their walkers that are cached
 SCALE_OF_ZERO: Final = 0.01  # typical change of a parameter that is 0
@@ -170,8 +181,13 @@ def identify_walk(
             f"no walk of the model can be fitted: {verdicts[0].reasons[0]}.",
             "Start from a config whose walk takes at least as many steps as the recording, or fit fewer parameters.",
         )
-    best = max(answers, key=lambda answer: (answer.models[0].usable, answer.models[0].log_likelihood))
-    return replace(best, models=verdicts)
+    return replace(max(answers, key=rank), models=verdicts)
+
+
+def rank(answer: Identification) -> tuple[bool, float]:
+    """Return a key that sorts results: those that fit, then by their likelihood."""
+    verdict = answer.models[0]
+    return verdict.usable, verdict.log_likelihood or -math.inf
 
 
 def identify_with(
@@ -183,8 +199,36 @@ def identify_with(
     note: Callable[[str], None],
     begin: Begin,
 ) -> Identification | str:
-    """Fit one model, or return the reason as text if no walk of the model can be fitted."""
+    """Fit one model, or return the reason as text if no walk of the model can be fitted.
+
+    If it is not known which leg of two that differ swings first, both are tried.
+    """
     subject = find_model_gait(model, config, gait, note)
+    stride = ConfigFamily(config, question.keys).stride
+    if stride == 1 or measured.first_leg is not None:
+        answer = identify_beginning(subject, measured, question, begin)
+        stated = FirstLeg(measured.first_leg, "statement", None) if stride > 1 and measured.first_leg else None
+        return answer if isinstance(answer, str) else replace(answer, first_leg=stated)
+    walks = {leg: replace(measured, first_leg=leg) for leg in LEGS}
+    results = {leg: identify_beginning(subject, walk, question, begin) for leg, walk in walks.items()}
+    answers = {leg: result for leg, result in results.items() if isinstance(result, Identification)}
+    if not answers:
+        return next(reason for reason in results.values() if isinstance(reason, str))
+    leg = max(answers, key=lambda leg: rank(answers[leg]))
+    other = answers.get(sum(LEGS) - leg)
+    if other is None or rank(other)[0] < rank(answers[leg])[0]:
+        return replace(answers[leg], first_leg=FirstLeg(leg, "likelihood", None))
+    gain = rank(answers[leg])[1] - rank(other)[1]
+    if gain > DECISIVE_GAIN:
+        return replace(answers[leg], first_leg=FirstLeg(leg, "likelihood", gain))
+    return replace(answers[leg], first_leg=FirstLeg(leg, "guess", gain), other_differences=other.leg_differences)
+
+
+def identify_beginning(
+    subject: ModelUnderTest, measured: MeasuredWalk, question: Identify, begin: Begin
+) -> Identification | str:
+    """Fit a model to a walk whose first step is that of `measured.first_leg`. Returns as `identify_with`."""
+    model = subject.model
     problem = problem_of(subject, measured, question)
     # Periods alone do not tell kicks from floor heights, and only the rigid map has derivatives by kicks.
     kicked = model == RIGID and (measured.sampled or len(measured.channels()) > 1)
@@ -267,12 +311,18 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         )
     )
     pulls = (*pulls_of_bounds(best, keys), *pulls_of_priors(best, keys, question.prior))
-    fixed = [*fixed_parameters(subject, question, best)]
+    second_leg = mass_of_second_leg(subject.config) if forecast.walks.stride == 1 and alternates(steps) else None
+    fixed = [*fixed_parameters(subject, question, best, fixed_keys(subject, question))]
+    # Leg 2 follows leg 1 while the parameters of both legs change, so that one of its own is changed alone.
+    other_leg = [*fixed_parameters(subject, question, best, [second_leg])][:1] if second_leg else []
     verdict = next((verdict for verdict in map(judge, (steps, best)) if verdict[0] not in USABLE), judge(best))
     if verdict[0] in USABLE:
-        suggested = suggest_parameter(subject, keys, fixed, best)
+        others = (other_leg, fixed)
+        suggested = next(filter(None, (tuple(suggest_parameter(subject, keys, each, best)) for each in others)), ())
         reasons = (*verdict[1], *map(describe_pull, strong_pulls(pulls)), *suggested)
         verdict = ("fits-but" if reasons else "fits"), reasons
+    elif second_leg and verdict[1][0].endswith(LIMP):
+        verdict = verdict[0], (f"{verdict[1][0]}; estimate a mass of leg 2 as well (--fit {second_leg})",)
     dof = max(1, best.data.residuals.size - best.u.size)
     gait = gait_with_errors(best, information.covariance, subject.units if question.robustness else None)
     walk = forecast.predict(best.u, best.heights_m)
@@ -295,7 +345,27 @@ def describe(subject: ModelUnderTest, question: Identify, steps: Fitted, best: F
         nuisances_with_errors(best, question.sensors),
         tuple(sensitivities(fixed, best, estimates, subject.config)),
         measure_radius(steps, gait["spectral_radius"].value) if gait else None,
+        tuple(leg_differences(subject.config, estimates, information)),
     )
+
+
+def leg_differences(
+    config: ContactConfig, estimates: Sequence[Estimate], information: Information
+) -> Iterator[LegDifference]:
+    """Yield the difference between the legs for each estimated key of leg 2 whose value in leg 1 is known."""
+    known = {parameter_of(each.key, config).path: index for index, each in enumerate(estimates)}
+    for index, estimate in enumerate(estimates):
+        path = parameter_of(estimate.key, config).path
+        first = first_leg_path(path)
+        value = value_at(config, first)
+        if first == path or value is None or estimate.standard_error is None:
+            continue
+        weights = np.eye(len(estimates))[index]
+        if first in known:
+            weights[known[first]] = -1.0
+            value = estimates[known[first]].value
+        error = math.sqrt(weights @ information.covariance @ weights)
+        yield LegDifference(estimate.key, estimate.value - value, error, estimate.unit)
 
 
 def pulls_of_bounds(fitted: Fitted, keys: Sequence[str]) -> Iterator[Pull]:
@@ -440,14 +510,21 @@ def one_percent(parameter: Fixed, config: ContactConfig) -> float:
     return 0.0
 
 
-def fixed_parameters(subject: ModelUnderTest, question: Identify, fitted: Fitted) -> Iterator[Fixed]:
-    """Yield each parameter and nuisance that is not estimated and along which walks can be predicted."""
+def fixed_keys(subject: ModelUnderTest, question: Identify) -> list[str]:
+    """Return the keys of the parameters that the model reads and that are not estimated."""
+    config = subject.config
+    estimated = {parameter_of(key, config).path for key in question.keys}
+    others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
+    return [key for key in others if model_reads(subject.model, config, key)]
+
+
+def fixed_parameters(
+    subject: ModelUnderTest, question: Identify, fitted: Fitted, fixed: Sequence[str]
+) -> Iterator[Fixed]:
+    """Yield each fixed parameter, and each nuisance that is not estimated, along which walks can be predicted."""
     config = subject.config
     forecast = fitted.forecast
     count = len(question.keys)
-    estimated = {parameter_of(key, config).path for key in question.keys}
-    others = [key for key in parameter_keys(config) if parameter_of(key, config).path not in estimated]
-    fixed = [key for key in others if model_reads(subject.model, config, key)]
     sensors = [name for name in NUISANCES if forecast.measured.sampled and name not in forecast.nuisances]
     family = ConfigFamily(config, (*question.keys, *fixed))
     wide = replace(

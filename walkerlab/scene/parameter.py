@@ -105,7 +105,18 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
     """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg."""
     value = value_at(config, path)
-    return value_at(config, [name for name in path if name != SECOND_LEG]) if value is None else value
+    return value_at(config, first_leg_path(path)) if value is None else value
+
+
+def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the path of leg 1's key for that of a key of leg 2, or the path itself for other keys."""
+    return tuple(name for name in path if name != SECOND_LEG)
+
+
+def mass_of_second_leg(config: ContactConfig) -> str | None:
+    """Return the first key of a mass of leg 2, or None for a type of walker without such keys."""
+    paths = (path for path, _ in leaves(Config, held=config) if SECOND_LEG in path and path[-1].endswith("mass_kg"))
+    return next(map(".".join, paths), None)
 
 
 def _keys_set(value: Any) -> Any:

@@ -107,16 +107,6 @@ def have_different_legs(config: RigidConfig) -> bool:
     return rigid_walker(config).legs_differ
 
 
-def refuse_different_legs(config: RigidConfig, request: str) -> None:
-    """Raise ConfigError for a request that needs two equal legs, if those of the config's walker differ."""
-    if have_different_legs(config):
-        raise ConfigError(
-            f"{request} needs two equal legs, but those of this walker differ.",
-            "Leave out walker.leg_2, or run `walkerlab report`, which shows the walk of legs that differ.",
-            ("walker",),
-        )
-
-
 def state_names(config: RigidConfig) -> tuple[str, ...]:
     angles = tuple(f"theta_{name}" for name in group_bodies(assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))

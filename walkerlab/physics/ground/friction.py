@@ -11,8 +11,12 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
+import numpy as np
+
 from walkerlab.physics.ground.smooth_step import smooth_step
 from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default
+
+SLOPE_SAMPLES = 101  # slip velocities in each of the rising and the falling part
 
 
 class FrictionLaw(Protocol):
@@ -167,5 +171,11 @@ FRICTION_LAWS: Final[dict[str, type[FrictionLaw]]] = {"coulomb": Coulomb, "none"
 
 
 def steepest_change(law: FrictionLaw, slip: float) -> float:
-    """Return an upper bound on the coefficient's change over a range `slip` (m/s), from its slope at zero slip."""
-    return min(law.largest, -slip * float(friction_coefficient(law, 0.0)[1]))
+    """Return an upper bound on the coefficient's change over a range `slip` (m/s)."""
+    if law.largest == 0.0:
+        return 0.0
+    # The coefficient may fall to its sliding value more steeply than it rises.
+    rise = np.linspace(0.0, law.rising_until, SLOPE_SAMPLES)
+    fall = np.linspace(law.rising_until, law.sliding_from, SLOPE_SAMPLES)
+    steepest = max(abs(friction_coefficient(law, float(v))[1]) for v in (*rise, *fall))
+    return float(min(2.0 * law.largest, slip * steepest))
