@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compare ten steps of exported walkers in MuJoCo with our contact model.
 
-The results are in docs/exchange-details.md and docs/legs.md.
+The results are in docs/exchange-details.md and docs/legs-reference.md.
 
 Usage: python scripts/mujoco_walks.py [CONFIG [KEY=VALUE ...]], by default the walkers of both tables
 

@@ -184,7 +184,7 @@ def study_in_five_rows(results: Results) -> str:
         beside("mean energy (J)", compared["table3"]["E_avg"], 2),
     ]
     rows = [[title, paper, printed, corrected, contact] for title, paper, printed, corrected, _, contact in cells]
-    head = ["", "paper (MATLAB)", "rigid model, equations as printed", "sign corrected", "contact model"]
+    head = ["", "paper (MATLAB)", "rigid model, printed equations", "rigid model, sign corrected", "contact model"]
     return re.sub(r" *\| *", "|", table(head, rows))
 
 

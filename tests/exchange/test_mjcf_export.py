@@ -278,7 +278,7 @@ def test_locked_knee_stays_straight_under_load(tmp_path):
 
 
 @pytest.mark.parametrize("walker", [KNEED, KNEED_TORSO], ids=["kneed", "torso"])
-def test_knee_lock_is_the_same_plastic_impact(walker, tmp_path):
+def test_knee_lock_in_mujoco_equals_our_plastic_impact(walker, tmp_path):
     """Velocities after the lock are those of `lock_knee`, to the time step in which the knee became straight."""
     export, walk = export_of(*walker), walk_of(tmp_path, *walker)
     data, lock = walk.data, walk.lock

@@ -196,7 +196,7 @@ def test_bound_that_excludes_the_truth_is_reported():
     assert (pull.key, pull.against, pull.value) == (LEG, "bound", 0.99)
     assert pull.standard_deviations == pytest.approx((free.value - 0.99) / free.standard_error, rel=0.1)
     assert result.verdict.fit == "fits-but"
-    assert "against its bound of 0.99" in result.verdict.reasons[0]
+    assert "the bound of 0.99 for" in result.verdict.reasons[0]
 
 
 def test_bound_without_influence_raises_no_doubt():

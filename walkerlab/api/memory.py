@@ -446,10 +446,10 @@ def explore(
     >>> page.close()
     """
     from walkerlab.views.explore.server import Server
-    from walkerlab.views.explore.walks import ExploredConfig, sets_of
+    from walkerlab.views.explore.walks import ExploredConfig, set_arguments
 
     config = config_of_scene(walker, {"slope_deg": slope_deg, "contact": contact}, keys)
-    server = Server(0, ExploredConfig(None, sets_of(config), folder_of(runs), {}, called="your walker"))
+    server = Server(0, ExploredConfig(None, set_arguments(config), folder_of(runs), {}, called="your walker"))
     server.begin()
     return server
 

@@ -198,7 +198,7 @@ def changes_of(base: Config, changed: Config, slope_deg: float | None = None) ->
             added.append(f"{name}=added")
     values_before = dict(flatten(before))
     differing = {key: value for key, value in flatten(after) if key not in values_before or values_before[key] != value}
-    # Null says nothing new about a key of a block that was null.
+    # If a block was null, a null key in it is no change.
     absent = {f"{key}." for key, value in values_before.items() if value is None}
     differing = {key: value for key, value in differing.items() if value is not None or not key.startswith((*absent,))}
     if slope_deg is not None and "slope_rad" in differing:

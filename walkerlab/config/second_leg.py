@@ -69,7 +69,7 @@ class SecondKneedLeg(Block):
 
 
 class KneelessLeg(SecondStraightLeg):
-    """A second leg without a knee. Keys that it leaves out are those of leg 1 with its knee locked."""
+    """A second leg without a knee. Keys left out have the values of leg 1 with its knee locked."""
 
     type: Literal["straight-legs"] = key(..., "", "a leg without a knee")
 

@@ -23,8 +23,8 @@ from walkerlab.config.problems import (
 )
 from walkerlab.config.schema import MID_STEP, Config, MidStep, SlopeInDegrees
 from walkerlab.config.tree import BlockNode, ListNode, Node, Position, Scalar, as_typed, plain
-from walkerlab.config.walkers import AssembledWalker, Kneed, followers, second_of
-from walkerlab.extensions import WORDS, foreign
+from walkerlab.config.walkers import AssembledWalker, Kneed, followers, second_leg_of
+from walkerlab.extensions import WORDS, external_extensions
 
 Location: TypeAlias = tuple[int | str, ...]
 
@@ -148,7 +148,7 @@ def following_values(config: Config, stated: Sequence[float | None]) -> dict[int
     if not isinstance(config.start, MidStep) and not isinstance(walker, AssembledWalker):
         because = f"so that both feet stand on the slope of {config.slope_rad:.10g} rad"
         values[0] = -2 * (config.slope_rad + walker.lean_rad) - values[1]
-        if second_of(walker) is not walker:
+        if second_leg_of(walker) is not walker:
             swing = walker.swing_angle(values[1] + config.slope_rad)
             values[0] = values[0] if swing is None else swing - config.slope_rad
         following[0] = FollowingValue("theta_1", values[0], "rad", because)
@@ -249,7 +249,7 @@ def _problem(detail: ErrorDetails, tree: BlockNode, model: type[Block]) -> Probl
 
 def advise_extensions() -> str:
     """Return the advice for a word that an extension may add."""
-    names = ", ".join(found.name for found in foreign() if found.extension) or "none"
+    names = ", ".join(found.name for found in external_extensions() if found.extension) or "none"
     return f", or a word of an extension: install the one that adds it (installed: {names})"
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeGuard
 from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
 from walkerlab.config.contact import Contact
-from walkerlab.config.drives import QUICKEST, Hip, acting_on
+from walkerlab.config.drives import MAX_LEG_SPEED, Hip, acting_on
 from walkerlab.config.fields import Block, check_against, key, meaning_error
 from walkerlab.config.numbers import short_number
 from walkerlab.config.second_leg import (
@@ -111,25 +111,25 @@ class _Legged(Block):
 
         Angles are from the ground's normal. Returns None if leg 1 cannot reach the ground.
         """
-        second = second_of(self)
+        second = second_leg_of(self)
         if second is self:
             return float(-2 * self.lean_rad - stance_rad)
         (own, own_radius), (other, radius) = (
             (math.hypot(leg.leg_length_m - sole, getattr(leg, "foot_centre_ahead_m", 0.0)), sole)
             for leg, sole in ((each, 0.0 if each.type == "compass" else each.foot_radius_m) for each in (self, second))
         )
-        height = radius + other * math.cos(stance_rad + lean_of(second)) - own_radius
-        return None if abs(height) > own else -math.acos(height / own) - lean_of(self)
+        height = radius + other * math.cos(stance_rad + rigid_lean(second)) - own_radius
+        return None if abs(height) > own else -math.acos(height / own) - rigid_lean(self)
 
     @property
     def foot_radii_m(self: Any) -> tuple[float, float]:
         """Radius (m) of each leg's foot."""
-        return self.foot_radius_m, second_of(self).foot_radius_m
+        return self.foot_radius_m, second_leg_of(self).foot_radius_m
 
     @property
     def total_mass_kg(self: Any) -> float:
         """Mass of the whole walker, kg."""
-        legs = self.leg_mass_kg + second_of(self).leg_mass_kg
+        legs = self.leg_mass_kg + second_leg_of(self).leg_mass_kg
         return float(legs + self.hip_mass_kg + torso_mass(self.torso))
 
     @field_validator("hip", check_fields=False)
@@ -146,10 +146,10 @@ class _Legged(Block):
         with suppress(AttributeError):  # errors of the keys above are reported already
             inertia = leg_inertia(SimpleNamespace(**info.data))
             if value.too_quick_for(inertia):
-                most = f"{QUICKEST**2 * inertia:.3g} (torque, spring) and {QUICKEST * inertia:.3g} (damper)"
+                most = f"{MAX_LEG_SPEED**2 * inertia:.3g} (torque, spring) and {MAX_LEG_SPEED * inertia:.3g} (damper)"
                 raise meaning_error(
-                    f"whose torques would swing the legs faster than {QUICKEST:g} rad/s: with their inertia about the "
-                    f"hip, {inertia:.3g} kg m^2, the limits are {most}"
+                    f"whose torques would swing the legs faster than {MAX_LEG_SPEED:g} rad/s: with their inertia about "
+                    f"the hip, {inertia:.3g} kg m^2, the limits are {most}"
                 )
         return value
 
@@ -183,7 +183,7 @@ def alike_second(kind: type[Block], values: Mapping[str, Any], leg: Block) -> An
     return kind.model_validate(second)
 
 
-def second_of(walker: Any) -> Any:
+def second_leg_of(walker: Any) -> Any:
     """Return the walker with two legs like leg 2, or the walker itself if it has no `leg_2`."""
     return walker if getattr(walker, "leg_2", None) is None else built_second(walker)
 
@@ -495,8 +495,8 @@ def why_off_the_leg(mass_m: float, length_m: float) -> str:
     return f"{massless if mass_m == length_m else ''}must be below leg_length_m, {length_m:g}"
 
 
-def lean_of(walker: Any) -> float:
-    """Return `lean_rad` as in the rigid model, in which a compass has point feet."""
+def rigid_lean(walker: Any) -> float:
+    """Return the `lean_rad` of the rigid model, which is 0 for a compass because its feet are points."""
     return 0.0 if walker.type == "compass" else float(walker.lean_rad)
 
 
@@ -556,7 +556,7 @@ def leg_inertia(walker: Any) -> float:
 
 def why_no_push_off(walker: Any) -> str:
     """Explain why a walker cannot push off along its trailing leg, or return '' if it can."""
-    return why_no_push_on(walker) or why_no_push_on(second_of(walker))
+    return why_no_push_on(walker) or why_no_push_on(second_leg_of(walker))
 
 
 def why_no_push_on(walker: Any) -> str:
@@ -579,7 +579,7 @@ def why_no_push_on(walker: Any) -> str:
 def too_light_for_contact(walker: Any) -> str:
     """Explain why a walker cannot stand on compliant ground, or return '' if it can."""
     lighter = (
-        min(each.leg_mass_kg for each in (walker, second_of(walker))) if isinstance(walker, CompassWalker) else 1.0
+        min(each.leg_mass_kg for each in (walker, second_leg_of(walker))) if isinstance(walker, CompassWalker) else 1.0
     )
     share = lighter / walker.total_mass_kg if isinstance(walker, CompassWalker) else 1.0
     if share >= LIGHTEST_CONTACT:
@@ -598,7 +598,7 @@ def why_no_contact(walker: Any) -> str:
     )
 
 
-def why_no_state(start: Any, walker: Any) -> str:
+def explain_wrong_state(start: Any, walker: Any) -> str:
     """Explain why a start has the wrong number of values for a walker, or return '' if the number is right."""
     numbers = 2 * rigid_bodies(walker)
     fits = isinstance(start, str) or len(start) == numbers

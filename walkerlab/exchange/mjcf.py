@@ -60,9 +60,9 @@ Slope = Literal["gravity", "geometry"]
 
 @dataclass(frozen=True)
 class Foot:
-    """Ball of a foot: name, collision group, position across the walk (m), and its leg's links with their lower ends.
+    """Ball of a foot: name, collision group, lateral position (m), and the parts of its leg.
 
-    limbs  link and lower end (m) of each part of the leg to draw, in the link's frame
+    limbs  for each part of the leg that is drawn: its link, and its lower end (m) in the link's frame
     """
 
     name: str

@@ -185,9 +185,9 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
 def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     """Add a doubt if the legs swing as if the clock were wrong, as in a film that is played at another speed.
 
-    Energy is constant within a step of straight legs that nothing drives. In the clock's time kinetic energy is smaller
-    by the clock rate squared, so its changes over those of potential energy show the rate. A tilt of the recording
-    turns gravity, and is fitted as well.
+    Energy is constant within a step of straight legs that nothing drives. If the clock runs fast by a factor r, the
+    measured kinetic energy is too small by r^2. So the ratio of its changes to those of the potential energy gives r.
+    The tilt of the recording, which turns gravity, is fitted as well.
     """
     if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
         return steps

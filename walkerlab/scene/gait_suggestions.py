@@ -96,7 +96,7 @@ def suggest_gaits(scene: RigidConfig) -> str:
     """Suggest gaits near a scene that has none, as commands, or return '' on slopes that do not descend."""
     if scene.slope_rad <= 0.0:
         return ""
-    config = rigid_alone(scene)
+    config = rigid_config(scene)
     feet = find_gait_with_feet_ahead(config)
     suitable = find_slopes_with_gaits(config)
     advice = []
@@ -124,7 +124,7 @@ def round_inward(low: float, high: float) -> tuple[float, float]:
     return rounded if rounded[0] < rounded[1] else (low, high)
 
 
-def rigid_alone(scene: RigidConfig) -> Config:
+def rigid_config(scene: RigidConfig) -> Config:
     """Return a config with only the keys on which a gait of the rigid model depends."""
     data = {name: getattr(scene, name) for name in keys_of(RigidConfig)}
     push_off = {"impulse_N_s": scene.push_off.impulse_N_s, "leg_2": scene.push_off.leg_2}

@@ -87,7 +87,7 @@ STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior co
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
 DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
 PROMISING_GAIN: Final = 1.0  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
-MOST_FREED: Final = 3  # maximum number of parameters that are freed in turn
+MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
 SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
 RARE_GAIN: Final = 0.03  # a gain is surprising if it is more improbable than this under the right model
 GAIT_EFFORT: Final = Effort(1e-9, 40)
@@ -404,7 +404,7 @@ def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
 
 def describe_pull(pull: Pull) -> str:
     return (
-        f"the walk pulls {pull.key} against its {pull.against} of {pull.value:g} by {pull.standard_deviations:.2g} "
+        f"the walk contradicts the {pull.against} of {pull.value:g} for {pull.key} by {pull.standard_deviations:.2g} "
         "standard deviations"
     )
 
@@ -422,7 +422,7 @@ def suggest_parameter(
     gains = [evaluate(rows, fitted.noise).likelihood - fitted.evaluation.likelihood for rows in widened]
     values = data.residuals.size
     freedom = max(1, values - fitted.u.size - 1)
-    for index in np.argsort(gains)[: -MOST_FREED - 1 : -1].tolist():
+    for index in np.argsort(gains)[: -MAX_FREED - 1 : -1].tolist():
         other = others[index]
         if gains[index] < PROMISING_GAIN:
             return

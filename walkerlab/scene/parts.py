@@ -10,7 +10,7 @@ from walkerlab.config.walkers import (
     CompassWalker,
     Kneed,
     StraightLegs,
-    second_of,
+    second_leg_of,
     torso_mass,
 )
 from walkerlab.errors import ConfigError
@@ -27,7 +27,7 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
     Raises ConfigError for inconsistent parts.
     """
     parts = legs_of(walker, rigid)
-    other = second_of(walker)
+    other = second_leg_of(walker)
     parts = parts if other is walker else replace_second_leg(parts, legs_of(other, rigid))
     torso = walker.torso
     return parts if torso is None else add_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
@@ -82,7 +82,7 @@ def drive_parameters(config: RigidConfig) -> dict[str, Any]:
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
     """Return the damping (N m s/rad) of each leg's knee, or 0 for a leg without a knee."""
-    knees = (getattr(each, "knee", None) for each in (walker, second_of(walker)))
+    knees = (getattr(each, "knee", None) for each in (walker, second_leg_of(walker)))
     first, second = (0.0 if knee is None else knee.damping_N_m_s_per_rad for knee in knees)
     return first, second
 

@@ -18,7 +18,7 @@ MAP_ATOL = 1e-6
 MIN_BUDGET, BUDGET_FACTOR = 60_000, 4  # evaluations per cell: minimum, and multiple of those for the unchanged start
 
 
-def starts_of(
+def build_scaled_starts(
     scene: ContactScene, rigid: RigidModel, state: State, steps: int, answer: GaitAnswer, tolerances: Tolerances
 ) -> scaled_starts.ScaledStarts:
     """Build starts with scaled velocities from a rigid start. If the contact gait is known, walks must settle on it."""

@@ -87,7 +87,7 @@ def test_edge_cells_store_the_share_of_subcells_that_walk(whole):
     assert (cells["walking"][between] * 9).round(9).tolist() == (cells["walking"][between] * 9).round().tolist()
 
 
-def test_walking_share_of_a_cell_is_that_of_a_finer_grid(tmp_path, whole):
+def test_walking_share_of_a_refined_cell_equals_a_finer_grid(tmp_path, whole):
     finer = run(tmp_path, *SMALL[1:3], "basin.cells=[48,36]", "basin.refine=1")
     shares = whole.groups["basin"]["walking"].ravel()
     between = (shares > 0.0) & (shares < 1.0)

@@ -53,7 +53,7 @@ from walkerlab.scene.contact import (
     tolerances_of,
 )
 from walkerlab.scene.rigid import rigid_walker, state_names
-from walkerlab.scene.scaled import scale_for_map, starts_of
+from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
 from walkerlab.scene.walk_outcomes import Pads, describe_endings
 
 RIGID_SETTINGS = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
@@ -110,7 +110,7 @@ class TuneRun:
         self.tolerances = tolerances_of(config, self.steps)
         self.rigid: RigidModel = rigid_walker(config)
         self.pins_foot = is_passive_compass(config)
-        self.starts = starts_of(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
+        self.starts = build_scaled_starts(scene, self.rigid, rigid_state, self.steps, gait, self.tolerances)
         self.walks: dict[str, ContactWalkResult] = {}
         self.printed: dict[str, dict[str, Any]] = {}
         self.margins: list[scaled_starts.Margin] = []

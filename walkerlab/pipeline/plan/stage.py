@@ -180,7 +180,7 @@ class Stage:
         if self.why_no_such_legs(config) is not None:
             raise ConfigError(
                 f"{target} needs two equal legs, but those of this walker differ.",
-                f"Leave out what differs in the second leg, or ask another stage, such as {', '.join(WALKED)}.",
+                f"Leave out what differs in the second leg, or run another stage, such as {', '.join(WALKED)}.",
             )
         # Imported here: the command line's help needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add

@@ -216,7 +216,7 @@ class Worker:
 
 
 class SizedExecutor(Executor):
-    """Executor that runs `size` calls at the same time, or 0 if it runs each call immediately, in this process."""
+    """Executor with a `size`: number of calls that run at the same time, or 0 if each runs in this process."""
 
     size: int
 

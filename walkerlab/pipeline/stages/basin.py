@@ -154,7 +154,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
     # Imported here: it loads interpolation code, which the rigid model does not need.
-    from walkerlab.scene.scaled import scale_for_map, starts_of
+    from walkerlab.scene.scaled import build_scaled_starts, scale_for_map
 
     gait = inputs["fixedpoint"].summary
     steps = config.basin.contact_steps
@@ -163,7 +163,7 @@ def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: 
     answer = contact_gait(config, step_length_m, state)
     asymmetry = step_asymmetry(config, inputs)
     scene = replace(scene_on_pads(config, step_length_m, state, answer, asymmetry), pinned=False)
-    starts = starts_of(scene, rigid, state, steps, answer, tolerances_of(config, steps))
+    starts = build_scaled_starts(scene, rigid, state, steps, answer, tolerances_of(config, steps))
     pads = Pads((scene.pitch_m, scene.pitch_m), laid=str(config.contact.pad_pitch))
     return ContactQuestion(scene, rigid, scale_for_map(starts, starts.walk(1.0, 1.0).evaluations), pads)
 

@@ -23,10 +23,10 @@ from walkerlab.pipeline.stages.walk import (
     legs,
     measure_pace,
     rigid_start,
+    rotation_variables,
     step_asymmetry,
     steps_of,
     summarise_walk,
-    turning,
     variables_over_time,
 )
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
@@ -195,7 +195,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
     variables = variables_over_time(**of_legs, hip_along_m=along, hip_height_m=height)
     if walker.kneed:
         shanks, thighs = layout.knees.T.tolist()
-        variables |= turning("shank", angle[:, shanks], velocity[:, shanks])
+        variables |= rotation_variables("shank", angle[:, shanks], velocity[:, shanks])
         knees = np.zeros((2, len(y), 2))
         for leg, (thigh, shank) in enumerate(zip(thighs, shanks, strict=True)):
             hip = hinge_point(scene.assembly, names[thigh], names[thighs[1 - leg]])
@@ -206,7 +206,7 @@ def state_variables(scene: ContactScene, y: Floats) -> dict[str, Variable]:
             knees[1, :, leg] = height + s[:, thigh] * ahead + c[:, thigh] * up
         variables |= variables_over_time(knee_along_m=knees[0], knee_height_m=knees[1])
     if TORSO in names:
-        variables |= turning(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
+        variables |= rotation_variables(TORSO, angle[:, names.index(TORSO)], velocity[:, names.index(TORSO)])
     return variables
 
 

@@ -115,7 +115,7 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
     problems = list[NoAnswer]()
     for measured in file.divisions():
         try:
-            answers.append(divide_again(file, ask, ask(measured)))
+            answers.append(refit_with_new_strikes(file, ask, ask(measured)))
         except NoAnswer as error:
             problems.append(error)
             continue
@@ -126,12 +126,10 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
     return max(answers, key=lambda answer: answer.verdict.usable)
 
 
-def divide_again(
+def refit_with_new_strikes(
     file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Repeat a fit if the identified slope, sensors or soles move heel strikes, and keep the old fit if the new one is
-    bad.
-    """
+    """Fit again if the identified slope, sensors or soles move heel strikes, or keep the old fit if this one is bad."""
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)

@@ -7,7 +7,7 @@ import numpy as np
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, Samples
 from walkerlab.physics.hybrid.rigid_measures import Places, energies, footholds_of, places, reactions
 from walkerlab.physics.mechanics.rigid_model import STANCE, RigidModel, compute_in_turns, energy_at_touch
-from walkerlab.pipeline.stages.walk import COORDINATE, legs, steps_of, turning, variables_over_time
+from walkerlab.pipeline.stages.walk import COORDINATE, legs, rotation_variables, steps_of, variables_over_time
 from walkerlab.pipeline.store.content import Group, Variable
 from walkerlab.scene.rigid import RigidScene
 
@@ -87,7 +87,7 @@ def body_variables(scene: RigidScene, samples: Samples, stance: Any) -> dict[str
         if name.startswith("theta_1_"):  # the stance leg's shank is in line with its thigh
             angle = reorder_by_leg(np.column_stack((angle, samples.state[:, 1])), stance)
             rate = reorder_by_leg(np.column_stack((rate, samples.state[:, n + 1])), stance)
-        variables |= turning(name.split("_")[-1], angle, rate)
+        variables |= rotation_variables(name.split("_")[-1], angle, rate)
     return variables
 
 

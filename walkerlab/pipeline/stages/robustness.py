@@ -83,7 +83,7 @@ LABELS: Final[dict[str, dict[str, Label]]] = {
         "roughness_m": Label("m", "standard deviation of the footholds' heights"),
         "mean_steps": Label("1", "mean number of steps to failure, or a lower bound"),
         "walks": Label("1", "walks"),
-        "capped": Label("1", "walks that were stopped before they failed"),
+        "capped": Label("1", "walks stopped at the maximum number of steps"),
         "method": Label("", "method of the mean"),
     },
     "sensitivity": {
@@ -176,7 +176,7 @@ def refuse(config: RobustnessConfig) -> None:
         if roughness > half:
             raise ConfigError(
                 f"robustness.roughness_m: {roughness:g} m is more than half a leg, {half:g} m: no step survives it.",
-                "Give millimetres as 0.001.",
+                "The unit is metres: write 1 mm as 0.001.",
             )
 
 

@@ -189,8 +189,8 @@ def variables_over_time(**values: ArrayLike) -> dict[str, Variable]:
     }
 
 
-def turning(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
-    """Build angle and velocity of a torso (samples,) or of the shanks (samples, 2)."""
+def rotation_variables(name: str, angle: ArrayLike, velocity: ArrayLike) -> dict[str, Variable]:
+    """Build the variables of angle and angular velocity of a torso (samples,) or the shanks (samples, 2)."""
     labels = Label("rad", f"angle of the {name} from the vertical"), Label("rad/s", f"angular velocity of the {name}")
     dims = (TIME, LEG)[: np.ndim(angle)]
     return {

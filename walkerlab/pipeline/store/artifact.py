@@ -95,7 +95,7 @@ class Damaged(Exception):  # noqa: N818 - a finding about a file, not a failure 
 
 
 class OtherLayout(Damaged):
-    """Error for an artifact of another version of this program. It needs no warning."""
+    """Error for an artifact in another program version's layout. Callers skip it without a warning."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

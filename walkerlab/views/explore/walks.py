@@ -226,7 +226,7 @@ class ExploredConfig:
         return 422, {"error": {"key": key, "value": value, "message": error.message, "advice": error.advice}}
 
 
-def sets_of(config: Config) -> tuple[str, ...]:
+def set_arguments(config: Config) -> tuple[str, ...]:
     """Return the `--set` texts that turn the built-in paper config into `config`."""
     paper = ExploredConfig(None, (), Path(), {}).loaded.config.model_dump(mode="json")
     values = config.model_dump(mode="json").items()

@@ -164,7 +164,7 @@ def plot_rough_ground(results: Results) -> Drawn:
 
 
 def draw_shares(axes: Axes, steps: Group) -> None:
-    """Plot the fraction of walks still going over the number of steps, for each model and roughness."""
+    """Plot the fraction of walks still upright after each number of steps, for each model and roughness."""
     for model, last, of_model in zip(steps["model"], steps["cut_off_at"], steps["steps"], strict=True):
         for walks, dash in zip(of_model, cycle(DASHES), strict=False):
             # A walk that was cut off has not failed, so it counts as still walking.

@@ -233,7 +233,7 @@ def draw_cycles(results: Results) -> Drawn:
 
 
 def draw_cycles_of(axes: Axes, walk: DrawnWalk, leg: int) -> None:
-    """Plot the last stride in the model's style, with earlier strides as thin lines below."""
+    """Plot the last stride in the model's style, with earlier strides as thin lines behind it."""
     # markers show the state just before a heel strike: filled if this leg strikes, open if the other does
     angle = walk["angle"][:, leg]
     velocity = walk["velocity"][:, leg]

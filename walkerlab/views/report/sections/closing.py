@@ -93,7 +93,7 @@ def omissions_section(results: Results) -> Section | None:
 
 
 def rows_by_reason(missing: Sequence[LeftOut]) -> Iterator[tuple[str, str, str]]:
-    """Yield for each reason a row of results missing because of it, then a row of any results that depend on them."""
+    """Yield, for each reason, a row with the results missing for it and, if any, one with those that need them."""
     reasons = {absent.why for absent in missing}
     # the innermost reason is the last part: 'no gait' in 'it needs simulate: it needs fixedpoint: no gait'
     causes = {absent.why: min(filter(absent.why.endswith, reasons), key=len) for absent in missing}
