@@ -10,7 +10,6 @@ from walkerlab.config.files import builtin_config
 from walkerlab.config.reads import restrict
 from walkerlab.config.walkers import second_of
 from walkerlab.errors import ConfigError
-from walkerlab.exchange.exported import GaitStart, prepare_export
 from walkerlab.physics.hybrid.contact_result import sample_feet
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING, swing_foot
 from walkerlab.physics.orbits.contact_map import lengths_between_touches
@@ -240,13 +239,6 @@ def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     for row in rows:
         assert sorted((row["from"], row["to"])) == pytest.approx([4.9, 5.1])
     assert content.summary["bifurcations"] == []
-
-
-def test_walker_with_one_knee_and_a_straight_leg_cannot_be_exported():
-    config = config_of("kneed", f"walker.leg_2={PEG}")
-    assert rigid_walker(config).legs_differ
-    with pytest.raises(ConfigError, match="both with a knee or both without"):
-        prepare_export(config, GaitStart(0.4, (0.0,) * 6))
 
 
 ONE_KNEE_GROUND = (

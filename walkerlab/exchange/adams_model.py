@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -516,9 +516,20 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
     # that is where the knee is beyond straight.
     stop = ",".join(finite(value) for value in (1.0, MM * law.stiffness, *law[1:2], MM * law.damping, law[3]))
     for number, leg in enumerate(LEGS):
-        shank = export.names[export.knee_links[number]]
         foot = FootTerms(export, number)
         other = LEGS[1 - number]
+        place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
+        # Over a gap the sensor must not reach zero.
+        down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
+        down_ahead = Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM)
+        sinking = f"VY({foot.motion})"
+        if f"{other}_pulses" in model.variables:
+            # the trailing knee stays locked during the push-off
+            sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
+        model.sensors |= {f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM), f"{leg}_touches": down_ahead}
+        if number >= len(export.knee_links):
+            continue
+        shank = export.names[export.knee_links[number]]
         i, j = f"{shank}.hinge", model.joints[f"hinge_of_{shank}"].j
         angle = f"AZ({{{i}}},{{{j}}})"
         rate = f"WZ({{{i}}},{{{j}}},{{{j}}})"
@@ -526,25 +537,21 @@ def add_knees(model: AdamsModel, export: Exported) -> None:
         model.motions[f"lock_{number + 1}"] = f"hinge_of_{shank}"
         if damping := knee_dampings(export.config.walker)[number]:
             model.torques[f"knee_damper_{number + 1}"] = Torque(i, j, f"-{finite(MM * damping)}*{rate}")
-        place = f"{{{foot.marker}}},{{{FootTerms(export, 1 - number).marker}}},{{{ORIGIN}}}"
-        # Over a gap the sensor must not reach zero.
-        down = foot.restrict_to_pads(f"-({foot.height})", elsewhere="-1")
-        sinking = f"VY({foot.motion})"
-        if f"{other}_pulses" in model.variables:
-            # the trailing knee stays locked during the push-off
-            sinking = f"IF(-VARVAL({{{other}_pulses}}):-1,{sinking},{sinking})"
         model.sensors |= {
             f"{leg}_bent": Sensor(f"-{finite(MIN_FLEXION)}-{angle}", ERROR_RAD),
             f"{leg}_straight": Sensor(f"IF({angle}:-1,-1,-{rate})", ERROR_RAD),
             f"{leg}_touches": Sensor(down, ERROR_MM),
-            f"{leg}_sinks_no_longer": Sensor(sinking, ERROR_MM),
-            f"{leg}_on_bent_knee": Sensor(f"IF(DX({place}):-1,-1,{down})", ERROR_MM, halts=True),
+            f"{leg}_on_bent_knee": replace(down_ahead, halts=True),
         }
     hip = f"{{{export.names[0]}.hinge}}"
     lowest = FALLEN_HIP * MM * export.config.walker.leg_length_m
     model.sensors["fell"] = Sensor(f"{finite(lowest)}-DY({hip})", ERROR_MM, halts=True)
     # Leg 1 swings first, so of the locks only that of leg 2 is active at the start.
-    model.inactive = ("stop_1", "stop_2", "lock_1", *(name for name in model.sensors if name != "fell"))
+    model.inactive = (
+        *(stop for stop in ("stop_1", "stop_2") if stop in model.torques),
+        "lock_1",
+        *(name for name in model.sensors if name != "fell"),
+    )
     for step in range(export.walk.steps):
         model.events += step_events(export, step % 2)
 
@@ -555,8 +562,12 @@ def step_events(export: Exported, swing: int) -> Iterator[Event]:
     number = swing + 1
     trailing = 2 - swing
     on_bent_knee = f"{leg}_on_bent_knee"
-    yield Event(f"{leg}_bent", (f"stop_{number}", on_bent_knee))
-    yield Event(f"{leg}_straight", (f"lock_{number}",), (f"stop_{number}", on_bent_knee))
+    if number <= len(export.knee_links):
+        yield Event(f"{leg}_bent", (f"stop_{number}", on_bent_knee))
+        yield Event(f"{leg}_straight", (f"lock_{number}",), (f"stop_{number}", on_bent_knee))
+    if trailing > len(export.knee_links):
+        yield Event(f"{leg}_touches")
+        return
     released = (f"lock_{trailing}",)
     if knee_rules(export.config.walker).release_at_touch and not any(export.impulses_N_s):
         yield Event(f"{leg}_touches", (), released)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig
-from walkerlab.errors import ConfigError
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
@@ -20,7 +19,6 @@ from walkerlab.physics.mechanics.assembly import Anchor, levers, masses, total_m
 from walkerlab.physics.mechanics.parts import Assembly, Knee
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
-from walkerlab.scene.parts import assembly_of
 
 # ratio of tangential to normal force of a standing foot; about the mean over a walk
 CREEP_LOAD = 0.1
@@ -165,13 +163,3 @@ def contact_target(scene: EngineScene) -> EngineContact | None:
     creep = creep_velocity(friction, CREEP_LOAD)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     return EngineContact(mass, g, foot.depth, walker.normal.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
-
-
-def refuse_one_knee(config: ContactConfig) -> None:
-    """Raise ConfigError if only one leg has a knee: exports and engines need two legs of one kind."""
-    if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
-        raise ConfigError(
-            "exports and engines need two legs of one kind, both with a knee or both without.",
-            "Simulate this walker in walkerlab: `walkerlab contact-sim`.",
-            ("walker",),
-        )

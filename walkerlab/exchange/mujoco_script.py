@@ -39,11 +39,12 @@ class Walk:
         self.height = base.dofadr[0]
         self.feet = [model.geom(f"foot_{foot}").id for foot in (1, 2)]
         joints = {model.joint(joint).name: joint for joint in range(model.njnt)}
-        self.knees = [joints[name] for name in ("knee_1", "knee_2") if name in joints]
+        # joints by leg, of the legs that have a knee
+        self.knees = {leg: joints[name] for leg, name in enumerate(("knee_1", "knee_2")) if name in joints}
+        self.locks = {leg: model.equality(f"lock_{leg + 1}").id for leg in self.knees}
+        self.stops = {leg: bool(model.jnt_limited[knee]) for leg, knee in self.knees.items()}
         if self.knees:
             self.flexed, self.at_touch = model.numeric("knees").data
-            self.locks = [model.equality(f"lock_{leg}").id for leg in (1, 2)]
-            self.stops = model.jnt_limited[self.knees].copy()
         mujoco.mj_resetDataKeyframe(model, self.data, model.key("gait").id)
         mujoco.mj_forward(model, self.data)
         # directions along the slope and normal to it
@@ -60,9 +61,9 @@ class Walk:
         # The trailing knee is released once the leading foot stops sinking in, and after the push-off.
         self.sinks = self.pushes = False
         self.bent = [False, False]
-        for leg in range(len(self.knees)):
+        for knee in self.knees.values():
             # A stop acts only after its knee has bent.
-            self.model.jnt_limited[self.knees[leg]] = 0
+            self.model.jnt_limited[knee] = 0
 
     def control(self, _model: Any, data: Any) -> None:
         """Apply push-off and hip torque. Once in a time step, also look for touchdowns and update the knees."""
@@ -87,7 +88,7 @@ class Walk:
         """Swap feet if the swing foot is on the ground ahead of the stance foot and its knee is locked."""
         data = self.data
         swing = 1 - self.stance
-        if (self.knees and not data.eq_active[self.locks[swing]]) or self.feet[swing] not in data.contact.geom:
+        if (swing in self.knees and not data.eq_active[self.locks[swing]]) or self.feet[swing] not in data.contact.geom:
             return
         along = data.geom_xpos[self.feet] @ self.along
         if along[swing] > along[self.stance]:
@@ -131,8 +132,9 @@ class Walk:
             self.sinks = self.sinks and not self.at_touch and motion[3:] @ self.up < 0.0
             if not self.sinks and (not self.pushed or data.time >= self.touches_s[-1] + self.duration):
                 self.pushes = self.bent[trailing] = False
-                data.eq_active[self.locks[trailing]] = 0
-        for leg, knee in enumerate(self.knees):
+                if trailing in self.knees:
+                    data.eq_active[self.locks[trailing]] = 0
+        for leg, knee in self.knees.items():
             if data.eq_active[self.locks[leg]]:
                 continue
             bend = data.qpos[model.jnt_qposadr[knee]]
