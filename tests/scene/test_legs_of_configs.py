@@ -241,6 +241,19 @@ def test_a_family_over_the_mass_of_leg_2_passes_through_equal_legs():
     assert content.summary["bifurcations"] == []
 
 
+def test_flips_of_legs_that_differ_lie_on_a_curve_over_slope_and_mass():
+    second = "{over: walker.leg_2.leg_mass_kg, from: 3.95, to: 4.05}"
+    block = f"{{over: slope_deg, from: 2.2, to: 2.35, model: rigid, periods: 2, points: 12, second: {second}}}"
+    config = config_of("prosthesis", f"continuation={block}")
+    content = continuation.run(restrict(config, PIPELINE["continuation"].takes), {}, Silent(), again=False)
+    (curve,) = content.summary["curves"]
+    assert (curve["kind"], curve["period"]) == ("flip", 2)
+    for slope_deg, mass in (curve["begins"], curve["ends"]):
+        gait = gait_of(config_of("prosthesis", f"slope_deg={slope_deg}", f"walker.leg_2.leg_mass_kg={mass}"))
+        # the last point is interpolated to the edge of the plane
+        assert gait.stride_multipliers[0] == pytest.approx(-1.0, abs=1e-4)
+
+
 ONE_KNEE_GROUND = (
     "contact={stiffness: 300000, damping: 270, terrain: after-mid-swing, stiction_velocity: 10, friction_velocity: 100}"
 )

@@ -56,7 +56,8 @@ class FamilyQuestion:
 
     @property
     def stride(self) -> int:
-        return steps_of_stride(self.config, self.parameter)
+        parameters = (self.parameter, *(() if self.second is None else (self.second.parameter,)))
+        return max(steps_of_stride(self.config, each) for each in parameters)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -143,12 +144,6 @@ def models_of(question: FamilyQuestion) -> tuple[str, ...]:
     if question.models != (RIGID,) and config.contact is None:
         raise contact_required_error("the contact model", config.walker, "Use --model rigid.")
     question.refuse_ends("continuation")
-    if second is not None and question.stride > 1:
-        raise ConfigError(
-            "continuation.second: curves over a second key need two equal legs, but those of this walker differ.",
-            "Leave out the second key.",
-            ("continuation", "second"),
-        )
     if second is not None:
         second.refuse_ends("continuation", "second")
         current = second.parameter.value_in(config)
@@ -182,7 +177,9 @@ def search_of(model: str, question: FamilyQuestion, progress: Progress) -> Famil
         config = question.config
         plane = Plane(parameter.vary(config, map_of), second.span, parameter.value_in(config))
     periods = min(block.periods, THOROUGHNESS[model].periods)
-    return FamilySearch(model, map_of(question.config), question.span, seeds, periods, block.points, progress, plane)
+    step_map = map_of(question.config)
+    step_map.stride = question.stride
+    return FamilySearch(model, step_map, question.span, seeds, periods, block.points, progress, plane)
 
 
 def rigid_seeds(question: FamilyQuestion, progress: Progress) -> Begun:
@@ -461,7 +458,7 @@ def omitted_families(families: Sequence[Family], question: FamilyQuestion) -> li
             what = f"the contact model's gaits of more than {THOROUGHNESS[CONTACT].periods} steps"
             entries.append((what, "its flips are located too coarsely, to about 1e-7, to follow them further"))
     if question.stride > 1:
-        entries.append(("attractors, and gaits of other numbers of steps", "the legs differ"))
+        entries.append(("attractors, their regions, and gaits of other numbers of steps", "the legs differ"))
     entries += [
         (f"the {family.model} model's plane of both keys", "the second key does not affect this model")
         for family in families
