@@ -141,11 +141,11 @@ LEGS_DIFFER = {
 
 
 @cache
-def limping(name):
+def limping(name, model="rigid"):
     own, *sets = LEGS_DIFFER[name]
     config = load(Path(own), sets).config
     gait = run_in_memory("fixedpoint", config).summary
-    return find_model_gait("rigid", config, gait, lambda _: None), ConfigFamily(config, ["walker.leg_2.leg_mass_kg"])
+    return find_model_gait(model, config, gait, lambda _: None), ConfigFamily(config, ["walker.leg_2.leg_mass_kg"])
 
 
 @pytest.mark.parametrize("name", ["round-feet", "kneed", "paper"])
@@ -178,15 +178,31 @@ def test_tangents_of_a_limping_walk_equal_difference_quotients(name, first_leg):
     assert exact.rates == pytest.approx(differences.rates, abs=1e-4)
 
 
-def test_walk_that_leg_2_begins_is_the_same_gait_half_a_stride_later():
-    subject, family = limping("prosthesis")
+@pytest.mark.parametrize(("model", "accuracy"), [("rigid", 1e-9), ("contact", 1e-5)])
+def test_walk_that_leg_2_begins_is_the_same_gait_half_a_stride_later(model, accuracy):
+    subject, family = limping("prosthesis", model)
     walks = [step_map_of(subject, family, leg) for leg in (1, 2)]
     first, second = (
         each.take_disturbed_walk(gait_start(subject, family, leg), family.start, np.zeros(7))
         for leg, each in enumerate(walks, 1)
     )
-    assert second.durations_s[:5] == pytest.approx(first.durations_s[1:], rel=1e-10)
-    assert second.angles_rad[:5] == pytest.approx(first.angles_rad[1:], rel=1e-9)
+    assert second.durations_s[:5] == pytest.approx(first.durations_s[1:], rel=accuracy)
+    assert second.angles_rad[:5] == pytest.approx(first.angles_rad[1:], rel=accuracy)
+    # leg 2 is lighter and swings faster
+    assert second.durations_s[0] < 0.95 * first.durations_s[0]
+
+
+@pytest.mark.parametrize("first_leg", [1, 2])
+@pytest.mark.parametrize("name", ["prosthesis", "longer leg"])
+def test_legs_touch_at_the_angles_that_are_sampled_then(name, first_leg):
+    for model, accuracy in (("rigid", 1e-5), ("contact", 5e-4)):
+        subject, family = limping(name, model)
+        walks, z = step_map_of(subject, family, first_leg), gait_start(subject, family, first_leg)
+        walk = walks.take_disturbed_walk(z, family.start, np.zeros(5))
+        touches = np.cumsum(walk.durations_s) * (1.0 - 1e-6)
+        sampled = walks.sample_legs(z, family.start, np.zeros(5), touches)
+        # the legs land in turns, beginning with the one that swings first
+        assert walk.angles_rad == pytest.approx(sampled[[0, 1, 2, 3], [0, 1, 0, 1]], abs=accuracy)
 
 
 def test_noise_free_steps_give_the_parameters_to_many_digits():

@@ -259,7 +259,6 @@ def walk_from_section(
     stance: int = STANCE_FOOT,
 ) -> DisturbedWalk:
     """Walk from the section over heights (steps + 1,) in m, with a push (N s) at the hip at the first touchdown."""
-    first_stance = stance
     start = state_on_section(walker, z, stance)
     steps = heights.size - 1
     walk_state = walk_state_on_section(walker, ground_with_footholds(ground, heights), start, steps + 1, stance)
@@ -275,6 +274,13 @@ def walk_from_section(
             place_on_ground(walker, walk_state.has_ground, walk_state.knee), walker, stopped.state, push
         )
         stopped = replace(stopped, state=pushed)
+    landed = list[float]()
+    differ = have_different_soles(walker)
+    # the angles of legs with different soles do not follow from the footholds, so that the walk stops at each of them
+    for touches in range(2, steps + 1) if differ else ():
+        if stopped.outcome is Outcome.WALKED:
+            stopped = go_on(shorten(walk_state, touches), stopped.state)
+            landed.append(stopped.state[ANGLES + walker.legs[int(walk_state.progress.stance)][0]])
     if stopped.outcome is Outcome.WALKED:
         stopped = go_on(walk_state, stopped.state, steps)
     if stopped.outcome is Outcome.WALKED:
@@ -283,29 +289,31 @@ def walk_from_section(
         # Heights on the section are measured from the ground of the stance foot.
         z[0] -= walk_state.level[stance]
         stopped = go_on(walk_state, stopped.state)
+        landed.append(stopped.state[ANGLES + walker.legs[int(walk_state.progress.stance)][0]])
     touched = int(walk_state.progress.steps)
     times = walk_state.touch_time[:touched]
     along = walk_state.touch_along[:touched]
-    angles = touch_angles(walker, first_stance, np.diff(along), np.diff(walk_state.touch_height[:touched]))
+    rises = np.diff(walk_state.touch_height[:touched])
+    angles = touch_angles(walker, ground.frame.leg_length, np.diff(along), rises)
+    if differ:
+        angles = np.array(landed[: angles.size])
     return DisturbedWalk(stopped.outcome, np.diff(times), np.diff(along), angles, z)
 
 
-def leg_lengths(walker: ContactWalker) -> Floats:
-    """Return the lengths (2,) of the straight legs from hip to sole (m)."""
-    levers = walker.whole.foot_y
-    below_hip = [(levers[1 - k] - levers[k])[np.unique(walker.legs[k])].sum() for k in range(2)]
-    return np.asarray(walker.whole.radius + below_hip)
+def have_different_soles(walker: ContactWalker) -> bool:
+    """Whether the feet of the straight legs differ in radius or in the place of their centres relative to the hip."""
+    whole = walker.whole
+    first, second = (
+        [whole.radius[k], *((f[k] - f[1 - k])[np.unique(walker.legs[k])].sum() for f in (whole.foot_x, whole.foot_y))]
+        for k in range(2)
+    )
+    return not np.allclose(first, second, rtol=1e-12, atol=1e-12)
 
 
-def touch_angles(walker: ContactWalker, foot: int, along: Floats, up: Floats) -> Floats:
-    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above.
-
-    foot  the first to land, after which the feet take turns
-    """
-    apart = np.hypot(along, up)
-    lengths = leg_lengths(walker)[np.add.outer((foot, 1 - foot), np.arange(apart.size)) % 2]
-    ahead = 0.5 * (apart + (lengths[0] ** 2 - lengths[1] ** 2) / apart) / lengths[0]
-    return np.asarray(np.arcsin(np.clip(ahead, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
+def touch_angles(walker: ContactWalker, leg_length: float, along: Floats, up: Floats) -> Floats:
+    """Return the angles (steps,) from the vertical of straight legs that land `along` (m) ahead and `up` (m) above."""
+    apart = 0.5 * np.hypot(along, up) / leg_length
+    return np.asarray(np.arcsin(np.clip(apart, -1.0, 1.0)) + np.arctan2(up, along) - walker.slope)
 
 
 def sample_legs_from_section(
