@@ -1,4 +1,4 @@
-"""Stage `check`: compare every printed value of a gait with the right one, and explain differences."""
+"""Check of a printed gait: a comparison of every printed value with the right one, and explanations of differences."""
 
 from __future__ import annotations
 
@@ -19,9 +19,7 @@ from walkerlab.evidence.check.gaits import CheckedStep, Convention, Values, gait
 from walkerlab.evidence.check.plain_walker import EXACT, Floats, PlainStep, PlainWalker, plain_walker, why_not_plain
 from walkerlab.evidence.check.printed import EXACT_ERROR, UNEXPLAINED, Item, Verdict, items_of, judge, spell_name
 from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
-from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
-from walkerlab.pipeline.store.content import Content
 from walkerlab.scene.rigid import rigid_walker, state_names
 
 SAME_ROUTE: Final = 1e-10  # largest difference between the two routes, with L and g of 1
@@ -192,12 +190,6 @@ def values_of(summary: Mapping[str, Any]) -> dict[str, Any]:
     for name, same in WALK_VALUES.items():
         values[name] = [values[same]] * 1000 if name.startswith("step_") else values[same]
     return values
-
-
-def run(config: CheckConfig, _inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Check the printed gait of a config, and search for an explanation of values that differ."""
-    progress.start("check")
-    return Content({}, check_gait(config))
 
 
 def check_gait(config: CheckConfig) -> dict[str, Any]:

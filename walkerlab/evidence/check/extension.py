@@ -8,7 +8,7 @@ from walkerlab.pipeline.plan.stage import Stage
 
 STAGES = (
     Stage(
-        "check", "walkerlab.evidence.check.answer",
+        "check", "walkerlab.evidence.check.stage",
         "Check a printed gait: is it right, and if not, why?", reads.CheckConfig, requires=("check",),
         needed_by=("report",), adds_command="walkerlab.evidence.check.command:OFFER",
     ),

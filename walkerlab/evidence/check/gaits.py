@@ -123,6 +123,12 @@ class Convention:
             state[SHANK], state[n + SHANK] = state[SWING], state[n + SWING]
         return state
 
+    def stands(self, walker: PlainWalker, items: Sequence[Item]) -> bool:
+        """Whether a printed state has both feet on the slope, within its digits. False in mid-stance."""
+        state = self.read(walker, [item.value for item in items], np.zeros(6 if walker.kneed else 4))
+        near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if self.unit == "deg" else 1.0)
+        return self.instant != "mid-stance" and abs(walker.feet_apart(state)) <= near
+
     def rate_factor(self, walker: PlainWalker) -> float:
         """Return the factor on rates, and on the inverse of times, due to the unit of time."""
         if self.time == SCALED:
@@ -157,16 +163,10 @@ def stated(check: Check, count: int, bodies: int, name: str = "state") -> Conven
 
 def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequence[Item]) -> Convention:
     """Return a printed state's convention, with the sign of its relative angle such that both feet are on the slope."""
-    if convention.second != "relative" or len(convention.order) < 2 or convention.instant == "mid-stance":
+    if convention.second != "relative" or len(convention.order) < 2 or convention.stands(walker, items):
         return convention
-
-    def miss(reading: Convention) -> float:
-        known = np.zeros(6 if walker.kneed else 4)
-        return abs(walker.feet_apart(reading.read(walker, [item.value for item in items], known)))
-
     opposite = replace(convention, second="stance-minus-swing")
-    near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if convention.unit == "deg" else 1.0)
-    return opposite if miss(opposite) <= near < miss(convention) else convention
+    return opposite if opposite.stands(walker, items) else convention
 
 
 def alternatives(convention: Convention) -> list[Convention]:
