@@ -38,23 +38,27 @@ at most the first four are right:
 
 {story}
 
-The cause is one term. In the heel strike of the script, the balance of the trailing leg about the hip subtracts a
-term that should not be there: the leg's moment of inertia about its centre of mass, I, times the rate at which the
-angle between the legs changes. With this mistake all digits follow. A later script of the same hand has the right
-strike ([passivewalker-sim](published-right.md#passivewalker-sim)). Type this to see it for yourself. For another gait
-of the table below, put its name in the place of `passivewalker-2009`:
+The cause is one term. In its heel strike, the script computes the angular momentum of the trailing leg about the hip,
+and adds a term that should not be there:
+
+```
+-I * (rate of the trailing leg - rate of the leading leg)
+```
+
+Here I is the leg's moment of inertia about its centre of mass. With this mistake all digits follow. A later script by
+the same author has the right heel strike ([passivewalker-sim](published-right.md#passivewalker-sim)). To see it for
+yourself, type this, or `published/NAME.yaml` with another name from the tables:
 
 ```
 walkerlab check published/passivewalker-2009.yaml
 ```
 
-Two more stories: a much-quoted state of a walker with knees is not periodic, and the cause is unknown
-([hsu-chen-2007](#hsu-chen-2007)). And the paper that this project reproduces has a wrong sign in its equations,
-which its own fixed point shows ([adams-compass](#adams-compass)).
+There are two more stories. A much-quoted state of a walker with knees is not periodic, and we do not know why
+([hsu-chen-2007](#hsu-chen-2007)). And the paper that this project reproduces has a wrong sign in its equations, as its
+own printed state shows ([adams-compass](#adams-compass)).
 
-Next come the gaits that differ, one by one. Those that are right have [a page of their own](published-right.md),
-and [known mistakes](known-mistakes.md) shows how each mistake changes a gait. To check yours, see [whose third
-digit is right](check.md).
+Below are the gaits that differ, one by one. Those that are right have [a page of their own](published-right.md), and
+[known mistakes](known-mistakes.md) shows how each mistake changes a gait. To check yours, see [check a gait](check.md).
 
 ## Gaits that differ
 
@@ -63,24 +67,27 @@ digit is right](check.md).
 *Right* means that two independent models agree on a value: the compiled one that all of walkerlab uses, and a plain
 one that shares no equations with it. For all {all} gaits they agree: after a step of the plain model from the gait of
 the compiled one, the state and the period differ by {routes} at most (angles in rad, rates and the period scaled with
-sqrt(L/g)). For each value there is a verdict:
+sqrt(L/g)). Each printed value gets a verdict:
 
-- *Reproduced*: the right value, rounded or cut off, has all printed digits. A value also counts as reproduced if at
-  least three of its digits agree, and at least half of them. The table then shows how many do, and how far off the
-  printed value is, in units of its last digit. All other values are *different*.
-- If values differ, the program looks for one cause that gives all of them: a convention, a mistake that is known
-  from programs, or a misprint. The gait is *explained* if there is one, and *partly explained* if a cause gives
-  some of the values to their last digit.
+- *Reproduced*: it agrees with the right one in all printed digits, after rounding or cutting off.
+- *Reproduced to n digits*: it agrees in n digits, at least three and at least half of those printed. The table says how
+  far off it is, in units of its last digit.
+- *Different*: anything else.
 
-The signs and angles of each source are kept, and the right values are written in its convention. *One exact step* is a
-step of the right equations from the printed state, without a noticeable numerical error. If the state is periodic,
-the step leads back to it.
+If values differ, the program looks for one cause: another convention, a mistake known from programs, or a misprint.
+
+- *Explained*: the cause gives all printed values, to the last digit.
+- *Partly explained*: it gives some of them.
+
+The signs and angles of each source are kept, and the right values are converted to them. *One exact step* is a step of
+the right equations from the printed state, without a noticeable numerical error. If the state is periodic, the step
+leads back to it.
 """
 TAIL = """## The longest case
 
-The study that this project reproduces prints 38 values; [the study](study.md) judges each with its evidence. Its
-words *reproduced* and *explained* mean what they mean here. *Contradicted* is a different value that other values
-of the paper refute, and *not reproduced* is a value that is different and unexplained, or that cannot be compared.
+The study that this project reproduces prints 38 values, and [the study](study.md) judges each of them. *Reproduced* and
+*explained* have the same meaning there. Two more verdicts are *contradicted*, for a value that other values of the
+paper refute, and *not reproduced*, for a value that differs without an explanation or cannot be compared.
 """
 RIGHT = """# Published gaits that are right
 
@@ -97,7 +104,7 @@ that differ, and says what *reproduced* means.
 MISTAKES = """# Known mistakes in programs for walkers
 
 Your gait is close to the right one, but not equal to it. Each row below is a mistake that `walkerlab check` tries on
-your values ([whose third digit is right](check.md)), and how much it changes a gait.
+your values ([check a gait](check.md)), and how much it changes a gait.
 
 {made}
 
@@ -140,7 +147,7 @@ class Entry:
 
 
 def entry_of(file: Path) -> Entry:
-    """Check a printed gait, and return what the pages say of it."""
+    """Check a printed gait, and return its entry on the pages."""
     summary = check_gait(load(file).config)
     source = summary["source"]
     rows = summary["values"]
@@ -182,7 +189,7 @@ def table_of(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def finding_of(summary: Mapping) -> str:
-    """Return what was found; partly explained if a cause gives some of the values that differ."""
+    """Return the finding. It is 'partly explained' if a cause gives some of the values that differ."""
     unexplained = summary["finding"] not in ("explained", "reproduced")
     return "partly explained" if unexplained and summary["explanations"] else summary["finding"]
 

@@ -106,11 +106,11 @@ def leaves(
     """
     for name, field in block.model_fields.items():
         inner = block_of(field)
-        own = getattr(held, name, None)
+        instance = getattr(held, name, None)
         if inner is None:
             yield (*prefix, name), field
         else:
-            yield from leaves(type(own) if isinstance(own, Block) else inner, (*prefix, name), own)
+            yield from leaves(type(instance) if isinstance(instance, Block) else inner, (*prefix, name), instance)
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:

@@ -28,8 +28,8 @@ def statements(model: AdamsModel) -> Iterator[str]:
         for marker_name, marker in model.markers.items():
             if marker.part == name:
                 place = "FLOATING" if marker.floating else f"QP = {values(*marker.place)}"
-                own = marker_name.rpartition(".")[2]
-                yield from named_statement(own, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
+                short_name = marker_name.rpartition(".")[2]
+                yield from named_statement(short_name, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
     for name, joint in model.joints.items():
         head = f"{'JPRIM' if joint.kind == 'INLINE' else 'JOINT'}/{ids[name]}"
         yield from named_statement(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig
-from walkerlab.errors import ConfigError
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
@@ -20,7 +19,6 @@ from walkerlab.physics.mechanics.assembly import Anchor, levers, masses, total_m
 from walkerlab.physics.mechanics.parts import Assembly, Knee
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
-from walkerlab.scene.parts import assembly_of
 
 # ratio of tangential to normal force of a standing foot; about the mean over a walk
 CREEP_LOAD = 0.1
@@ -132,7 +130,7 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
 
 @dataclass(frozen=True)
 class EngineContact:
-    """Properties that the native contact model of an engine is tuned to reproduce, SI."""
+    """Properties, in SI units, that the native contact model of an engine is tuned to reproduce."""
 
     mass: float  # mass that rests on one foot (kg)
     gravity: float  # gravity towards the ground (m/s^2)
@@ -165,13 +163,3 @@ def contact_target(scene: EngineScene) -> EngineContact | None:
     creep = creep_velocity(friction, CREEP_LOAD)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     return EngineContact(mass, g, foot.depth, walker.normal.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
-
-
-def refuse_one_knee(config: ContactConfig) -> None:
-    """Raise ConfigError if only one leg has a knee: exports and engines need two legs of one kind."""
-    if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
-        raise ConfigError(
-            "exports and engines need two legs of one kind, both with a knee or both without.",
-            "The models of walkerlab walk with one knee: `walkerlab contact-sim`.",
-            ("walker",),
-        )

@@ -103,7 +103,7 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
-    """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg."""
+    """Return the value at a path of keys. A key that is left out for the second leg has the value of the first leg."""
     value = value_at(config, path)
     return value_at(config, first_leg_path(path)) if value is None else value
 
@@ -133,18 +133,18 @@ def dotted(key: Key) -> str:
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """Return the parameter for a config key.
+    """Return the parameter that a config key names.
 
     Raises ConfigError if the key is not a number that a model uses.
     """
     # `asker` is the config key that names this parameter, if any
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
-    own = {".".join(path): field for path, field in leaves(Config, held=config)}
-    reason = why_no_parameter(key, config, own, stated_value)
+    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
+    reason = explain_non_parameter(key, config, fields, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
-    unit = annotation_of(own[key], "unit") or "1"
+    unit = annotation_of(fields[key], "unit") or "1"
     return Parameter(key, config.contact.unit_of(unit) if config.contact else unit, tuple(key.split(".")))
 
 
@@ -153,12 +153,12 @@ _KEY_ADVICE = "Name a parameter of the walker, its slope or its ground; `walkerl
 
 def parameter_keys(config: ContactConfig) -> Iterator[str]:
     """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
-    own = {".".join(path): field for path, field in leaves(Config, held=config)}
+    fields = {".".join(path): field for path, field in leaves(Config, held=config)}
     written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
-    yield from (written.get(key, key) for key in own if not why_no_parameter(key, config, own))
+    yield from (written.get(key, key) for key in fields if not explain_non_parameter(key, config, fields))
 
 
-def why_no_parameter(
+def explain_non_parameter(
     key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""

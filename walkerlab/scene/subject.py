@@ -50,7 +50,9 @@ class ModelUnderTest:
         return GaitOnMap(step_map, p, self.z, walk_steps(step_map, self.z, p, step_map.stride).DP, self.units)
 
     def quick_by_leg(self) -> list[GaitOnMap]:
-        """Return the gait from the start of each leg's step (once for equal legs), on a map of quick walks."""
+        """Return the gait on a map of quick walks, once for each leg that may begin to swing, or only once for equal
+        legs.
+        """
         quick = QUICK_WALKS[self.model]
         return [
             gait._replace(step_map=gait.step_map.replace_tolerances(quick))
@@ -85,7 +87,7 @@ def find_model_gait(
     """Find the gait of a model, on ground without pads for the contact model.
 
     gait  summary of `fixedpoint`
-    note  receives a message about each difference from the config's scene
+    note  receives a message about each difference from the scene of the config
 
     Raises NoAnswer if it has no gait.
     """

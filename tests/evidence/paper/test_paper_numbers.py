@@ -230,7 +230,7 @@ def test_rounding_is_allowed_for_before_a_value_counts_as_contradicted(rows):
     )
 
 
-def test_uncontradicted_adams_values_are_at_most_not_reproduced(rows):
+def test_adams_values_without_a_contradiction_are_not_reproduced(rows):
     adams = [row.adams for row in (*TABLE_2, *TABLE_3)]
     found = rows()
     verdicts = {entry: found[entry].verdict for entry in (*adams, LOST_BALANCE)}

@@ -363,7 +363,7 @@ def at_the_start(question: Question) -> Iterator[Explanation]:
     minus_one = [item for item in question.items if item.quantity == "multipliers" and item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
     if minus_one and len(question.reproduced(question.right, others)) == len(others):
-        what = "the integration starts on the strike's surface and meets it at once, which adds a multiplier of -1"
+        what = "the integration starts at a heel strike, which is found again at once and adds a multiplier of -1"
         yield question.explanation("mistake", what)
 
 

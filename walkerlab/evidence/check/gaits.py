@@ -81,7 +81,7 @@ class Convention:
     time: str = ""  # unit of time, or the gravity that was used; empty for the config's
 
     def rows(self, bodies: int) -> Floats:
-        """Return the matrix (printed angles, bodies) from absolute angles to printed ones, without their origin."""
+        """Return the matrix (printed angles, bodies) from absolute angles to printed ones of the same origin."""
         K = np.eye(bodies)[[BODIES[body] for body in self.order]]
         second = (1.0, -1.0) if self.second == "relative" else (-1.0, 1.0)
         for row, body in enumerate(self.order):

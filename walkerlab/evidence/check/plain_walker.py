@@ -469,34 +469,35 @@ def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
         yield mistake(what, signs={**right.signs, **{term: -right.signs.get(term, 1.0) for term in signs}})
     if right.leg_inertia:
         rates = {
-            "trailing leg's rate": (1.0, 0.0),
-            "leading leg's rate": (0.0, 1.0),
-            "rate between the legs": (1.0, -1.0),
+            "the trailing leg's rate": (1.0, 0.0),
+            "the leading leg's rate": (0.0, 1.0),
+            "(trailing leg's rate − leading leg's rate)": (1.0, -1.0),
         }
-        for (rate, weights), (verb, sign) in product(rates.items(), (("subtracts", 1.0), ("adds", -1.0))):
-            what = (
-                f"the strike, in the balance of the trailing leg about the hip, also {verb} the leg's inertia I times"
-            )
-            yield mistake(f"{what} the {rate}", extra_inertia=tuple(sign * weight for weight in weights))
+        momentum = "the trailing leg's angular momentum about the hip before the heel strike"
+        for (rate, weights), (mark, sign) in product(rates.items(), (("−", 1.0), ("+", -1.0))):
+            what = f"{momentum} has an extra term {mark}I × {rate}, where I is the leg's inertia"
+            yield mistake(what, extra_inertia=tuple(sign * weight for weight in weights))
         massless = tuple(part._replace(inertia=0.0) for part in right.parts)
         yield mistake("the legs' inertia is left out", parts=massless)
-        yield mistake("the legs' inertia is left out of the strike", strike_inertia=0.0)
-    yield mistake("the trailing leg keeps its rate through the strike", keeps_trailing_rate=True)
+        yield mistake("the legs' inertia is left out of the heel strike", strike_inertia=0.0)
+    yield mistake("the trailing leg keeps its rate through the heel strike", keeps_trailing_rate=True)
     if right.radius:
         for point, name in ((right.foot, "the arc's centre"), (right.foot - 1j * right.radius, "the sole's middle")):
-            what = f"the strike leaves out the foot's rolling: the leading leg turns about {name}"
+            what = f"the heel strike leaves out the foot's rolling: the leading leg turns about {name}"
             yield mistake(what, strike_foot=point)
             yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_on_it=True)
     if right.hip_mass:
         yield mistake("the hip's mass counts once for each leg", hip_mass=2.0 * right.hip_mass)
-    early = "a touch counts already when the sum of the legs' angles is within {} rad of a touch"
+    early = "the heel strike is accepted as soon as the sum of the legs' angles is within {} rad of it"
     angle = ("window", 1e-3, (1e-5, 0.3))
     yield mistake_of_size(early, *angle)
     yield mistake_of_size(f"{early}, and both feet are then put on the slope", *angle, evens_angles=True)
     step = "the equations are integrated by Euler's method with a step of {} s"
     time = ("euler_step", 4e-3 * right.pendulum_time, (2e-5, 0.2))
     yield mistake_of_size(step, *time)
-    yield mistake_of_size(f"{step} that ends a step after the strike", *time, interpolates=False)
+    yield mistake_of_size(
+        f"{step}, and the swing ends at the first time step after the heel strike", *time, interpolates=False
+    )
 
 
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:

@@ -23,7 +23,7 @@ COLUMNS = (
     Column("value", lambda row: add_unit(spell_name(row["name"]), unit_by_name(row["name"]))),
     Column("printed", "printed", numeric=True),
     Column("right", "right_text", numeric=True),
-    Column("digits that agree", lambda row: digits_of(row) if row["right_text"] else ""),
+    Column("digits that agree", lambda row: agreeing_digits(row) if row["right_text"] else ""),
     Column("verdict", lambda row: Cell(verdict_of(row), TONES[row["verdict"]])),
 )
 
@@ -33,7 +33,9 @@ def is_short(row: Row) -> bool:
     return bool(row["verdict"] == Verdict.REPRODUCED and row["digits"] < row["of_digits"])
 
 
-def digits_of(row: Row) -> str:
+def agreeing_digits(row: Row) -> str:
+    if row["printed"].startswith(("<", ">")):
+        return ""
     agreeing = f"{row['digits']} of {row['of_digits']}"
     return f"{agreeing}, off by {format_units(row['difference_in_units'])} units" if is_short(row) else agreeing
 
@@ -122,8 +124,8 @@ def remarks(summary: Row) -> Iterator[str]:
         yield summary["undecided"]
     if near := summary["closest"]:
         yield (
-            f"Closest comes a {near['kind']}: if {near['what']}, the largest difference falls from "
-            f"{number(near['without_in_units'], 2)} to {number(near['miss_in_units'], 2)} units of a last digit."
+            f"The nearest candidate is a {near['kind']}: if {near['what']}, the largest difference falls from "
+            f"{number(near['without_in_units'], 2)} to {number(near['miss_in_units'], 2)} units of the last digit."
         )
     yield from state_remarks(summary)
     if gait := summary["nearest_gait"]:
@@ -160,8 +162,10 @@ def state_remarks(summary: Row) -> Iterator[str]:
             yield f"It would be periodic with {' or '.join(changes)}."
     broken = [each for each in summary["momenta"] if not each["conserved"]]
     if broken:
-        listed = join_words([f"{each['about']} ({number(each['residual'], 3)} {each['unit']})" for each in broken])
+        changes = [f"{each['about']} by {number(each['residual'], 3)} {each['unit']}" for each in broken]
         kept = [each["about"] for each in summary["momenta"] if each["conserved"]]
-        fine = f"; that of {join_words(kept)} is conserved" if kept else ""
-        before = broken[0]["before"]
-        yield f"Over the heel strike before it ({before}), angular momentum changes: {listed}{fine}."
+        fine = f" That of {join_words(kept)} is conserved." if kept else ""
+        yield (
+            f"The heel strike before this state ({broken[0]['before']}) changes the angular momentum of "
+            f"{join_words(changes)}.{fine}"
+        )

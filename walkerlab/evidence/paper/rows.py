@@ -46,16 +46,16 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
     contact = measured.contact
     walker = measured.walker
     for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
-        yield judge.input(entry, float(getattr(walker, parameter)), "rigid")
+        yield judge.judge_input(entry, float(getattr(walker, parameter)), "rigid")
     for coordinate, entry in enumerate(printed.X_P):
         yield judge.fixed_point(entry, coordinate)
     yield judge.eigenvalue()
-    yield judge.input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
-    yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
+    yield judge.judge_input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
+    yield judge.judge_input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
     for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
-        yield judge.input(entry, value, "contact", prose("evidence.unitless", contact))
-    yield judge.input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
-    yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
+        yield judge.judge_input(entry, value, "contact", prose("evidence.unitless", contact))
+    yield judge.judge_input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
+    yield judge.judge_input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
     yield judge.lost_balance()
     for coordinate, row in enumerate(printed.TABLE_2):
         yield judge.adams_start(row.adams, coordinate)
@@ -113,7 +113,7 @@ class Judge:
         pairs = zip(start, gait.state, strict=True)
         return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
 
-    def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> Judged:
+    def judge_input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> Judged:
         """Judge a parameter of both models, or of the contact model alone."""
         rigid: dict[str, float] = dict.fromkeys(EQUATION_SETS, value) if scene == "rigid" else {}
         verdict = Verdict.INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else Verdict.EXPLAINED

@@ -136,7 +136,7 @@ def paper_section(results: Results) -> Section | None:
 
 
 def list_verdicts(results: Results, rows: Sequence[Row]) -> Iterator[PageBlock]:
-    """Yield the paper's values by verdict and location, and its gravest errors."""
+    """Yield the paper's values by verdict and location, and its most serious errors."""
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
     yield Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)

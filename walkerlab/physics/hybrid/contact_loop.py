@@ -9,7 +9,7 @@ from walkerlab.physics.hybrid import endings
 from walkerlab.physics.hybrid.contact_crossings import earliest_crossing, sample_event_functions
 from walkerlab.physics.hybrid.contact_events import NO_EVENT, PASSING, PULSE_END, is_switching
 from walkerlab.physics.hybrid.contact_record import ContactObserver, note_work, observe
-from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, is_above, is_to_lift
+from walkerlab.physics.hybrid.contact_state import AT_PULSE_END, WalkState, has_not_lifted, is_above
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
 from walkerlab.physics.kernels import kernel, kernel_part
 from walkerlab.physics.mechanics.hinges import HIP_ROW, is_sprung
@@ -117,7 +117,7 @@ def walk_in_form(
 
 @kernel_part
 def steps_are_left(walk_state: WalkState, until: int) -> bool:
-    return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state))
+    return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and has_not_lifted(walk_state))
 
 
 @kernel_part
