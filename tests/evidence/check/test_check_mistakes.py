@@ -87,6 +87,17 @@ def test_conventions_that_differ_in_several_ways_are_found(walker, changes):
     assert {each["kind"] for each in answer["explanations"]} == {"convention"}
 
 
+def test_a_mistake_is_named_in_the_convention_that_puts_both_feet_on_the_slope():
+    """The state is printed from the slope's normal and with the legs exchanged, and the config states neither."""
+    words = "the legs' inertia is left out"
+    legs, ((swing, stance, dswing, dstance), period) = first_gait_with(MISTAKES[words], walkers(7))
+    texts = {"state": [f"{value:.7f}" for value in (stance, swing, dstance, dswing)], "period_s": f"{period:.7f}"}
+    answer = check_gait(checked_config(config_of(legs), {"angles": {}, "printed": texts}))
+    (cause,) = [each["what"] for each in answer["explanations"]]
+    conventions = "angles are measured from the slope’s normal and the order is stance, swing"
+    assert cause == f"{conventions}, and {words}"
+
+
 def test_damaged_files_are_refused_or_answered(tmp_path):
     generator = random.Random(5)
     for number in range(8):

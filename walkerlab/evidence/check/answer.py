@@ -15,7 +15,7 @@ from walkerlab.config.problems import suggestion
 from walkerlab.config.reads import CheckConfig
 from walkerlab.errors import ConfigError
 from walkerlab.evidence.check.explanations import Explanation, Question, advise, explain, find_periodic_changes
-from walkerlab.evidence.check.gaits import CheckedStep, Convention, gait_near, put_feet_on_slope, stated
+from walkerlab.evidence.check.gaits import CheckedStep, Convention, Values, gait_near, put_feet_on_slope, stated
 from walkerlab.evidence.check.plain_walker import EXACT, Floats, PlainStep, PlainWalker, plain_walker, why_not_plain
 from walkerlab.evidence.check.printed import EXACT_ERROR, UNEXPLAINED, Item, Verdict, items_of, judge, spell_name
 from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
@@ -39,8 +39,8 @@ WALK_VALUES: Final = {
 """Values of `simulate` that may be printed, with the equal values of `fixedpoint`."""
 
 
-def refuse_unknown(config: CheckConfig, check: Check) -> None:
-    """Raise ConfigError if a config's block `check` names values that no gait has, or states that do not fit."""
+def refuse_unknown(check: Check) -> None:
+    """Raise ConfigError if a config's block `check` names values that no gait has, or a state is no list."""
     known = (*GAIT_VALUES, *WALK_VALUES)
     for name in check.printed:
         if name not in known:
@@ -50,8 +50,6 @@ def refuse_unknown(config: CheckConfig, check: Check) -> None:
     for name, texts in states_of(check).items():
         if isinstance(texts, str):
             raise ConfigError(f"check.printed: {name} is one value.", "Give a list of angles and rates.")
-        if not why_not_plain(config):
-            stated(check, len(texts), 3 if config.walker.type == "kneed" else 2, name)
 
 
 def states_of(check: Check) -> dict[str, Any]:
@@ -66,7 +64,10 @@ class Checked:
 
     config: CheckConfig
     check: Check
-    search: GaitSearch
+
+    @cached_property
+    def search(self) -> GaitSearch:
+        return find_gaits(rigid_walker(self.config), self.config.seed)
 
     @cached_property
     def walker(self) -> PlainWalker:
@@ -130,10 +131,8 @@ class Checked:
         return found
 
     @cached_property
-    def right(self) -> CheckedStep | None:
-        """The right gait nearest to the printed one, or None if no gait was found."""
-        if not self.gaits:
-            return None
+    def right(self) -> CheckedStep:
+        """The right gait nearest to the printed one."""
         nearest = min(self.gaits, key=self.distance)
         printed = self.printed_state("state", self.walker.full_state(nearest.start))
         start = None if printed is None else self.walker.start_from(printed[0], self.convention.instant)
@@ -143,7 +142,7 @@ class Checked:
         moved = np.abs(other.start - nearest.start).max() > SAME_GAIT
         return other if moved and self.distance(other) < self.distance(nearest) else nearest
 
-    def values(self, gait: CheckedStep) -> dict[str, complex | None]:
+    def values(self, gait: CheckedStep) -> Values:
         """Return a gait's values of all printed numbers, in the printed convention."""
         return gait.values(self.items, self.convention, self.gaits.get(gait, {}))
 
@@ -157,10 +156,8 @@ class Checked:
         )
 
     @cached_property
-    def question(self) -> Question | None:
-        """Printed values to explain, or None without a right gait."""
-        if self.right is None:
-            return None
+    def question(self) -> Question:
+        """Printed values to explain."""
         values = self.right.values(self.items, self.convention)
         items = [item for item in self.items if values[item.name] is not None]
         printed = self.printed_state("state", self.walker.full_state(self.right.start))
@@ -168,11 +165,9 @@ class Checked:
 
     @cached_property
     def printed_step(self) -> PrintedStep | None:
-        """A step from the printed state, or None if no state of both legs is printed or there is no right gait."""
-        if self.right is None or not {"swing", "stance"}.issubset(self.convention.order):
-            return None
+        """A step from the printed state, or None if no state of both legs is printed."""
         printed = self.printed_state("state", self.walker.full_state(self.right.start))
-        if printed is None:
+        if printed is None or not {"swing", "stance"}.issubset(self.convention.order):
             return None
         start = self.walker.start_from(printed[0], self.convention.instant)
         step = None if start is None else self.walker.step(start)
@@ -205,16 +200,17 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
     check = config.check
     if check is None:
         raise ConfigError("the config has no check block.", "`walkerlab init FILE --check` writes one to fill in.")
-    refuse_unknown(config, check)
+    refuse_unknown(check)
     if reason := why_not_plain(config):
         return answer_without(check, f"{reason}, so no second route confirms the right values")
-    checked = Checked(config, check, find_gaits(rigid_walker(config), config.seed))
+    checked = Checked(config, check)
+    items = checked.items  # raises ConfigError if states do not fit the walker
+    if not checked.gaits:
+        return answer_without(check, f"the walker has no gait here ({checked.search.reason})")
     right = checked.right
     question = checked.question
-    if right is None or question is None:
-        return answer_without(check, f"the walker has no gait here ({checked.search.reason})")
     values = checked.values(right)
-    rows = [judge(item, values[item.name], f"this gait has no {spell_name(item.name)}").row for item in checked.items]
+    rows = [judge(item, values[item.name], f"this gait has no {spell_name(item.name)}").row for item in items]
     searched = any(row["digits"] < row["of_digits"] and row["right"] is not None for row in rows)
     explanations, closest = explain(question) if searched else ([], None)
     periodic = periodicity(checked, right)
@@ -241,7 +237,12 @@ def answer_without(check: Check, reason: str) -> dict[str, Any]:
     """Return the answer if there is no right gait to compare with."""
     items = items_of({**check.printed, "state_before": check.state_before}, {})
     rows = [judge(item, None, reason).row for item in items]
-    head = {"source": check.source.model_dump(), "finding": Verdict.NOT_COMPARABLE, "reason": reason, "values": rows}
+    head = {
+        "source": check.source.model_dump(),
+        "finding": Verdict.NOT_COMPARABLE.value,
+        "reason": reason,
+        "values": rows,
+    }
     lists: dict[str, Any] = {"momenta": [], "explanations": [], "undecided": "", "searched": False}
     return {**head, **lists, **dict.fromkeys(("periodic", "closest", "nearest_gait", "routes"))}
 
@@ -251,10 +252,10 @@ def finding_of(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explana
     verdicts = {row["verdict"] for row in rows}
     wrong = {row["name"] for row in rows if row["verdict"] == Verdict.DIFFERENT}
     if explanations and wrong.issubset(explanations[0].reproduces):
-        return Verdict.EXPLAINED
+        return Verdict.EXPLAINED.value
     if Verdict.DIFFERENT in verdicts:
         return UNEXPLAINED
-    return Verdict.REPRODUCED if Verdict.REPRODUCED in verdicts else Verdict.NOT_COMPARABLE
+    return (Verdict.REPRODUCED if Verdict.REPRODUCED in verdicts else Verdict.NOT_COMPARABLE).value
 
 
 def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:

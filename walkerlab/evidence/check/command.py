@@ -39,22 +39,20 @@ def check(
     if state is not None:
         numbers = ", ".join(f"'{number}'" for number in SEPARATORS.split(state) if number)
         settings = (*settings, f"check.printed.state=[{numbers}]")
-    single = len(paths) == 1 and bool(paths[0].suffix or request.config)
-    answers = []
-    errors = []
+    answers: list[dict[str, Any]] = []
     for path in configs_in(paths):
         try:
             answers.append(answer_to(path, settings, request))
         except ConfigError as error:
             answers.append({"file": str(path), "error": error.as_json()})
-            errors.append(error)
             print_error(error)
             continue
         if not request.as_json:
             print_answer(answers[-1], first=len(answers) == 1)
     if request.as_json:
+        single = len(paths) == 1 and bool(paths[0].suffix or request.config)
         print_json(answers[0] if single else {"checks": answers})
-    if errors:
+    if any("error" in answer for answer in answers):
         raise typer.Exit(ConfigError.exit_code)
 
 

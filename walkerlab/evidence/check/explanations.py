@@ -43,8 +43,8 @@ ROUND_SIZES: Final = (1.0, 2.0, 5.0, 2.5)
 SIZE_SHARE = 0.03  # relative error of a fitted size within which a round one is tried
 FEW = 3  # numbers that can be explained while others are not
 MUCH_CLOSER = 5.0  # how much closer a cause must come to be worth telling
-READINGS = 2  # other conventions in which a mistake is searched
-NEARLY = 2.0  # ratio of two distances between which the number of changes decides
+READINGS = 3  # other conventions in which a mistake is searched
+NEARLY = 4.0  # ratio of two distances between which the number of changes decides
 CONVERGED: Final = 1e-6  # relative change of a fitted value
 SLOPE = "slope_rad"
 GRAVITY = "gravity_m_s2"
@@ -248,20 +248,30 @@ def explained(question: Question, attempts: Iterator[Attempt] | Sequence[Attempt
 
 
 def closer_readings(question: Question) -> Iterator[tuple[str, Question]]:
-    """Yield conventions in which the right gait comes much closer to the printed values, with the question in them."""
+    """Yield conventions that fit the printed values better than the stated one, with the question in them.
+
+    If a convention puts both feet on the slope, it suffices that the right gait comes closer to the printed values than
+    in the stated one, which does not. All others must bring it much closer.
+    """
     if question.state is None:
         return
-    far = question.miss(question.right, question.exact_items) / MUCH_CLOSER
-    readings: dict[float, Convention] = {}
+    walker = question.walker
+    items = [item for item in question.items if item.quantity == "state"]
+    far = question.miss(question.right, question.exact_items)
+    readings: dict[Any, tuple[float, Convention]] = {}
     for other in alternatives(question.convention):
-        # of conventions that differ in nothing that is printed, the first has the fewest changes
-        readings.setdefault(question.miss(question.right, question.exact_items, other), other)
-    near = NEARLY * min(readings)
-    closest = [other for miss, other in readings.items() if miss <= near and miss < far]
-    numbers = [item.value for item in question.items if item.quantity == "state"]
-    known = question.walker.full_state(question.right.start)
-    for other in closest[:READINGS]:
-        state = other.read(question.walker, numbers, known)
+        # of conventions in which the right gait has the same values, the first has the fewest changes
+        values = question.right.values(question.exact_items, other)
+        miss = max(item.miss(values[item.name]) for item in question.exact_items)
+        if miss < far:
+            readings.setdefault(tuple(values.values()), (miss, other))
+    standing = [(miss, other) for miss, other in readings.values() if other.stands(walker, items)]
+    gain = 1.0 if standing and not question.convention.stands(walker, items) else MUCH_CLOSER
+    closer = [(miss, other) for miss, other in standing or readings.values() if miss * gain < far]
+    near = NEARLY * min((miss for miss, _ in closer), default=0.0)
+    closer.sort(key=lambda each: (len(each[1].differences(question.convention)), each[0]))
+    for other in [other for miss, other in closer if miss <= near][:READINGS]:
+        state = other.read(walker, [item.value for item in items], walker.full_state(question.right.start))
         yield join_words(other.differences(question.convention)), replace(question, convention=other, state=state)
 
 

@@ -10,7 +10,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import permutations, product, starmap
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -53,7 +52,8 @@ CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
 }  # fmt: skip
 """Conventions: for each, a sentence about it, and the words for its values."""
 BEFORE: Instant = "before-strike"
-NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
+Values = dict[str, complex | None]
+"""Values of printed numbers by name, or None if a gait has none."""
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Power of rates in which a quantity scales with the unit of time."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
@@ -123,6 +123,12 @@ class Convention:
             state[SHANK], state[n + SHANK] = state[SWING], state[n + SWING]
         return state
 
+    def stands(self, walker: PlainWalker, items: Sequence[Item]) -> bool:
+        """Whether a printed state has both feet on the slope, within its digits. False in mid-stance."""
+        state = self.read(walker, [item.value for item in items], np.zeros(6 if walker.kneed else 4))
+        near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if self.unit == "deg" else 1.0)
+        return self.instant != "mid-stance" and abs(walker.feet_apart(state)) <= near
+
     def rate_factor(self, walker: PlainWalker) -> float:
         """Return the factor on rates, and on the inverse of times, due to the unit of time."""
         if self.time == SCALED:
@@ -157,16 +163,10 @@ def stated(check: Check, count: int, bodies: int, name: str = "state") -> Conven
 
 def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequence[Item]) -> Convention:
     """Return a printed state's convention, with the sign of its relative angle such that both feet are on the slope."""
-    if convention.second != "relative" or len(convention.order) < 2 or convention.instant == "mid-stance":
+    if convention.second != "relative" or len(convention.order) < 2 or convention.stands(walker, items):
         return convention
-
-    def miss(reading: Convention) -> float:
-        known = np.zeros(6 if walker.kneed else 4)
-        return abs(walker.feet_apart(reading.read(walker, [item.value for item in items], known)))
-
     opposite = replace(convention, second="stance-minus-swing")
-    near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if convention.unit == "deg" else 1.0)
-    return opposite if miss(opposite) <= near < miss(convention) else convention
+    return opposite if opposite.stands(walker, items) else convention
 
 
 def alternatives(convention: Convention) -> list[Convention]:
@@ -179,28 +179,6 @@ def alternatives(convention: Convention) -> list[Convention]:
         possible |= {"order": single, "second": [convention.second], "layout": [convention.layout]}
     found = starmap(Convention, product(*possible.values()))
     return sorted(found, key=lambda other: len(other.differences(convention)))[1:]
-
-
-def state_at(walker: PlainWalker, start: Floats, step: PlainStep, instant: Instant, vertical: bool) -> Floats | None:
-    """Return the state of all bodies at an instant of a step, or None if the step has no such instant.
-
-    vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
-    """
-    if instant == "after-strike":
-        return walker.full_state(start)
-    if instant == "before-strike":
-        return walker.full_state(step.before)
-    upright = walker.slope if vertical else 0.0
-
-    def lean(state: Floats) -> float:
-        return float(state[STANCE]) - upright
-
-    for piece in step.pieces:
-        if piece.start[STANCE] > upright >= piece.end[STANCE]:
-            middle = walker.swing(piece.phase, piece.start, lean, lambda _: True, EXACT)
-            if middle is not None:
-                return middle.end if middle.phase == BENT else walker.full_state(middle.end)
-    return None
 
 
 def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> Floats | None:
@@ -255,21 +233,21 @@ class CheckedStep:
         }.get(name)
 
     def values(
-        self, items: Sequence[Item], convention: Convention, measured: Mapping[str, Any] = NOTHING
-    ) -> dict[str, complex | None]:
+        self, items: Sequence[Item], convention: Convention, measured: Mapping[str, Any] | None = None
+    ) -> Values:
         """Return the right value of each printed number in the printed conventions, or None if the models lack it.
 
         measured  values of the compiled model by name, which replace those of the plain one
         """
         instants = {"state": convention.instant, "state_before": BEFORE}
-        values: dict[str, complex | None] = {}
+        values: Values = {}
         known: dict[str, Any] = {}
         for name in {item.quantity for item in items}:
             if name in instants:
                 state = self.state(instants[name], convention.origin == "vertical")
                 known[name] = [] if state is None else convention.write(self.walker, state)
             else:
-                known[name] = measured[name] if name in measured else self.quantity(name)
+                known[name] = measured[name] if measured and name in measured else self.quantity(name)
         for item in items:
             value = known[item.quantity]
             if isinstance(value, list | tuple):
@@ -284,7 +262,23 @@ class CheckedStep:
 
     @cache  # noqa: B019 - walks are few, and live as long as their check
     def state(self, instant: Instant, vertical: bool) -> Floats | None:
-        return state_at(self.walker, self.start, self.step, instant, vertical)
+        """Return the state of all bodies at an instant of the step, or None if the step has no such instant.
+
+        vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
+        """
+        if instant != "mid-stance":
+            return self.walker.full_state(self.start if instant == "after-strike" else self.step.before)
+        upright = self.walker.slope if vertical else 0.0
+
+        def lean(state: Floats) -> float:
+            return float(state[STANCE]) - upright
+
+        for piece in self.step.pieces:
+            if piece.start[STANCE] > upright >= piece.end[STANCE]:
+                middle = self.walker.swing(piece.phase, piece.start, lean, lambda _: True, EXACT)
+                if middle is not None:
+                    return middle.end if middle.phase == BENT else self.walker.full_state(middle.end)
+        return None
 
 
 def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> CheckedStep | None:

@@ -47,11 +47,6 @@ class PrintedNumber:
         return value
 
     @property
-    def about(self) -> dict[str, Any]:
-        """Name or source, as JSON values."""
-        return {"quantity": self.quantity}
-
-    @property
     def digits(self) -> Digits:
         """The number or its real part, without bounds."""
         return self.printed.real
@@ -117,10 +112,6 @@ class Item(PrintedNumber):
     place: int  # index of the component
     text: str
 
-    @property
-    def about(self) -> dict[str, Any]:
-        return {"name": self.name}
-
 
 def equal_digits(printed: Digits, right: float, error: float = 0.0) -> int:
     """Return how many digits of a printed number agree with the right one, within the error of the right one."""
@@ -146,15 +137,16 @@ class Judged:
     """A printed number, what it was compared with, and the verdict."""
 
     number: PrintedNumber
-    values: Mapping[str, Any]  # JSON values by name
+    about: Mapping[str, Any]  # JSON values by name: what the number is, and in `values` what it was compared with
+    values: Mapping[str, Any]
     verdict: Verdict
     evidence: str
 
     @property
     def row(self) -> dict[str, Any]:
         """Row of a table, as JSON values."""
-        printed = {**self.number.about, "printed": self.number.text}
-        return {**printed, **self.values, "verdict": self.verdict.value, "evidence": self.evidence}
+        verdict = {"verdict": self.verdict.value, "evidence": self.evidence}
+        return {**self.about, "printed": self.number.text, **self.values, **verdict}
 
 
 def judge(item: Item, right: complex | None, reason: str = "") -> Judged:
@@ -183,7 +175,7 @@ def judge(item: Item, right: complex | None, reason: str = "") -> Judged:
         "of_digits": item.count,
         "difference_in_units": None if right is None else miss,
     }
-    return Judged(item, values, verdict, evidence)
+    return Judged(item, {"name": item.name}, values, verdict, evidence)
 
 
 def format_units(number: float) -> str:

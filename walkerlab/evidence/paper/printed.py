@@ -1,7 +1,7 @@
 """Numbers printed in the paper, with their sources, and the walker that they describe."""
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from walkerlab.config.check import agreement
 from walkerlab.config.contact import MM_PER_M, Contact
@@ -21,10 +21,6 @@ class Printed(PrintedNumber):
     quantity: str
     unit: str
     text: str
-
-    @property
-    def about(self) -> dict[str, Any]:
-        return {"where": self.where, "quantity": self.quantity, "unit": self.unit}
 
     @property
     def rounding(self) -> tuple[float, float]:

@@ -100,7 +100,8 @@ class Judge:
             verdict = Verdict.EXPLAINED
             evidence = f"Not the paper's scene ({differs}): {evidence}"
         values = {name.replace("-", "_"): rigid.get(name) for name in EQUATION_SETS}
-        return Judged(entry, {**values, "contact": contact}, verdict, evidence)
+        about = {"where": entry.where, "quantity": entry.quantity, "unit": entry.unit}
+        return Judged(entry, about, {**values, "contact": contact}, verdict, evidence)
 
     @property
     def raised(self) -> list[float | None]:
