@@ -25,7 +25,7 @@ from walkerlab.pipeline.plan.resolve import resolve
 from walkerlab.pipeline.plan.results import MemoryResults
 from walkerlab.pipeline.run.executor import answer_in_memory
 from walkerlab.pipeline.store.artifact import Identified
-from walkerlab.pipeline.store.csv_text import csv_text
+from walkerlab.pipeline.store.files import csv_text
 
 if TYPE_CHECKING:
     from walkerlab.views.explore.server import Server

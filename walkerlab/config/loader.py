@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from walkerlab.config.analyses import Case
-from walkerlab.config.fields import block_of
+from walkerlab.config.fields import block_of, short_number
 from walkerlab.config.files import (
     DEFAULT,
     ConfigFile,
@@ -28,7 +28,6 @@ from walkerlab.config.files import (
     read_layers,
     replace_cases_file,
 )
-from walkerlab.config.numbers import short_number
 from walkerlab.config.problems import Problem, problem_error
 from walkerlab.config.reads import flatten
 from walkerlab.config.schema import QUESTIONS, Config

@@ -9,10 +9,9 @@ from pydantic import BaseModel, Discriminator, Field, Tag, ValidationInfo, field
 
 from walkerlab.config.analyses import Basin, Continuation, Design, Plan, Robustness, Stability, Sweep
 from walkerlab.config.check import Check
-from walkerlab.config.contact import Contact
+from walkerlab.config.contact import Contact, Footholds
 from walkerlab.config.drives import PushOff, acting_on, push_offs
 from walkerlab.config.fields import Block, Text, check_against, key, meaning_error
-from walkerlab.config.ground import Footholds
 from walkerlab.config.identify import Identify
 from walkerlab.config.recording import RecordedFile
 from walkerlab.config.walkers import (

@@ -9,9 +9,17 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from walkerlab.config.contact import BOUNDS_SI
-from walkerlab.config.fields import Block, block_of, describe_allowed, kinds_of, leaves, words_of
+from walkerlab.config.fields import (
+    DECIMAL_COMMA,
+    Block,
+    block_of,
+    describe_allowed,
+    kinds_of,
+    leaves,
+    short_number,
+    words_of,
+)
 from walkerlab.config.files import DEFAULT, builtin_config, builtin_names, merge_layers, read_layers
-from walkerlab.config.numbers import DECIMAL_COMMA, short_number
 from walkerlab.config.problems import (
     Problem,
     explain_missing_feature,

@@ -14,8 +14,7 @@ from pydantic import Discriminator, Field, Tag, ValidationError, ValidationInfo,
 
 from walkerlab.config.contact import Contact
 from walkerlab.config.drives import QUICKEST, Hip, acting_on
-from walkerlab.config.fields import Block, check_against, key, meaning_error
-from walkerlab.config.numbers import short_number
+from walkerlab.config.fields import Block, check_against, key, meaning_error, short_number
 from walkerlab.config.second_leg import (
     KneelessLeg,
     SecondCompassLeg,

@@ -29,7 +29,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.config.numbers import DECIMAL_COMMA
+from walkerlab.config.fields import DECIMAL_COMMA
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.units import UNIT_VALUES, is_unit
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkerlab.config.contact import Contact
 from walkerlab.config.drives import push_offs
+from walkerlab.config.reads import ContactConfig, GroundConfig
 from walkerlab.config.walkers import AssembledWalker, Kneed
 from walkerlab.errors import ConfigError, NoAnswer
 from walkerlab.extensions import declared, load
@@ -31,8 +33,6 @@ from walkerlab.scene.parts import AnyWalker, assembly_of, damper, drive_paramete
 from walkerlab.scene.rigid import have_different_legs
 
 if TYPE_CHECKING:
-    from walkerlab.config.contact import Contact
-    from walkerlab.config.reads import ContactConfig, GroundConfig
     from walkerlab.config.schema import Config
 
 BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations

@@ -40,10 +40,9 @@ from walkerlab.physics.orbits.similarity import Units
 from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
-from walkerlab.scene.families import model_reads, scene_for
 from walkerlab.scene.parameter import R, config_with, parameter_keys, parameter_of
 from walkerlab.scene.rigid import rigid_walker
-from walkerlab.scene.subject import ModelUnderTest, find_model_gait
+from walkerlab.scene.subject import ModelUnderTest, find_model_gait, model_reads, scene_for
 
 if TYPE_CHECKING:
     from walkerlab.config.identify import Identify

@@ -1,4 +1,4 @@
-"""Build the rigid model of a config, with only the parts that the config needs."""
+"""Build the rigid model of a config, with only the parts that the config needs, and the heights of its footholds."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from walkerlab.config.contact import Footholds
 from walkerlab.config.drives import push_offs
-from walkerlab.config.ground import Footholds
+from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
 from walkerlab.physics.hybrid.recorded_walk import RigidWalkResult, take_walk
+from walkerlab.physics.hybrid.walk_record import rough_heights
 from walkerlab.physics.mechanics.parts import Position
 from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, rigid_on_level_ground
 from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
-from walkerlab.physics.solvers.system import State
-from walkerlab.scene.footholds import foothold_heights
+from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.parts import (
     PARTS_DOCS,
     assembly_of,
@@ -29,8 +32,18 @@ from walkerlab.scene.parts import (
 from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
-    from walkerlab.config.reads import RigidConfig
     from walkerlab.config.schema import Equations, Output
+
+
+def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
+    """Return the heights (steps + 1,) of the footholds in m above the slope, from the start on, or None if even."""
+    if ground.even:
+        return None
+    if ground.heights_m:
+        listed = np.array(ground.heights_m)[:steps]
+        return np.concatenate(([0.0], listed, np.full(steps - listed.size, ground.heights_m[-1])))
+    return rough_heights(ground.roughness_m, ground.seed, steps)
+
 
 FIRST_STEP = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
 CACHED_LEVEL_WALKERS = 16  # a family over slopes reuses its walker on level ground

@@ -12,8 +12,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
-from walkerlab.config.fields import Block
-from walkerlab.config.numbers import short_number
+from walkerlab.config.fields import Block, short_number
 from walkerlab.config.reads import RigidConfig
 from walkerlab.evidence.check.conventions import GRAVITIES
 from walkerlab.evidence.check.gaits import plain_walker

@@ -30,7 +30,6 @@ from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import State
 from walkerlab.pipeline.progress import Progress, track
 from walkerlab.pipeline.run.workers import map_in_order
-from walkerlab.pipeline.stages.numerical_error import numerical_error
 from walkerlab.pipeline.stages.rigid_groups import leg_variables
 from walkerlab.pipeline.stages.walk import (
     OUTCOMES,
@@ -38,6 +37,7 @@ from walkerlab.pipeline.stages.walk import (
     count_outcomes,
     legs,
     numbers_of,
+    numerical_error,
     rigid_start,
     step_columns,
     variables_over_time,

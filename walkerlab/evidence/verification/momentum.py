@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from walkerlab.config.analyses import Case
 from walkerlab.config.reads import RigidConfig, WalksConfig
-from walkerlab.evidence.verification.scaling import pendulum_time
+from walkerlab.evidence.verification.catalogue import pendulum_time
 from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasured, allowed_difference, finite
 from walkerlab.physics.ground.friction import steepest_change
 from walkerlab.physics.hybrid.contact_record import ContactSamples

@@ -27,8 +27,8 @@ from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.run.work import WorkUnit, complete
 from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes
-from walkerlab.pipeline.store.checkpoint import Checkpoint
 from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.files import Checkpoint
 
 PAPER_STIFFNESS: Final = Contact().to_si().stiffness
 STIFFNESS_RANGE: Final = (1e-6 * PAPER_STIFFNESS, 1e6 * PAPER_STIFFNESS)

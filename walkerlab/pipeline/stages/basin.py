@@ -39,10 +39,9 @@ from walkerlab.physics.orbits.similarity import unit_walker
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.run.work import WorkUnit, complete
-from walkerlab.pipeline.stages.numerical_error import evenly_spread, tightened
-from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes, step_asymmetry
-from walkerlab.pipeline.store.checkpoint import Checkpoint
+from walkerlab.pipeline.stages.walk import OUTCOMES, count_outcomes, evenly_spread, step_asymmetry, tightened
 from walkerlab.pipeline.store.content import Content, Group, Variable
+from walkerlab.pipeline.store.files import Checkpoint
 from walkerlab.scene.contact import (
     ContactScene,
     contact_gait,

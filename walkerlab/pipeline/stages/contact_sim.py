@@ -39,8 +39,8 @@ from walkerlab.scene.contact import (
     start_state,
     tolerances_of,
 )
-from walkerlab.scene.footholds import foothold_heights
 from walkerlab.scene.omissions import contact_walk_omissions
+from walkerlab.scene.rigid import foothold_heights
 
 RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved
 SCUFFED = (

@@ -25,11 +25,11 @@ from walkerlab.physics.orbits.step_map import Cycle, StepMap, gait_near
 from walkerlab.physics.orbits.two_parameters import Plane
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.family_groups import groups
-from walkerlab.pipeline.stages.numerical_error import DEFAULT_TIGHTENING, SAMPLE, evenly_spread, tightened
+from walkerlab.pipeline.stages.walk import DEFAULT_TIGHTENING, SAMPLE, evenly_spread, tightened
 from walkerlab.pipeline.store.content import Content
-from walkerlab.scene.families import contact_map, model_differs, rigid_map, steps_of_stride, unused_key_error
 from walkerlab.scene.parameter import Parameter, parameter_of
 from walkerlab.scene.rigid import rigid_walker
+from walkerlab.scene.subject import contact_map, model_differs, rigid_map, steps_of_stride, unused_key_error
 from walkerlab.scene.walk_outcomes import ground_causes, ground_without_pads
 
 Begun = tuple[list[Seed], Callable[[ContactConfig], StepMap]]
