@@ -43,10 +43,7 @@ class Contact(Block):
     """Contact between feet and ground: normal force, friction, terrain."""
 
     units: Literal["adams", "si"] = key(
-        "adams",
-        "",
-        "adams: values of this block in N, mm, s as in ADAMS dialogs; si: in N, m, s",
-        _SECTION_4,
+        "adams", "", "adams: values of this block in N, mm, s as in ADAMS dialogs; si: in N, m, s", _SECTION_4
     )
     normal_force: Literal[words("normal_force")] = key(  # type: ignore[valid-type]
         "impact", "", "impact: the IMPACT law of ADAMS; extensions add others", _ADAMS

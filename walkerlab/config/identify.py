@@ -44,11 +44,7 @@ class Identify(Recorded):
         1, "1", "number of starts of the fit: the config's values first, then values within 10 % of them", ge=1, le=100
     )
     max_walks: int = key(
-        10_000,
-        "1",
-        "number of predicted walks after which a fit ends without convergence",
-        ge=1,
-        le=10_000_000,
+        10_000, "1", "number of predicted walks after which a fit ends without convergence", ge=1, le=10_000_000
     )
     robustness: bool = key(
         False, "", "whether to report the identified gait's sensitivity norm (floor drop to step period)"

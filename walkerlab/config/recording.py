@@ -68,12 +68,7 @@ class Recorded(Block):
         default_in_words="the last sample",
     )
     min_likelihood: float | None = key(
-        None,
-        "1",
-        "likelihood of a marker below which its place is a gap",
-        ge=0.0,
-        le=1.0,
-        default_in_words="none",
+        None, "1", "likelihood of a marker below which its place is a gap", ge=0.0, le=1.0, default_in_words="none"
     )
 
     _span = check_against(

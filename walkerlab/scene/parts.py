@@ -2,23 +2,15 @@
 
 from typing import Any
 
+from walkerlab.config import walkers
 from walkerlab.config.drives import push_offs
 from walkerlab.config.reads import RigidConfig
-from walkerlab.config.walkers import (
-    LIGHTEST_CONTACT,
-    AssembledWalker,
-    CompassWalker,
-    Kneed,
-    StraightLegs,
-    second_of,
-    torso_mass,
-)
 from walkerlab.errors import ConfigError
 from walkerlab.physics.mechanics.parts import Assembly, BallFoot, Body, Coupling, Knee, Particle, Revolute
 from walkerlab.physics.mechanics.walkers import Arc, Limb, add_torso, kneed_legs, replace_second_leg, straight_legs
 
 PARTS_DOCS = "docs/walkers.md shows a walker described by its parts."
-AnyWalker = CompassWalker | StraightLegs | Kneed | AssembledWalker
+AnyWalker = walkers.CompassWalker | walkers.StraightLegs | walkers.Kneed | walkers.AssembledWalker
 
 
 def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
@@ -27,7 +19,7 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
     Raises ConfigError for inconsistent parts.
     """
     parts = legs_of(walker, rigid)
-    other = second_of(walker)
+    other = walkers.second_of(walker)
     parts = parts if other is walker else replace_second_leg(parts, legs_of(other, rigid))
     torso = walker.torso
     return parts if torso is None else add_torso(parts, torso.mass_kg, torso.above_hip_m, torso.inertia_kg_m2)
@@ -35,14 +27,14 @@ def assembly_of(walker: AnyWalker, rigid: bool = False) -> Assembly:
 
 def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
     """Return the parts of a walker without its torso, both legs like leg 1."""
-    if isinstance(walker, CompassWalker):
+    if isinstance(walker, walkers.CompassWalker):
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, walker.mass_to_hip_m, 0.0, walker.leg_inertia_kg_m2)
         return straight_legs(leg, hip_mass(walker, rigid), Arc(0.0 if rigid else walker.foot_radius_m))
-    if isinstance(walker, StraightLegs):
+    if isinstance(walker, walkers.StraightLegs):
         centre = walker.leg_mass_below_hip_m, walker.leg_mass_ahead_m
         leg = Limb(walker.leg_length_m, walker.leg_mass_kg, *centre, walker.leg_inertia_kg_m2)
         return straight_legs(leg, hip_mass(walker, rigid), Arc(walker.foot_radius_m, walker.foot_centre_ahead_m))
-    if isinstance(walker, Kneed):
+    if isinstance(walker, walkers.Kneed):
         upper = walker.thigh
         lower = walker.shank
         thigh = Limb(upper.length_m, upper.mass_kg, upper.mass_below_hip_m, upper.mass_ahead_m, upper.inertia_kg_m2)
@@ -51,17 +43,17 @@ def legs_of(walker: AnyWalker, rigid: bool) -> Assembly:
     return own_parts(walker)
 
 
-def hip_mass(walker: CompassWalker | StraightLegs, rigid: bool) -> float:
+def hip_mass(walker: walkers.CompassWalker | walkers.StraightLegs, rigid: bool) -> float:
     """Return the hip mass (kg) of a walker with straight legs, raised if the contact model needs more."""
     # On compliant ground, legs that are point masses need a hip mass. Otherwise legs side by side can turn about their
     # masses and move the massless hip freely, and the forces do not determine the hip's acceleration.
     if rigid:
         return walker.hip_mass_kg
-    present = torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
-    return max(walker.hip_mass_kg, LIGHTEST_CONTACT * walker.total_mass_kg - present)
+    present = walkers.torso_mass(walker.torso) + walker.leg_inertia_kg_m2 / walker.leg_length_m**2
+    return max(walker.hip_mass_kg, walkers.LIGHTEST_CONTACT * walker.total_mass_kg - present)
 
 
-def own_parts(walker: AssembledWalker) -> Assembly:
+def own_parts(walker: walkers.AssembledWalker) -> Assembly:
     try:
         return Assembly(
             bodies=tuple(Body(**dict(body)) for body in walker.bodies),
@@ -82,7 +74,7 @@ def drive_parameters(config: RigidConfig) -> dict[str, Any]:
 
 def knee_dampings(walker: AnyWalker) -> tuple[float, float]:
     """Return the damping (N m s/rad) of each leg's knee, or 0 for a leg without a knee."""
-    knees = (getattr(each, "knee", None) for each in (walker, second_of(walker)))
+    knees = (getattr(each, "knee", None) for each in (walker, walkers.second_of(walker)))
     first, second = (0.0 if knee is None else knee.damping_N_m_s_per_rad for knee in knees)
     return first, second
 
@@ -94,4 +86,4 @@ def damper(damping: float) -> tuple[float, float, float]:
 
 def knee_locked_at_strike(walker: AnyWalker) -> bool:
     """Whether the trailing knee is rigid during heel strike."""
-    return not isinstance(walker, Kneed | AssembledWalker) or walker.knee.at_heel_strike == "locked"
+    return not isinstance(walker, walkers.Kneed | walkers.AssembledWalker) or walker.knee.at_heel_strike == "locked"

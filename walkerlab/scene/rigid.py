@@ -21,14 +21,7 @@ from walkerlab.physics.mechanics.rigid import group_bodies, knee_positions, rigi
 from walkerlab.physics.mechanics.rigid_model import RigidModel, change_slope, pair, replace_fields
 from walkerlab.physics.solvers.registry import ENDLESS, Tolerances
 from walkerlab.physics.solvers.system import Floats, State
-from walkerlab.scene.parts import (
-    PARTS_DOCS,
-    assembly_of,
-    damper,
-    drive_parameters,
-    knee_dampings,
-    knee_locked_at_strike,
-)
+from walkerlab.scene import parts
 from walkerlab.scene.studies import replace_equations
 
 if TYPE_CHECKING:
@@ -76,7 +69,7 @@ def rigid_scene(config: RigidConfig, ground: Footholds, outputs: tuple[Output, .
     return RigidScene(
         walker=rigid_walker(config),
         names=state_names(config),
-        knees_m=knee_positions(assembly_of(config.walker, rigid=True)),
+        knees_m=knee_positions(parts.assembly_of(config.walker, rigid=True)),
         outputs=outputs,
         ground=ground,
     )
@@ -90,10 +83,10 @@ def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Rig
 
 def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
     """Return the model with the push-off, hip spring and knee dampers of the config."""
-    driven = passive.changed(**drive_parameters(config))
-    dampings = knee_dampings(config.walker)
+    driven = passive.changed(**parts.drive_parameters(config))
+    dampings = parts.knee_dampings(config.walker)
     drives = [
-        {"push_off": push} | ({"knees": damper(damping)} if any(dampings) else {})
+        {"push_off": push} | ({"knees": parts.damper(damping)} if any(dampings) else {})
         for push, damping in zip(push_offs(config.push_off), dampings, strict=True)
     ]
     if drives[0] == drives[1]:
@@ -110,9 +103,11 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
     Raises ConfigError if the parts are not a valid walker.
     """
     try:
-        return rigid_on_level_ground(assembly_of(walker, rigid=True), gravity, knee_locked_at_strike(walker))
+        return rigid_on_level_ground(
+            parts.assembly_of(walker, rigid=True), gravity, parts.knee_locked_at_strike(walker)
+        )
     except ValueError as error:
-        raise ConfigError(f"walker: {error}", PARTS_DOCS) from None
+        raise ConfigError(f"walker: {error}", parts.PARTS_DOCS) from None
 
 
 def have_different_legs(config: RigidConfig) -> bool:
@@ -130,7 +125,7 @@ def refuse_different_legs(config: RigidConfig, request: str) -> None:
 
 
 def state_names(config: RigidConfig) -> tuple[str, ...]:
-    angles = tuple(f"theta_{name}" for name in group_bodies(assembly_of(config.walker, rigid=True)).names)
+    angles = tuple(f"theta_{name}" for name in group_bodies(parts.assembly_of(config.walker, rigid=True)).names)
     return (*angles, *(f"d{name}" for name in angles))
 
 

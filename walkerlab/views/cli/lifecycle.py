@@ -179,8 +179,7 @@ def animate(
     request: Request,
     run: RunArgument,
     to: Annotated[
-        str | None,
-        typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name."),
+        str | None, typer.Option("--to", metavar="FORMAT", help="gif, or mp4 if ffmpeg is installed; or a file name.")
     ] = None,
     output: Output = None,
     model: Annotated[
