@@ -20,9 +20,8 @@ from walkerlab.physics.ground.knees import MIN_FLEXION
 from walkerlab.physics.ground.normal_force import Impact
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.mechanics.parts import Position
-from walkerlab.physics.mechanics.walkers import TORSO
 from walkerlab.scene.contact import knee_rules
-from walkerlab.scene.parts import knee_dampings
+from walkerlab.scene.parts import TORSO, knee_dampings
 
 MM = 1000.0
 GROUND = "ground"

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from walkerlab.config.reads import ContactConfig
 from walkerlab.errors import ConfigError
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
-from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import LOCKED, MAX_BODIES, ContactWalker, changed_forms
-from walkerlab.physics.hybrid.contact_events import JudgedGround
-from walkerlab.physics.mechanics.assembly import Anchor, levers, masses, total_mass
-from walkerlab.physics.mechanics.parts import Assembly, Knee
+from walkerlab.physics.hybrid.contact_state import JudgedGround
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, Knee, hinge_point, levers, masses, total_mass
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
 from walkerlab.scene.parts import assembly_of

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from walkerlab.config.contact import Footholds
-from walkerlab.config.drives import push_offs
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import Walker
 from walkerlab.errors import ConfigError
@@ -83,17 +82,15 @@ def rigid_walker(config: RigidConfig, equations: Equations | None = None) -> Rig
 
 def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
     """Return the model with the push-off, hip spring and knee dampers of the config."""
-    driven = passive.changed(**parts.drive_parameters(config))
-    dampings = parts.knee_dampings(config.walker)
-    drives = [
-        {"push_off": push} | ({"knees": parts.damper(damping)} if any(dampings) else {})
-        for push, damping in zip(push_offs(config.push_off), dampings, strict=True)
+    drives = parts.drive_parameters(config)
+    driven = passive.changed(**drives.shared)
+    legs = [
+        {"push_off": push} | ({"knees": drives.knees[leg]} if drives.knees else {})
+        for leg, push in enumerate(drives.push_offs)
     ]
-    if drives[0] == drives[1]:
-        return driven.changed(**drives[0])
-    return pair(
-        *(replace_fields(model, drive) for model, drive in zip((driven, driven.exchanged), drives, strict=True))
-    )
+    if legs[0] == legs[1]:
+        return driven.changed(**legs[0])
+    return pair(*(replace_fields(model, leg) for model, leg in zip((driven, driven.exchanged), legs, strict=True)))
 
 
 @lru_cache(CACHED_LEVEL_WALKERS)

@@ -19,8 +19,8 @@ from walkerlab.evidence.paper.appendix_a import RigidWalker, impact
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.ground.walker import ContactWalker
-from walkerlab.physics.hybrid.contact_events import JudgedGround
 from walkerlab.physics.hybrid.contact_result import walk_contact
+from walkerlab.physics.hybrid.contact_state import JudgedGround
 from walkerlab.physics.hybrid.rigid_record import unwatched
 from walkerlab.physics.hybrid.rigid_walk import EVENTS as RIGID_EVENTS
 from walkerlab.physics.hybrid.rigid_walk import new_heel_strikes, walk

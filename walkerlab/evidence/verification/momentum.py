@@ -19,8 +19,7 @@ from walkerlab.evidence.verification.verdict import MAGNIFIED, Measure, NotMeasu
 from walkerlab.physics.ground.friction import steepest_change
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import sample_feet
-from walkerlab.physics.mechanics.assembly import Anchor, levers, masses
-from walkerlab.physics.mechanics.parts import Assembly
+from walkerlab.physics.mechanics.parts import Anchor, Assembly, levers, masses
 from walkerlab.physics.mechanics.rigid import find_hip, group_bodies, have_equal_legs
 from walkerlab.physics.mechanics.rigid_model import STANCE, SWING
 from walkerlab.physics.solvers.registry import Tolerances

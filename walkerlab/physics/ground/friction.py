@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple, Protocol, Self
 
-from walkerlab.physics.ground.smooth_step import smooth_step
+from walkerlab.physics.ground.normal_force import smooth_step
 from walkerlab.physics.kernels import dispatch_by_type, dispatch_by_type_or_default
 
 
@@ -68,10 +68,7 @@ class Coulomb(NamedTuple):
     @classmethod
     def from_contact(cls, contact: Any) -> Coulomb:
         return cls(
-            contact.static_friction,
-            contact.dynamic_friction,
-            contact.stiction_velocity,
-            contact.friction_velocity,
+            contact.static_friction, contact.dynamic_friction, contact.stiction_velocity, contact.friction_velocity
         )
 
     @property

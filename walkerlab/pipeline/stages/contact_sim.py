@@ -8,11 +8,10 @@ import numpy as np
 
 from walkerlab.config.reads import ContactSimConfig
 from walkerlab.physics.energy_channels import SAMPLED
-from walkerlab.physics.ground.compliant import hinge_point
 from walkerlab.physics.ground.terrain import STANCE_FOOT, Terrain
 from walkerlab.physics.hybrid.contact_record import ContactSamples
 from walkerlab.physics.hybrid.contact_result import ContactWalkResult, losses_by_channel, sample_energies, sample_feet
-from walkerlab.physics.mechanics.walkers import TORSO
+from walkerlab.physics.mechanics.parts import hinge_point
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
@@ -32,6 +31,7 @@ from walkerlab.pipeline.stages.walk import (
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered
 from walkerlab.scene import contact
 from walkerlab.scene.omissions import contact_walk_omissions
+from walkerlab.scene.parts import TORSO
 from walkerlab.scene.rigid import foothold_heights
 
 RESOLVED = 0.1  # largest ratio of tolerance to stiction velocity at which slips are resolved

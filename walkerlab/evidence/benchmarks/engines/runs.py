@@ -16,7 +16,7 @@ from walkerlab.exchange.engine_scene import EngineContact, EngineScene
 from walkerlab.outcome import Outcome
 from walkerlab.physics.ground.terrain import STANCE_FOOT
 from walkerlab.physics.hybrid.contact_state import steps_with_lift
-from walkerlab.physics.mechanics.assembly import Anchor
+from walkerlab.physics.mechanics.parts import Anchor
 from walkerlab.physics.solvers.system import Floats
 
 TIME_ROUNDING = 1e-9  # relative tolerance for times
