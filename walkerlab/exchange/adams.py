@@ -5,8 +5,6 @@ View's objects are in the order in which it writes them: parts with their marker
 all functions, because a function may refer to any object.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from walkerlab.exchange.adams_model import GROUND, ORIGIN, REFERENCE, AdamsContact, AdamsModel, values

@@ -4,8 +4,6 @@ The walk takes place in the x-y plane, x along the slope and y normal to it; gra
 Expressions name markers and variables in braces, as in DX({leg_1.foot}); each file format inserts its own names.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator
@@ -236,7 +234,7 @@ class MovingFrame(NamedTuple):
     velocity: Position
     spin: float
 
-    def moved_to(self, point: Position) -> MovingFrame:
+    def moved_to(self, point: Position) -> "MovingFrame":
         """Return the parallel frame at a point of this one."""
         s, c = math.sin(self.angle), math.cos(self.angle)
         x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]

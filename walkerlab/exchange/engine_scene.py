@@ -1,7 +1,5 @@
 """Scene for other programs: a walker's parts, its start, and a linear approximation of its contact."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -55,7 +53,7 @@ class EngineScene:
         bends = [self.model.chain[shank] - self.model.chain[thigh] for shank, thigh in ends]
         return tuple(2 + int(np.argmax(bend)) if bend.any() else -1 for bend in bends)
 
-    def lock_knees(self, doing: NDArray[np.int8]) -> EngineScene:
+    def lock_knees(self, doing: NDArray[np.int8]) -> "EngineScene":
         """Return the scene with the knees in state LOCKED locked."""
         locked = (knee for knee, state in zip(self.assembly.knees, doing, strict=False) if state == LOCKED)
         return replace(self, locked=tuple(locked))
@@ -95,7 +93,7 @@ class EngineScene:
         upward = s * d[:, 0] + c * d[:, 1]
         return np.array((forward.sum(), upward.sum())), np.array((-rates @ upward, rates @ forward))
 
-    def scale_start(self, factor: float) -> EngineScene:
+    def scale_start(self, factor: float) -> "EngineScene":
         """Return the scene with the initial velocities multiplied by `factor`. The stance foot still does not slip."""
         n = len(self.model.chain)
         return replace(self, start=(*self.start[: 2 + n], *(factor * x for x in self.start[2 + n :])))

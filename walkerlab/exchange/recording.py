@@ -4,8 +4,6 @@
 OpenSim tables (.sto, .mot), markers (.trc, .c3d). The module `columns` maps them to quantities of a walk.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

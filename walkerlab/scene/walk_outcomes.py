@@ -1,7 +1,5 @@
 """Describe how walks ended, and whether the cause is the ground, such as its pads, rather than the walker."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final

@@ -5,8 +5,6 @@ have the config's contact or contact near the rigid limit. Reference end states 
 Taylor method computes one of them.
 """
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -287,7 +285,7 @@ class End:
         return [END_METHODS.index(self.method), self.tolerance, self.rhs_evaluations, *self.state.tolist()]
 
     @classmethod
-    def unpack(cls, numbers: Numbers) -> End:
+    def unpack(cls, numbers: Numbers) -> "End":
         method, tolerance, rhs_evaluations, *state = numbers
         return cls(END_METHODS[int(method)], np.array(state), tolerance, int(rhs_evaluations))
 

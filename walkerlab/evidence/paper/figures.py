@@ -1,7 +1,5 @@
 """Figures on the paper's claim: the difference between the walks of both models (8), and the rigid limit (12)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final

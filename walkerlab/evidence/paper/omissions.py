@@ -1,7 +1,5 @@
 """Parts of the paper's adjustment that do not apply to a config, known before anything is loaded or run."""
 
-from __future__ import annotations
-
 from walkerlab.config.reads import RigidConfig
 from walkerlab.config.walkers import is_passive_compass
 from walkerlab.evidence.paper.law import is_own_walker

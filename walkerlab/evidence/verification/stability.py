@@ -1,7 +1,5 @@
 """Stage `stability`: extreme cases and known problems, judged by measures independent of the walk's computation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, TypeGuard

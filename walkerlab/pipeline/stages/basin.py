@@ -1,7 +1,5 @@
 """Basins of attraction: the starts that lead to walking, the attractors that they reach, and the steps needed."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -92,7 +90,7 @@ def run(
     return Content({"basin": group_of(config.basin, window, ends, walking)}, answer, timed=("trajectories_per_s",))
 
 
-def sample_again(question: Question, window: grid.Window, ends: grid.WalkEnds) -> dict[str, int]:
+def sample_again(question: "Question", window: grid.Window, ends: grid.WalkEnds) -> dict[str, int]:
     """Repeat the walks of evenly spread cells at tighter tolerances, and count those that end differently."""
     cells = np.array(evenly_spread(window.size, REPEATED_CELLS))
     tighter = question.tightened().walk_to_ends(window.starts(cells))
@@ -113,7 +111,9 @@ def window_of(config: BasinConfig, z: list[float]) -> grid.Window:
     return grid.Window(axes, lower, upper, settings.cells, (z[0], z[1], z[2]))
 
 
-def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: grid.Window, rigid: RigidModel) -> Question:
+def question_of(
+    config: BasinConfig, inputs: Mapping[str, Content], window: grid.Window, rigid: RigidModel
+) -> "Question":
     """Build the model whose walks are classified, and find its attractors."""
     if config.basin.model == "contact":
         return contact_question(config, inputs, rigid)
@@ -129,7 +129,7 @@ def question_of(config: BasinConfig, inputs: Mapping[str, Content], window: grid
     return question if legs is not None else one_by_one
 
 
-def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> ContactQuestion:
+def contact_question(config: BasinConfig, inputs: Mapping[str, Content], rigid: RigidModel) -> "ContactQuestion":
     """Build the contact model whose walks are classified, at the tolerances of the map that `tune` computes."""
     if config.contact is None:
         raise contact_required_error("basin.model: contact", config.walker, "Add one.")
@@ -171,7 +171,7 @@ def group_of(settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking:
 
 
 def summary(
-    settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats, question: Question
+    settings: Basin, window: grid.Window, ends: grid.WalkEnds, walking: Floats, question: "Question"
 ) -> dict[str, Any]:
     walks = ends.outcome == Outcome.WALKED
     attractors = question.attractor_rows()
@@ -251,7 +251,7 @@ class RigidQuestion:
         scaled = z * np.array(self.scale)
         return grid.walk_to_attractor(self.walker, self.attractors, scaled, self.steps, tolerances=self.tolerances)
 
-    def tightened(self) -> RigidQuestion:
+    def tightened(self) -> "RigidQuestion":
         """Return the same model with tolerances a hundred times tighter."""
         rtol, atol = self.tolerances
         return replace(self, tolerances=(rtol / 100.0, atol / 100.0))
@@ -290,7 +290,7 @@ class ContactQuestion:
         settled = self.starts.settling_steps(walk) if walk.outcome is Outcome.WALKED else None
         return (walk.outcome, grid.UNREACHED, walk.touch_time_s.size) if settled is None else (walk.outcome, 0, settled)
 
-    def tightened(self) -> ContactQuestion:
+    def tightened(self) -> "ContactQuestion":
         """Return the same model with the tighter tolerances of `numerical_error.tightened`."""
         return replace(self, starts=replace(self.starts, tolerances=tightened(self.starts.tolerances)[0]))
 

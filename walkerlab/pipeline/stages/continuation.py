@@ -1,7 +1,5 @@
 """Families of gaits over a parameter: branches, bifurcations, cascades and chaos."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -64,7 +62,7 @@ class FamilyQuestion:
         return (RIGID, CONTACT) if model == "both" else (model,)
 
     @property
-    def second(self) -> FamilyQuestion | None:
+    def second(self) -> "FamilyQuestion | None":
         """Second parameter and its span, or None if the config has no second key."""
         block = self.config.continuation.second
         return None if block is None else question_over(block, self.config, "continuation", "second")

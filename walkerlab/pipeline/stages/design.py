@@ -1,7 +1,5 @@
 """Optimise a quantity of a walker's gait by varying parameters within bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any, Final

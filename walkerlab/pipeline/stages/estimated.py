@@ -1,7 +1,5 @@
 """Checks of the `identify` block that the stages `identify` and `plan` share: parameters, priors and models."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Stored groups of gait families: branches with bifurcations, attractors, curves and sampled walks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise

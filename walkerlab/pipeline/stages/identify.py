@@ -1,7 +1,5 @@
 """Estimate parameters of a walker from a measured walk."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Final, cast

@@ -1,7 +1,5 @@
 """Find the measurements, and the numbers of steps, that would determine parameters of the walker."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Final, cast

@@ -1,7 +1,5 @@
 """Stage `recorded-walk`: read a walk recorded elsewhere, and store it like a computed walk."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

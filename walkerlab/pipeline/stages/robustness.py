@@ -1,7 +1,5 @@
 """Robustness of a gait in both models: the disturbances it survives, and the parameters that affect it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import partial

@@ -4,8 +4,6 @@ Under the same law, an engine integrates our contact forces; under its own law, 
 An engine runs in a separate process, so that a crash or hang does not stop the stage.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 import time
@@ -56,7 +54,7 @@ class OwnProcess:
         self._folder = tempfile.TemporaryDirectory(prefix="walkerlab-engine-")
         self._abandoned = False
 
-    def __enter__(self) -> OwnProcess:
+    def __enter__(self) -> "OwnProcess":
         return self
 
     def __exit__(self, *_error: object) -> None:

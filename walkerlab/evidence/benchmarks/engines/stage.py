@@ -2,8 +2,6 @@
 native contact, for the walkers that engines support.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
@@ -75,7 +73,7 @@ class EngineFindings:
     tuning: list[TuningRow] = field(default_factory=list)
     left_out: list[dict[str, str]] = field(default_factory=list)
 
-    def add(self, findings: EngineFindings) -> None:
+    def add(self, findings: "EngineFindings") -> None:
         for name in ("rows", "swings", "tuning", "left_out"):
             getattr(self, name).extend(getattr(findings, name))
 
