@@ -80,7 +80,7 @@ def kicked_walk(walks, z, p, kick, draw):
     unit = walks._unit_at(p)
 
     def kicked(start, step):
-        kicks = unit_kicks(unit, start)
+        kicks = unit_kicks(unit.walker, unit.section, start)
         return start + (kick * draw.normal(size=len(kicks)) @ kicks if step else 0.0)
 
     return walk_in_parts(walks, unit, z, lambda start, step: [(0.0, kicked(start, step))])

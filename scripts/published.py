@@ -235,8 +235,8 @@ def mistakes() -> list[str]:
             if gait is None:
                 rows.append((0.0, [what, "no gait near", "", ""]))
                 continue
-            pairs = [(gait[0][k], right.start[k]) for k in (STANCE, 2 + STANCE)]
-            pairs.append((gait[1].period, right.step.period))
+            pairs = [(gait.start[k], right.start[k]) for k in (STANCE, 2 + STANCE)]
+            pairs.append((gait.step.period, right.step.period))
             changes = [100.0 * (wrong / true - 1.0) for wrong, true in pairs]
             rows.append((abs(changes[-1]), [what, *(f"{change:+.2g} %" for change in changes)]))
         rows.sort(key=lambda row: -row[0])

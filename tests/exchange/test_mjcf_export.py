@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported_walkers import LIMPING, PADS, PARTS, export_of, files_of, with_gait
+from exported_walkers import LIMPING, ONE_KNEE, PADS, PARTS, export_of, files_of, with_gait
 
 from walkerlab.config.loader import load
 from walkerlab.errors import ConfigError
@@ -244,7 +244,7 @@ def test_kneed_walker_takes_the_same_steps_with_the_exported_script(walker, step
     assert lengths == pytest.approx(walk.lengths_m[:steps], rel=0.01)
 
 
-@pytest.mark.parametrize("walker", LIMPING, ids=lambda walker: walker[0])
+@pytest.mark.parametrize("walker", [*LIMPING, ONE_KNEE], ids=lambda walker: walker[0])
 def test_walker_whose_legs_differ_takes_the_same_steps_in_mujoco(walker, tmp_path):
     walk = export_of(*walker).walk
     periods, lengths = steps_of(walk_of(tmp_path, *walker), walk.steps)

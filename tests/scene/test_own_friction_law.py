@@ -15,7 +15,13 @@ from walkerlab.evidence.benchmarks.trials import CREEP_FACTOR, stiff_ground_tria
 from walkerlab.exchange.engine_scene import CREEP_LOAD, contact_target
 from walkerlab.extensions import WORDS
 from walkerlab.physics.ground import friction
-from walkerlab.physics.ground.friction import FRICTION_LAWS, Frictionless, friction_coefficient, steepest_change
+from walkerlab.physics.ground.friction import (
+    FRICTION_LAWS,
+    Coulomb,
+    Frictionless,
+    friction_coefficient,
+    steepest_change,
+)
 from walkerlab.physics.orbits.contact_gait import scale_laws, set_rigidity, why_no_gait
 from walkerlab.physics.orbits.rigid_limit import STICTION_SERIES, series_settings
 from walkerlab.physics.solvers.registry import Tolerances
@@ -124,6 +130,17 @@ def test_stated_properties_of_a_law_match_its_coefficient(word):
         slowed = friction_coefficient(law.scale_creep(0.25), 0.25 * slip)[0]
         assert slowed == pytest.approx(friction_coefficient(law, slip)[0], rel=1e-12)
         assert steepest_change(law, slip) >= -friction_coefficient(law, slip)[0] - 1e-12
+
+
+def test_steepest_change_bounds_a_fall_that_is_steeper_than_the_rise():
+    law = Coulomb(static=0.9, dynamic=0.7, stiction_velocity=0.1, friction_velocity=0.11)
+    span = 1e-4
+    changes = [
+        friction_coefficient(law, slip + span)[0] - friction_coefficient(law, slip)[0]
+        for slip in np.linspace(0.1, 0.11, 201)
+    ]
+    assert max(changes) == pytest.approx(0.003, rel=1e-3)
+    assert max(changes) <= steepest_change(law, span) <= 1.01 * max(changes)
 
 
 def test_friction_laws_have_different_descriptions():

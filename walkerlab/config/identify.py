@@ -33,6 +33,12 @@ class Identify(Recorded):
         "parameters that were measured by other means, in the key's unit",
         bounds="[value, standard deviation] for each key, the second above 0",
     )
+    first_leg: Literal[1, 2] | None = key(
+        None,
+        "",
+        "leg that swings in the first step of a table of steps, if the legs differ",
+        default_in_words="both are tried",
+    )
     nuisance: tuple[Nuisance, ...] = key(
         (),
         "",

@@ -80,6 +80,11 @@ class SecondPushOff(Block):
     impulse_N_s: float | None = second_leg("N s", 0.0)
 
 
+def states_second_leg(config: Any) -> bool:
+    """Whether a config states a second leg or its push-off, or has a type of walker without `leg_2`."""
+    return getattr(config.walker, "leg_2", ...) is not None or config.push_off.leg_2 is not None
+
+
 def describe_second_leg(walker: Any) -> str:
     """Describe the keys of leg 2 that a config states, with their values, or return '' if it states none."""
     leg = getattr(walker, "leg_2", None)

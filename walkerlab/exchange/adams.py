@@ -58,6 +58,7 @@ def statements(model: AdamsModel) -> Iterator[str]:
     for name, function in model.variables.items():
         yield from named_statement(name, f"VARIABLE/{ids[name]}", f"FUNCTION = {expression(function)}")
     for name, force in model.forces.items():
+        # Of several functions in a statement, all but the last end in a backslash.
         yield from named_statement(
             name, f"GFORCE/{ids[name]}", f"I = {ids[force.i]}", f"JFLOAT = {ids[force.reaction]}",
             f"RM = {ids[ORIGIN]}", f"FX = {expression(force.x)}\\", f"FY = {expression(force.y)}\\",
@@ -100,6 +101,7 @@ def part_arguments(model: AdamsModel, name: str, ids: Mapping[str, int]) -> Iter
     yield from (f"QG = {values(x, y, 0)}", f"REULER = {values(part.angle, 0, 0)}")
     yield from (f"VX = {values(vx)}", f"VY = {values(vy)}", "VZ = 0", "WX = 0", "WY = 0", f"WZ = {values(part.spin)}")
     yield from (f"MASS = {values(part.mass)}", f"CM = {ids[part.centre]}")
+    # Only the moment about the plane's normal matters to the walk. Three equal moments are those of a possible body.
     yield f"IP = {values(part.inertia, part.inertia, part.inertia)}"
 
 
@@ -244,6 +246,7 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
                 "part create rigid_body name_and_position", part_name=full(name), adams_id=str(number),
                 location=values(*part.place, 0.0), orientation=format_rotation(part.angle),
             )  # fmt: skip
+        # Locations of markers are relative to the part that carries them.
         yield command("defaults coordinate_system", default_coordinate_system=full(name))
         for marker_name, marker in model.markers.items():
             if marker.part == name and marker.floating:

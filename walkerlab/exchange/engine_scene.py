@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from walkerlab.config.reads import ContactConfig
-from walkerlab.errors import ConfigError
 from walkerlab.exchange.planar import FLOATING, PlanarModel, planar_model
 from walkerlab.physics.ground.friction import FrictionLaw, friction_coefficient
 from walkerlab.physics.ground.terrain import STANCE_FOOT
@@ -16,9 +15,9 @@ from walkerlab.physics.hybrid.contact_state import JudgedGround
 from walkerlab.physics.mechanics.parts import Anchor, Assembly, Knee, hinge_point, levers, masses, total_mass
 from walkerlab.physics.solvers.system import Floats, State
 from walkerlab.scene.contact import ContactScene, contact_scene, start_state
-from walkerlab.scene.parts import assembly_of
 
-CREEP_LOAD = 0.1  # ratio of tangential to normal force of a standing foot; about the mean over a walk
+# ratio of tangential to normal force of a standing foot; about the mean over a walk
+CREEP_LOAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -75,6 +74,7 @@ class EngineScene:
         shift, drift = self._centre(angles, rates)
         position = np.array(y[:2]) - shift
         velocity = np.array(y[2 + n : 4 + n]) - drift
+        # Bodies of a locked leg have equal rows, so there may be more equations than angles. They agree.
         relative, relative_rates = np.linalg.lstsq(self.model.chain, np.column_stack((angles, rates)), rcond=None)[0].T
         return np.concatenate((position, relative)), np.concatenate((velocity, relative_rates))
 
@@ -119,6 +119,7 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
     d = np.zeros((2, MAX_BODIES, 2))
     for foot, part in enumerate(assembly.feet):
         d[foot, : len(assembly.bodies)] = levers(assembly, base, Anchor(part.body, part.centre_m))
+    # The base is the hip, so the levers to the hip are zero.
     walker = changed_forms(scene.walker, foot_x=d[..., 0], foot_y=d[..., 1], hip_x=0.0, hip_y=0.0)
     return EngineScene(assembly, base, scene.walker, walker, scene.ground, start)
 
@@ -158,13 +159,3 @@ def contact_target(scene: EngineScene) -> EngineContact | None:
     creep = creep_velocity(friction, CREEP_LOAD)
     sliding = -friction_coefficient(friction, friction.sliding_from)[0]
     return EngineContact(mass, g, foot.depth, walker.normal.exponent, foot.damping_ratio, sliding, CREEP_LOAD, creep)
-
-
-def refuse_one_knee(config: ContactConfig) -> None:
-    """Raise ConfigError if only one leg has a knee: exports and engines need two legs of one kind."""
-    if len({len(leg) for leg in assembly_of(config.walker).legs}) > 1:
-        raise ConfigError(
-            "exports and engines need two legs of one kind, both with a knee or both without.",
-            "The models of walkerlab walk with one knee: `walkerlab contact-sim`.",
-            ("walker",),
-        )

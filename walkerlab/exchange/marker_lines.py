@@ -98,6 +98,12 @@ def swapped_rows(time: Array, apart: Array) -> NDArray[np.bool_]:
     costs = [[uneven(first * before, between, last * after) for last in (1.0, -1.0)] for first in (1.0, -1.0)]
     fast = float(np.percentile(np.sum(np.diff(apart, axis=0) ** 2, axis=1), FAST_PERCENT))
     least = max(EXCHANGE * fast, SCATTER * float(np.median(costs[0][0])))
+    # Consecutive exchanges between n samples can change the unevenness at these n samples only, and cost n - 1 times
+    # `least`. So without any stretch of samples that could gain as much, there are none.
+    gains = np.pad(costs[0][0] - np.min(costs, axis=(0, 1)), 1)
+    sums = np.append(0.0, np.cumsum(gains - least))
+    if np.all(sums[2:] - np.minimum.accumulate(sums)[:-2] <= -least):
+        return np.zeros(len(apart), bool)
     # Dynamic programming: lowest cost up to each interval between samples, without and with an exchange in it.
     stays = 0.0
     changes = least

@@ -7,9 +7,11 @@ or sensor offset makes the measured sum at these jumps non-zero.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -26,6 +28,7 @@ DEGREE: Final = 3
 SMALLEST_SCATTER: Final = 1e-12  # lower limit of the squared scatter, as a fraction of the sum of squared angles
 SUMS: Final = np.round(np.arange(-0.12, 0.121, 0.01), 2)  # rad, trial values of the sum
 MOST_FOUND: Final = 4
+RIDGE: Final = 1e-14  # relative; samples at nearly equal times would make equations singular
 
 
 def sums_at_jumps(time: Array, angle: Array, total: Callable[[Array], Array]) -> list[float]:
@@ -84,6 +87,52 @@ def noise_of(angle: Array) -> float:
 def typical_interval(instants: Sequence[float], time: Array) -> float:
     """Return the median interval (s) between instants of a recording, or its duration if there are fewer than two."""
     return float(np.median(np.diff(instants))) if len(instants) > 1 else float(time[-1] - time[0])
+
+
+def squares_around(t: Array, y: Array, instants: Array, degree: int, samples_per_degree: int = 1) -> Array:
+    """Return for each instant the squared residuals (instants,) of polynomials before and after it that meet there.
+
+    t, y                times (samples,), rising, and values (samples, legs)
+    instants            (instants,) rising
+    degree              highest degree of the polynomials
+    samples_per_degree  number of samples of a side that it needs for each degree above 1
+    """
+    counts = np.searchsorted(t, instants)
+    degrees = np.minimum(degree, 1 + np.stack((counts, t.size - counts)) // samples_per_degree)
+    before = squares_before(t, y, instants, counts, degrees[0])
+    mirrored = squares_before(-t[::-1], y[::-1], -instants[::-1], (t.size - counts)[::-1], degrees[1, ::-1])
+    after = [values[::-1] for values in mirrored]
+    gaps = np.sum((before[1] - after[1]) ** 2, axis=1)
+    return np.asarray(before[0] + after[0] + gaps / (before[2] + after[2]))
+
+
+def squares_before(
+    t: Array, y: Array, instants: Array, counts: NDArray[np.int64], degrees: NDArray[np.int64]
+) -> tuple[Array, Array, Array]:
+    """Fit polynomials to the first `counts` samples, for each instant.
+
+    Returns the squared residuals (instants,), values at the instants (instants, legs), and the variance (instants,) of
+    such a value if that of the samples is 1.
+    """
+    end = int(counts.max())
+    degree = int(degrees.max())
+    span = np.array([t[0], max(float(t[end - 1]), float(instants.max()))])
+    basis, at = (
+        chebvander(2.0 * (each - span[0]) / (np.ptp(span) or 1.0) - 1.0, degree) for each in (t[:end], instants)
+    )
+    columns = np.concatenate((basis, y[:end]), axis=1)
+    moments = np.cumsum([columns[a:b].T @ columns[a:b] for a, b in pairwise([0, *counts.tolist()])], axis=0)
+    used = (np.arange(degree + 1) <= degrees[:, None]) & (counts[:, None] > 1)
+    square = moments[:, : degree + 1, : degree + 1] * (used[:, :, None] & used[:, None, :])
+    square += np.eye(degree + 1) * (~used + RIDGE * counts[:, None])[:, None]
+    right = np.concatenate((moments[:, : degree + 1, degree + 1 :], at[:, :, None]), axis=2) * used[:, :, None]
+    solution = np.linalg.solve(square, right)
+    explained = np.sum(right * solution, axis=1)
+    total = np.trace(moments[:, degree + 1 :, degree + 1 :], axis1=1, axis2=2)
+    fitted = counts > 1
+    squares = np.where(fitted, np.maximum(total - np.sum(explained[:, :-1], axis=1), 0.0), 0.0)
+    values = np.sum(right[:, :, -1:] * solution[:, :, :-1], axis=1)
+    return squares, values, np.where(fitted, explained[:, -1], np.inf)
 
 
 def jump_at(time: Array, angle: Array, instant: float, half: float) -> tuple[float, float, int] | None:

@@ -194,13 +194,13 @@ def read_delimited(path: Path) -> Recording:
     names, units = names_and_units(header)
     names = [name or f"column {number}" for number, name in enumerate(names, 1)]
     stated = {name: of_row or unit for name, of_row, unit in zip(names, unit_row, units, strict=True) if of_row or unit}
-    if (numbers := plain_numbers(lines[first - 1 :], delimiter, len(names))) is not None:
-        return build_recording(path, names, numbers, stated, {})
-    return table_of(path, names, (row for row in rows_of(lines, delimiter) if row[0] >= first), stated)
+    return table_of(path, names, lines, first, delimiter, stated)
 
 
 def plain_numbers(lines: Sequence[str], delimiter: str, count: int) -> Array | None:
     """Return the columns (count, samples) of a table whose cells are all plain numbers, or None for another table."""
+    if not any(map(str.strip, lines)):
+        return None
     try:
         values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
@@ -329,17 +329,23 @@ def names_and_units(header: Iterable[str]) -> tuple[list[str], list[str]]:
 def table_of(
     path: Path,
     names: Sequence[str],
-    rows: Iterable[Row],
+    lines: Sequence[str],
+    first: int,
+    delimiter: str,
     units: Mapping[str, str] = MappingProxyType({}),
     kind_units: Mapping[str, str] = MappingProxyType({}),
 ) -> Recording:
-    """Build a recording from rows of cells. Empty cells become nan, and a cell with text is a problem of its column.
+    """Build a recording from the lines of a table, whose rows begin in line `first`.
+
+    Empty cells become nan, and a cell with text is a problem of its column.
 
     Raises ConfigError for a row with too many or too few cells.
     """
+    if (plain := plain_numbers(lines[first - 1 :], delimiter, len(names))) is not None:
+        return build_recording(path, names, plain, units, kind_units)
     numbers = []
     table = []
-    for number, row in rows:
+    for number, row in (row for row in rows_of(lines, delimiter) if row[0] >= first):
         cells = trim_blank_end(row, len(names))
         if len(cells) != len(names):
             raise ConfigError(
@@ -504,12 +510,11 @@ def read_opensim(path: Path) -> Recording:
             f"{path} holds values of type {settings['datatype']}, not numbers.", "Export a table of type double."
         )
     names = split_at_tabs(lines[start].strip())
-    # the rows are counted, because their number in the header is often wrong
-    rows = ((number, cells) for number, cells in rows_of(lines, "\t") if number > start + 1)
     if "\t" not in lines[start]:
-        rows = ((number, " ".join(cells).split()) for number, cells in rows)
+        lines = ["\t".join(line.split()) for line in lines]
     units = {"length": "m", "time": "s", "angle": angle_unit(path, settings)}
-    table = table_of(path, names, rows, {}, {kind: unit for kind, unit in units.items() if unit})
+    # the rows are counted, because their number in the header is often wrong
+    table = table_of(path, names, lines, start + 2, "\t", {}, {kind: unit for kind, unit in units.items() if unit})
     return replace(table, levelled_by=SEGMENTS if table.columns.keys() >= SEGMENT_NAMES else "")
 
 
@@ -550,17 +555,17 @@ def read_markers(path: Path) -> Recording:
             f"{path} names {len(markers)} markers over the coordinates of {count}, and its NumMarkers is {stated}.",
             "Export it again as .trc, with a name for every marker.",
         )
-    rows = [(number, cells) for number, cells in rows_of(lines, "\t") if number > 5]
-    if not rows or not any(markers):
+    if not any(map(str.strip, lines[5:])) or not any(markers):
         raise ConfigError(f"{path} holds no markers.", "Export it again as .trc.")
     names = [*labels[:2], *coordinates(markers), *[""] * (3 * (count - len(markers)))]
     # some programs omit the tabs after the last marker that was seen
-    padded = ((number, cells + [""] * (len(names) - len(cells))) for number, cells in rows)
+    padded = [line + "\t" * (len(names) - 1 - line.count("\t")) if line.strip() else "" for line in lines]
     unit = settings.get("Units")
     by_sports2d = "Sports2D" in lines[0]
     # Sports2D states metres even in files whose coordinates are pixels
     in_pixels = by_sports2d and "_px" in lines[0]
-    table = table_of(path, names, padded, {}, {"time": "s", **({"length": unit} if unit and not in_pixels else {})})
+    kind_units = {"time": "s", **({"length": unit} if unit and not in_pixels else {})}
+    table = table_of(path, names, padded, 6, "\t", {}, kind_units)
     return replace(table, levelled_by="Sports2D" if by_sports2d and not in_pixels else "")
 
 

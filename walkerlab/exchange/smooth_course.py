@@ -16,7 +16,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.exchange.rate_jumps import WINDOW_AHEAD, Array, apart_runs, noise_of, typical_interval
+from walkerlab.exchange.rate_jumps import (
+    WINDOW_AHEAD,
+    Array,
+    apart_runs,
+    noise_of,
+    squares_around,
+    typical_interval,
+)
 
 HIGHEST_DEGREE: Final = 7  # degree of the polynomial through a step; its error is 0.1 mrad for straight legs
 SAMPLES_PER_DEGREE: Final = 3  # a step needs this many samples for each degree of its polynomial above 1
@@ -32,7 +39,6 @@ LASTING: Final = 0.15  # as `BORDER`, for lasting jumps
 LENGTHS: Final = 16  # number of lengths of a stretch that are tried first
 FIRST_TRIALS: Final = 25  # number of instants tried for a strike
 NEXT_TRIALS: Final = (9,)  # numbers of instants tried around the best
-ROUGH, FINE = 80, 400  # numbers of samples that suffice to find a strike in a smooth course
 STANDARD_ERRORS: Final = 7.0
 TYPICAL: Final = 6.0  # how much more a stretch must explain than those in typical steps
 TYPICAL_PERCENT: Final = 30
@@ -69,9 +75,9 @@ class Strike:
     step_s: float
     at_ends: tuple[bool, bool]  # whether the recording begins and ends with them
 
-    def fit(self, at: float, thinning: int = 1) -> tuple[Array, Array]:
+    def fit(self, at: float) -> tuple[Array, Array]:
         """Return the orthonormal basis (samples, columns) of polynomials that meet at an instant, and the residuals."""
-        t, y = self.time[::thinning] - at, self.angle[::thinning]
+        t = self.time - at
         columns = [np.ones((t.size, 1))]
         for side in (t < 0.0, t >= 0.0):
             degree = min(HIGHEST_DEGREE, 1 + int(np.sum(side)) // SAMPLES_PER_DEGREE)
@@ -79,18 +85,18 @@ class Strike:
             # repeated products take a tenth of the time of powers
             columns.append(np.multiply.accumulate(np.broadcast_to(t_side[:, None], (t_side.size, degree)), axis=1))
         basis = np.linalg.qr(np.concatenate(columns, axis=1))[0]
-        return basis, y - basis @ (basis.T @ y)
+        return basis, self.angle - basis @ (basis.T @ self.angle)
 
-    def instant(self, cost: Callable[[float], float], *counts: int) -> float:
+    def instant(self, costs_at: Callable[[Array], Array], *counts: int) -> float:
         """Return the instant (s) of the smallest cost. `counts` are numbers of trials, in ever smaller intervals."""
         begin, end = self.span_s
         for count in counts:
             trials = np.linspace(begin, end, count)
-            costs = [cost(at) for at in trials.tolist()]
+            costs = costs_at(trials)
             best = min(max(int(np.argmin(costs)), 1), count - 2)
             begin, middle, end = trials[best - 1 : best + 2].tolist()
         # the vertex of the parabola through the best trials
-        left, least, right = costs[best - 1 : best + 2]
+        left, least, right = costs[best - 1 : best + 2].tolist()
         bend = left - 2.0 * least + right
         move = 0.5 * (left - right) / bend if bend > 0.0 else 0.0
         return float(middle + min(1.0, max(-1.0, move)) * (end - middle))
@@ -98,21 +104,25 @@ class Strike:
     @cached_property
     def smooth_instant(self) -> float:
         """Instant (s) of the strike in a smooth course."""
-        return self.instant(self.cost_of(FINE), FIRST_TRIALS, *NEXT_TRIALS)
+        return self.instant(self.costs_at, FIRST_TRIALS, *NEXT_TRIALS)
 
     @property
     def rough_instant(self) -> float:
-        """Instant (s) of the strike in a smooth course, from fewer samples and trials."""
-        return self.instant(self.cost_of(ROUGH), FIRST_TRIALS)
+        """Instant (s) of the strike in a smooth course, from fewer trials."""
+        return self.instant(self.costs_at, FIRST_TRIALS)
 
-    def cost_of(self, samples: int) -> Callable[[float], float]:
-        """Return the squared residuals as a function of the instant, from about this number of samples."""
-        thinning = max(1, self.time.size // samples)
-        return lambda at: float(np.sum(self.fit(at, thinning)[1] ** 2))
+    @cached_property
+    def smooth_fit(self) -> tuple[Array, Array]:
+        """Basis and residuals of a smooth course."""
+        return self.fit(self.smooth_instant)
+
+    def costs_at(self, instants: Array) -> Array:
+        """Return the squared residuals of a smooth course for each instant of the strike."""
+        return squares_around(self.time, self.angle, instants, HIGHEST_DEGREE, SAMPLES_PER_DEGREE)
 
     def scatter(self) -> Array:
         """Return the residuals of the smooth course, scaled up for the part that the fit has followed."""
-        basis, residuals = self.fit(self.smooth_instant)
+        basis, residuals = self.smooth_fit
         free = 1.0 - np.sum(basis**2, axis=1)
         clear = free > SMALLEST_NORM
         return np.asarray(residuals[clear] / np.sqrt(free[clear])[:, None])
@@ -121,23 +131,22 @@ class Strike:
         """Return the stretch that minimises the squared residuals (rad^2) with the best strike, and the minimum."""
 
         def left(at: float) -> float:
-            return float(np.sum(self.fit(at)[1] ** 2)) - self.best_stretch(at).explained
+            parts = self.fit(at)
+            return float(np.sum(parts[1] ** 2)) - self.best_stretch(parts).explained
 
-        at = self.instant(left, 2 * FIRST_TRIALS, *NEXT_TRIALS)
-        return self.best_stretch(at), left(at)
+        at = self.instant(lambda instants: np.array([*map(left, instants.tolist())]), 2 * FIRST_TRIALS, *NEXT_TRIALS)
+        return self.best_stretch(self.fit(at)), left(at)
 
-    def best_stretch(self, at: float) -> Stretch:
-        """Return the stretch that explains most of the residuals of a strike at an instant."""
-        parts = self.fit(at)
+    def best_stretch(self, parts: tuple[Array, Array]) -> Stretch:
+        """Return the stretch that explains most of the residuals of a fit (basis and residuals)."""
         sums = [np.concatenate((np.zeros((1, part.shape[1])), np.cumsum(part, axis=0))) for part in parts]
         longest = max(1, int(np.searchsorted(self.time, self.time[0] + LONGEST * self.step_s)))
         lengths = np.unique(np.geomspace(1, longest, LENGTHS).astype(int))
         low, high = self.inner_samples(BORDER)
-        firsts = np.arange(low, high)
-        short = np.stack(np.broadcast_arrays(firsts[:, None], firsts[:, None] + lengths), axis=2).reshape(-1, 2)
+        short = np.concatenate([first_and_end(np.arange(low, high, max(1, n // 8)), n) for n in lengths.tolist()])
         inner = np.arange(*self.inner_samples(LASTING, whole=False))
         count = self.time.size
-        lasting = np.stack((inner, np.full(inner.size, count)), axis=1)
+        lasting = first_and_end(inner, count - inner)
         spans = np.concatenate((short[short[:, 1] <= high], lasting))
         first, end, leg = best_span(sums, spans)
         lasts = bool(np.any((lasting == (first, end)).all(axis=1)))
@@ -161,13 +170,18 @@ class Strike:
         return 0 if whole and self.at_ends[0] else int(first), self.time.size if whole and self.at_ends[1] else int(end)
 
 
+def first_and_end(first: NDArray[np.int64], length: int | NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the spans (spans, 2) that begin at these samples and have a length."""
+    return np.stack((first, first + length), axis=1)
+
+
 def parts_of(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return for spans (first, end) the squared part that a fit cannot follow, and the sums (spans, 2) of residuals.
 
     sums  cumulative sums of the fit's orthonormal basis and of its residuals
     """
     inside, share = (part[spans[:, 1]] - part[spans[:, 0]] for part in sums)
-    return np.diff(spans, axis=1)[:, 0] - np.sum(inside**2, axis=1), share
+    return np.diff(spans, axis=1)[:, 0] - np.vecdot(inside, inside), share
 
 
 def best_span(sums: Sequence[Array], spans: NDArray[np.int64]) -> tuple[int, int, int]:
@@ -194,7 +208,7 @@ def find_stretches(time: Array, angle: Array) -> list[Stretch]:
     if not sampled or np.max(np.diff(time)) > WIDEST_GAP * course.step_s:
         return found
     scatter = NORMAL * float(np.median(np.abs(np.concatenate([strike.scatter().ravel() for strike in strikes]))))
-    worst = [strike.best_stretch(strike.smooth_instant).explained for strike in strikes]
+    worst = [strike.best_stretch(strike.smooth_fit).explained for strike in strikes]
     limit = max((STANDARD_ERRORS * scatter) ** 2, TYPICAL * float(np.percentile(worst, TYPICAL_PERCENT)))
     # A false strike in one step makes the neighbouring steps look wrong as well.
     for index in np.argsort(worst)[::-1].tolist():
@@ -227,11 +241,10 @@ def stretches_near(course: Course, index: int, limit: float, smallest: float) ->
     def worst(others: Sequence[Stretch]) -> Stretch | None:
         """Return the worst stretch besides others, or None if it is within the limit."""
         strike = course.remove_stretches(others).strike(index)
-        smooth = strike.smooth_instant
-        if strike.best_stretch(smooth).explained <= SUSPECT * limit:
+        if strike.best_stretch(strike.smooth_fit).explained <= SUSPECT * limit:
             return None
         stretch, left = strike.best_with_strike()
-        explains = float(np.sum(strike.fit(smooth)[1] ** 2)) - left > limit
+        explains = float(np.sum(strike.smooth_fit[1] ** 2)) - left > limit
         if not explains or abs(stretch.offset_rad) < smallest:
             return None
         rows = strike.rows

@@ -8,19 +8,22 @@ the angles around the fit gives the standard error of that time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from walkerlab.exchange.rate_jumps import WINDOW, WINDOW_AHEAD, Array, typical_interval
+from walkerlab.exchange.rate_jumps import WINDOW, WINDOW_AHEAD, Array, squares_around, typical_interval
 
 Height = Callable[[Array], Array]
 
 DEGREES: Final = range(1, 7)
 """Degrees of the polynomials; the samples decide between them."""
+ALL_DEGREES: Final = (*DEGREES, DEGREES[-1] + 1)
+"""These degrees and one more, which shows the bias of the highest."""
 MIN_SAMPLES: Final = 6
 """A fit uses at least this many samples on each side of a heel strike, if the step has as many."""
 WIDEST: Final = 0.4  # longest time before and after a heel strike in a fit, as a fraction of the step period
@@ -46,7 +49,7 @@ SMALLEST: Final = 1e-30  # rad^2, added to sums of squares, of which logarithms 
 
 
 @dataclass(frozen=True)
-class Fit:
+class StrikeFit:
     """Polynomials through the angles of both legs before and after an instant, at which they meet."""
 
     angle: Array  # (2,) at the instant
@@ -69,7 +72,7 @@ class Touch:
     leg: int
     error_s: float
     fall_m_s: float
-    fit: Fit  # in s
+    fit: StrikeFit  # in s
 
 
 def find_touches(time: Array, angle: Array, height: Height) -> list[Touch]:
@@ -95,9 +98,11 @@ def candidates(time: Array, angle: Array, height: Height) -> list[tuple[float, i
     """Return the time and leg of each candidate heel strike, where the front foot comes down to the level of the rear
     one. Noise can produce several candidates for one strike.
     """
-    # A recording may end with a heel strike, so its last two samples are continued by half an interval.
-    time = np.append(time, 1.5 * time[-1] - 0.5 * time[-2])
-    angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[-2:-1], axis=0)
+    # A recording may end with a heel strike, perhaps with two samples at that instant, so it is continued by half the
+    # interval before.
+    before = int(np.searchsorted(time, time[-1] - 0.5 * float(np.median(np.diff(time))))) - 1
+    time = np.append(time, 1.5 * time[-1] - 0.5 * time[before])
+    angle = np.append(angle, 1.5 * angle[-1:] - 0.5 * angle[before : before + 1], axis=0)
     spread = angle[:, 0] - angle[:, 1]
     over = height(angle)
     apart = WINDOW_AHEAD * np.abs(spread).max()
@@ -133,9 +138,10 @@ def touch_at_start(time: Array, angle: Array, height: Height, period: float) -> 
         return None
     rows = time - begin <= WIDEST * period
     t, y = time[rows] - begin, angle[rows]
-    degree = best_degree(t, y, 0.0)
+    fits = fit_degrees(t, y, 0.0)
+    degree = best_degree(fits)
     # The best degree balances bias and scatter. One degree more keeps the bias within the standard error.
-    fit = fit_of_degree(t, y, 0.0, degree + 1) or fit_of_degree(t, y, 0.0, degree)
+    fit = fits.get(degree + 1) or fits.get(degree)
     touch = touch_of(fit, height, begin, int(spread[0] < 0.0)) if fit else None
     off = abs(float(height(touch.fit.angle[None])[0])) / touch.fall_m_s if touch and touch.fall_m_s > 0.0 else np.inf
     return touch if touch and touch.error_s < PRECISE_S and off <= ERRORS * touch.error_s else None
@@ -153,15 +159,20 @@ def locate_touch(time: Array, angle: Array, height: Height, near: float, leg: in
     touch = None
     for iteration in range(ITERATIONS):
         # The best degree shows only once the polynomials meet near the strike.
-        degree = best_degree(t, y, at) if iteration < DEGREE_ITERATIONS else degree
-        fit = fit_at(t, y, at, degree)
+        choosing = iteration < DEGREE_ITERATIONS
+        fits = fit_degrees(t, y, at, ALL_DEGREES if choosing else (degree, degree + 1))
+        degree = best_degree(fits) if choosing else degree
+        fit = fits.get(degree)
+        if fit is None or len(fit.rates) < SIDES:
+            # one degree more, where the instant is at the end of the samples
+            fit = fits.get(degree + 1) or fit
         touch = touch_of(fit, height, near + at, leg) if fit else None
         if touch is None or touch.fall_m_s <= 0.0:
             return None
         over = float(height(touch.fit.angle[None])[0]) * (-1.0 if leg else 1.0)
         correction = float(np.clip(over / touch.fall_m_s, -farthest, farthest))
         if iteration >= DEGREE_ITERATIONS and abs(correction) < LOCATED * touch.error_s:
-            return touch_of(add_bias(touch.fit, t, y, at, degree), height, near + at, leg)
+            return touch_of(add_bias(touch.fit, fits.get(degree), fits.get(degree + 1)), height, near + at, leg)
         at += correction
     # Samples that change sides keep moving the zero; it is then as uncertain as it moves.
     if touch is None or abs(correction) > max(touch.error_s, 0.5 * float(np.median(np.diff(t)))):
@@ -183,7 +194,7 @@ def rows_within(time: Array, instant: float, half: float) -> slice:
     return slice(int(np.searchsorted(time, instant - half)), int(np.searchsorted(time, instant + half, "right")))
 
 
-def touch_of(fit: Fit, height: Height, time: float, leg: int) -> Touch:
+def touch_of(fit: StrikeFit, height: Height, time: float, leg: int) -> Touch:
     """Return the heel strike of a leg at the time (s) of a fit."""
     small = 1e-6 * np.eye(2)
     values = height(np.concatenate((fit.angle + small, fit.angle - small)))
@@ -193,54 +204,73 @@ def touch_of(fit: Fit, height: Height, time: float, leg: int) -> Touch:
     return Touch(time, leg, float(error), slope if leg else -slope, fit)
 
 
-def best_degree(t: Array, y: Array, at: float) -> int:
+def best_degree(fits: Mapping[int, StrikeFit]) -> int:
     """Return the degree of the polynomials that describe the samples best."""
-    fits = {degree: fit for degree in DEGREES if (fit := fit_of_degree(t, y, at, degree)) is not None}
-    return min(fits, key=lambda degree: fits[degree].criterion, default=DEGREES[0])
+    return min((degree for degree in DEGREES if degree in fits), key=lambda d: fits[d].criterion, default=DEGREES[0])
 
 
-def fit_at(t: Array, y: Array, at: float, degree: int) -> Fit | None:
-    """Fit polynomials of a degree, or of one more on a single side, where an instant is at the end of the samples."""
-    fit = fit_of_degree(t, y, at, degree)
-    return fit if fit and len(fit.rates) == SIDES else fit_of_degree(t, y, at, degree + 1) or fit
-
-
-def add_bias(fit: Fit, t: Array, y: Array, at: float, degree: int) -> Fit:
+def add_bias(fit: StrikeFit, narrow: StrikeFit | None, wide: StrikeFit | None) -> StrikeFit:
     """Return a fit whose error includes the change due to one more degree, since the best one balances bias and
     scatter.
     """
-    narrow, wide = (fit_of_degree(t, y, at, each) for each in (degree, degree + 1))
     change = float(np.linalg.norm(wide.angle - narrow.angle)) if narrow and wide else 0.0
     return replace(fit, deviation=float(np.hypot(fit.deviation, change / len(fit.rates))))
 
 
-def fit_of_degree(t: Array, y: Array, at: float, degree: int) -> Fit | None:
-    """Fit polynomials before and after an instant that meet there, or return None if both sides have too few samples.
+def fit_degrees(t: Array, y: Array, at: float, degrees: Iterable[int] = ALL_DEGREES) -> dict[int, StrikeFit]:
+    """Fit polynomials of each degree (rising) before and after an instant, which meet there.
 
-    A side with too few samples, for example where a recording begins just before a strike, is not fitted, because
-    it would force a low degree on the other side.
+    A side with too few samples for a degree, for example where a recording begins just before a strike, is not fitted,
+    because it would force a low degree on the other side. A degree for which both sides have too few samples is absent.
     """
     both = {"before": t < at, "after": t >= at}
-    fewest = max(degree + 1, LOPSIDED * max(int(np.sum(side)) for side in both.values()))
-    sides = {name: side for name, side in both.items() if np.sum(side) >= fewest}
-    if not sides:
-        return None
-    used = np.any(list(sides.values()), axis=0)
+    counts = {name: int(np.sum(side)) for name, side in both.items()}
+    fits = dict[int, StrikeFit]()
+    by_sides: dict[tuple[str, ...], list[int]] = {}
+    for degree in degrees:
+        fewest = max(degree + 1, LOPSIDED * max(counts.values()))
+        names = tuple(name for name, count in counts.items() if count >= fewest)
+        if sum(counts[name] for name in names) > 1 + degree * len(names):
+            by_sides.setdefault(names, []).append(degree)
+    by_sides.pop((), None)
+    for names, alike in by_sides.items():
+        used = np.any([both[name] for name in names], axis=0)
+        fits |= fit_sides(t[used] - at, y[used], {name: both[name][used] for name in names}, alike)
+    return fits
+
+
+def fit_sides(
+    t: Array, y: Array, sides: Mapping[str, NDArray[np.bool_]], degrees: Sequence[int]
+) -> dict[int, StrikeFit]:
+    """Fit polynomials of each degree, on these sides of the time 0, which meet there.
+
+    Columns are in the order of the degrees, so that one factorisation serves all of them.
+    """
     scale = float(np.ptp(t))
-    powers = ((t - at) / scale)[:, None] ** np.arange(1, degree + 1)
-    basis = np.concatenate([np.ones((t.size, 1)), *(side[:, None] * powers for side in sides.values())], axis=1)[used]
-    count, columns = basis.shape
-    if count <= columns:
-        return None
+    powers = (t / scale)[:, None] ** np.arange(1, degrees[-1] + 1)
+    by_side = np.stack([side[:, None] * powers for side in sides.values()], axis=2)
+    basis = np.concatenate((np.ones((t.size, 1)), by_side.reshape(t.size, -1)), axis=1)
     orthonormal, triangle = np.linalg.qr(basis)
     inverse = np.linalg.inv(triangle)
-    coefficients = inverse @ (orthonormal.T @ y[used])
-    squares = float(np.sum((y[used] - basis @ coefficients) ** 2)) + SMALLEST
-    freedoms = 2 * (count - columns)
-    rates = {name: coefficients[1 + k * degree] / scale for k, name in enumerate(sides)}
-    deviation = float(np.sqrt(squares / freedoms) * np.linalg.norm(inverse[0]))
-    criterion = 2 * count * float(np.log(squares)) + 2 * columns * float(np.log(2 * count)) * count / (count - columns)
-    return Fit(coefficients[0], rates, squares, freedoms, deviation, criterion)
+    shares = orthonormal.T @ y
+    left = float(np.sum((y - orthonormal @ shares) ** 2)) + SMALLEST
+    # sums over the columns that a lower degree lacks, and over those that it has
+    missed = np.append(np.cumsum(np.sum(shares**2, axis=1)[::-1])[::-1], 0.0).tolist()
+    variances = np.cumsum(inverse[0] ** 2).tolist()
+    count = t.size
+    fits = {}
+    for degree in degrees:
+        columns = 1 + degree * len(sides)
+        coefficients = inverse[: 1 + len(sides), :columns] @ shares[:columns]
+        squares = left + missed[columns]
+        freedoms = 2 * (count - columns)
+        rates = {name: coefficients[1 + k] / scale for k, name in enumerate(sides)}
+        # standard deviation of Student's t, because few values determine the scatter only roughly
+        deviation = math.sqrt(squares / max(freedoms - 2, 1) * variances[columns - 1])
+        penalty = 2 * columns * math.log(2 * count) * count / (count - columns)
+        criterion = 2 * count * math.log(squares) + penalty
+        fits[degree] = StrikeFit(coefficients[0], rates, squares, freedoms, deviation, criterion)
+    return fits
 
 
 def angles_at_jumps(
@@ -258,25 +288,33 @@ def angles_at_jumps(
     inside = [touch for touch in touches if time[0] + half <= touch.time_s <= time[-1] - half][:MOST_JUMPS]
     near = [(touch.time_s, rows_within(time, touch.time_s, half)) for touch in inside]
 
-    def fits_at(shift: float) -> list[Fit]:
-        fits = (fit_of_degree(time[rows] - instant, angle[rows], shift, JUMP_DEGREE) for instant, rows in near)
+    shifts = np.linspace(-0.5, 0.5, SHIFTS) * half
+    for instant, rows in near:
+        after = np.searchsorted(time[rows] - instant, shifts)
+        fewer, more = np.sort((after, time[rows].size - after), axis=0)
+        shifts = shifts[fewer >= np.maximum(JUMP_DEGREE + 1, LOPSIDED * more)]
+    if not near or not np.any(shifts == 0.0):
+        return None
+    squares = np.sum(
+        [squares_around(time[rows] - instant, angle[rows], shifts, JUMP_DEGREE) for instant, rows in near], axis=0
+    )
+    index = int(np.argmin(squares))
+    least = float(squares[index])
+
+    def fits_at(shift: float) -> list[StrikeFit]:
+        fits = (
+            fit_degrees(time[rows] - instant, angle[rows], shift, [JUMP_DEGREE]).get(JUMP_DEGREE)
+            for instant, rows in near
+        )
         return [fit for fit in fits if fit is not None and len(fit.rates) == SIDES]
 
-    trials = {shift: fits_at(shift) for shift in (np.linspace(-0.5, 0.5, SHIFTS) * half).tolist()}
-    squares = {shift: sum(fit.squares for fit in fits) for shift, fits in trials.items() if len(fits) == len(inside)}
-    shifts = list(squares)
-    if not inside or 0.0 not in squares:
-        return None
-    index = min(range(len(shifts)), key=lambda k: squares[shifts[k]])
-    best = shifts[index]
-    least = squares[shifts[index]]
-    variance = least / sum(fit.freedoms for fit in trials[best])
-    if squares[0.0] - least <= errors**2 * variance or not 0 < index < len(shifts) - 1:
+    variance = least / sum(fit.freedoms for fit in fits_at(float(shifts[index])))
+    if squares[shifts == 0.0][0] - least <= errors**2 * variance or not 0 < index < shifts.size - 1:
         return None
     # the smallest residuals between three trials, by a parabola
-    before, after = squares[shifts[index - 1]], squares[shifts[index + 1]]
-    best += 0.5 * (before - after) / (before - 2.0 * least + after) * (shifts[index + 1] - best)
+    before, after = squares[[index - 1, index + 1]].tolist()
+    best = float(shifts[index] + 0.5 * (before - after) / (before - 2.0 * least + after) * (shifts[1] - shifts[0]))
     fits = fits_at(best)
-    if abs(best) <= PRECISE_S or len(fits) < len(inside):
+    if abs(best) <= PRECISE_S or len(fits) < len(near):
         return None
     return best, np.array([fit.angle for fit in fits]), np.array([touch.leg for touch in inside])

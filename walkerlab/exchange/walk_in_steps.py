@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -25,7 +26,7 @@ from walkerlab.physics.mechanics.rigid_model import (
     SWING,
     RigidModel,
     apply_couplings,
-    feet_on_slope,
+    compute_in_turns,
     step_lengths,
 )
 
@@ -55,6 +56,7 @@ LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
 COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
 CONSTANT: Final = 0.25  # largest scatter of a constant error over a step, as a fraction of it
+SMALLEST: Final = 1e-30  # m, distance by which it is divided
 SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
 
 
@@ -86,17 +88,15 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     angle = legs(walk)
     refuse_noise(angle, source)
 
-    def total(angles: Array) -> Array:
-        return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
-
     def height(angles: Array) -> Array:
-        """Height (m) of leg 0's foot over leg 1's, normal to the slope, for straight legs of equal length."""
-        half = 0.5 * (total(angles) - touch_sum_rad)
-        return np.asarray(2.0 * model.leg_length * np.sin(half) * np.sin(0.5 * (angles[:, 0] - angles[:, 1])))
+        """Height (m) of leg 0's foot over leg 1's, normal to the slope, for straight legs."""
+        return np.asarray(hips_apart(model, angles - 0.5 * touch_sum_rad).real + rise_of_soles(model))
 
     touches = find_touches(walk.time_s, angle, height)
     refuse_gaps(walk, [touch.time_s for touch in touches], source)
     touches, doubts = longest_walk(touches)
+    if model.legs_differ and len(touches) > 1 and touches[1].leg == 1:
+        touches = touches[1:]  # as in computed walks, leg 1 swings first
     if len(touches) < 2:
         raise ConfigError(
             f"{source} holds no complete step; heel strikes found: {len(touches)}; the largest angle is "
@@ -116,16 +116,41 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
     return scale_to_belt(walk, steps if offsets else add_clock_doubt(steps, model))
 
 
+def hips_apart(model: RigidModel, angles: Array) -> NDArray[np.complex128]:
+    """Return the vectors (samples,) in m from the hip over leg 0's foot centre to that over leg 1's, normal + i along.
+
+    angles  (samples, 2) of straight legs, from the vertical
+    """
+    levers = [
+        (each.hip_y - 1j * each.hip_x) * np.exp(1j * (angles[:, leg] + model.slope))
+        for leg, each in enumerate((model.exchanged, model))
+    ]
+    return np.asarray(levers[1] - levers[0])
+
+
+def rise_of_soles(model: RigidModel) -> float:
+    """Return the radius of leg 1's foot minus that of leg 0's (m). Leg 0 stands in the exchanged model."""
+    return float(model.radius - model.exchanged.radius)
+
+
+def sum_over_level(model: RigidModel, angles: Array) -> Array:
+    """Return the sums (samples,) of the angles of straight legs minus their sum with both feet on the slope (rad).
+
+    For legs that are alike, these are the sums of the angles from the slope's normal.
+    """
+    apart = hips_apart(model, angles)
+    direction = np.angle(apart)
+    level = np.arccos(np.clip(-rise_of_soles(model) / np.maximum(np.abs(apart), SMALLEST), -1.0, 1.0))
+    return np.asarray(2.0 * (direction - np.sign(direction) * level))
+
+
 def find_tilt(walk: RecordedWalk, model: RigidModel) -> float:
     """Return the forward lean (rad) from the vertical of the direction from which angles are measured.
 
     It follows from the angles at heel strikes, where the leg rates jump and both feet are on the floor.
     """
     angle = legs(walk)
-
-    def total(angles: Array) -> Array:
-        return np.asarray(feet_on_slope(model, angles[:, 0], angles[:, 1]))
-
+    total = partial(sum_over_level, model)
     sum_rad = next(iter(sums_at_jumps(walk.time_s, angle, total)), 0.0)
 
     def height(angles: Array) -> Array:
@@ -166,10 +191,12 @@ def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     """
     if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
         return steps
+    first = model.exchanged if steps.swapped else model
     order = np.where(steps.step[:, None] % 2 == 0, [0, 1], [1, 0])
     angles, rates = (np.take_along_axis(each, order, axis=1) for each in (steps.angle_rad, steps.velocity_rad_s))
     energy, ahead, behind = (
-        energies(model, np.concatenate((angles + turn, rates), axis=1)) for turn in (0.0, TURN_RAD, -TURN_RAD)
+        compute_in_turns(first, steps.step, energies, np.concatenate((angles + turn, rates), axis=1))
+        for turn in (0.0, TURN_RAD, -TURN_RAD)
     )
     turning = (ahead[:, 1] - behind[:, 1]) / (2.0 * TURN_RAD)
     columns = np.column_stack((energy, turning))
@@ -204,7 +231,9 @@ def longest_walk(touches: list[Touch]) -> tuple[list[Touch], list[str]]:
 
 def knee_doubts(walk: RecordedWalk, touches: list[Touch], model: RigidModel) -> Iterator[str]:
     """Yield a sentence for each leg of a kneed walker whose angle may not be that of the thigh."""
-    for leg, name in enumerate(("angle 1", "angle 2") if model.kneed else ()):
+    for leg, name in enumerate(("angle 1", "angle 2")):
+        if not (model, model.exchanged)[leg].kneed:
+            continue
         farthest = float(np.percentile(walk.quantities[name], 1)) + model.slope
         thigh = "for a kneed walker it must be the angle of the thigh, from hip to knee"
         if name in walk.lines:
@@ -240,7 +269,7 @@ def mismatch(time: Array, angle: Array, touches: list[Touch], model: RigidModel,
     all_jumps = angles_at_jumps(time, angle, touches, period)
     jumps = [all_jumps, *(angles_at_jumps(time, angle, side, period, SIDE_ERRORS) for side in sides)]
     shift = max((jump[0] for jump in jumps if jump), key=abs, default=0.0)
-    sums = np.mean(feet_on_slope(model, *all_jumps[1].T)) - touch_sum_rad if all_jumps else 0.0
+    sums = np.mean(sum_over_level(model, all_jumps[1])) - touch_sum_rad if all_jumps else 0.0
     spreads = [np.array([abs(touch.fit.angle[0] - touch.fit.angle[1]) for touch in side]) for side in sides]
     periods = np.diff([touch.time_s for touch in touches])
     lengths = [2.0 * model.leg_length * math.sin(0.5 * float(np.mean(each))) for each in spreads if each.size]
@@ -407,7 +436,7 @@ def build_steps(walk: RecordedWalk, model: RigidModel, touches: list[Touch], dou
                 velocities[row] = rates[order]
     step = np.repeat(np.arange(len(pieces)), [piece[0].size for piece in pieces])
     times_s, angles_rad, velocities_rad_s = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    lengths = lengths_of(model, angles_rad, step, len(times))
+    lengths = lengths_of(model.exchanged if swapped else model, angles_rad, step, len(times))
     scatter = float(np.median([touch.fit.scatter for touch in touches[1:]]))
     errors = np.array([touch.error_s for touch in touches])
     return RecordedSteps(
@@ -460,7 +489,10 @@ def spline_through(time: Array, columns: Array) -> BSpline:
 
 
 def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: int) -> Array:
-    """Return the step lengths (m) from the leg angles at the beginning and end of each step."""
+    """Return the step lengths (m) from the leg angles at the beginning and end of each step.
+
+    model  the one of the first step
+    """
     n = len(model.arm_x)
     states = np.zeros((2, count, 2 * n))
     for number in range(count):
@@ -470,4 +502,4 @@ def lengths_of(model: RigidModel, angle: Array, step: NDArray[np.int64], count: 
             bodies = np.zeros(n)
             bodies[SWING], bodies[STANCE] = angle[row, swing], angle[row, stance]
             states[end, number, :n] = apply_couplings(model, STRAIGHT, bodies)
-    return step_lengths(model, *states)
+    return compute_in_turns(model, np.arange(count), step_lengths, *states)

@@ -80,6 +80,7 @@ def missing_members(law: type, kind: LawKind) -> list[str]:
     """List what a law's class lacks: members of its protocol, and registered cases of functions."""
     members = [name for name in vars(kind.protocol) if not name.startswith("_")]
     missing = [name for name in members if not hasattr(law, name)]
+    # A law with one of these functions needs the others: events that are counted must also be sampled.
     together = kind.together if any(law in function for function in kind.together) else ()
     cases = [function for function in (*kind.required, *together) if law not in function]
     return missing + [f"a case @{function.__name__}.case({law.__name__})" for function in cases]
@@ -87,7 +88,8 @@ def missing_members(law: type, kind: LawKind) -> list[str]:
 
 BUDGET_PER_STEP = 1_000_000  # right-hand-side evaluations
 SAMPLES_PER_PENDULUM_TIME = 200  # sampling rate of stored walks
-GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)  # derivatives of a radau5 step are exact
+# The derivatives of a radau5 step are exact.
+GAIT_TOLERANCES = Tolerances("radau5", 1e-10, 1e-12, 10_000_000)
 FULL_STOP_DAMPING = 1e-5  # rad, penetration at which a compliant knee stop reaches full damping
 
 
@@ -162,6 +164,7 @@ def scene_on_pads(
             raise NoAnswer(f"no contact gait to lay the pads for: {search.reason}", search.advice)
         pitch = float(search.gait.lengths_m.mean())
         if len(search.gait.steps) > 1:
+            # Pads lie where the feet touch, and these distances differ from those between sections.
             first, second = lengths_between_touches(search.gait)
             asymmetry = float((second - first) / pitch)
     return contact_scene(config, rigid_step, pitch, asymmetry)
@@ -178,6 +181,7 @@ def knee_rules(walker: AnyWalker) -> KneeRules:
     if not isinstance(walker, Kneed | AssembledWalker):
         return KneeRules()
     knee = walker.knee
+    # A knee that is free in the rigid strike must not be rigid while the leading foot sinks in.
     at_touch = knee.release == "touch" or knee.at_heel_strike == "free"
     if knee.lock == "ideal":
         return KneeRules(release_at_touch=at_touch)
@@ -203,6 +207,7 @@ def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state:
 
     rigid_step_length_m  initial pad pitch
     """
+    # A gait has no pinned step, and the search replaces this pitch by the gait's step length.
     scene = replace(contact_scene(config, rigid_step_length_m, rigid_step_length_m), pinned=False)
     start = start_state(scene, rigid_state)
     legs_differ = have_different_legs(config)
@@ -262,6 +267,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
     velocity is then changed so that it rolls without slip.
     """
     walker = scene.walker
+    # The bodies of a straight leg turn as one in the rigid model; here each has its own angle.
     members = group_bodies(scene.assembly).members
     parts = np.array(rigid_state).reshape(2, members.shape[1])
     turned = parts @ members.T
@@ -275,6 +281,7 @@ def start_state(scene: ContactScene, rigid_state: State) -> State:
 
 def stance_equilibrium(scene: ContactScene) -> RestingFoot:
     walker = scene.walker
+    # By definition, the static penetration is that under the whole weight, not under its part normal to the slope.
     return walker.normal.resting_foot(walker.mass * walker.gravity, walker.mass)
 
 

@@ -23,7 +23,8 @@ from walkerlab.scene.parameter import SLOPE, Parameter
 from walkerlab.scene.rigid import rigid_walker
 
 SLOPE_FACTORS = (0.7, 1.5, 2.3, 0.35, 0.1)  # slopes to try in this order, relative to the config's slope
-COMMON_SLOPES = (0.03, 0.12)  # rad; most walkers that have gaits have them on these slopes
+# rad; most walkers that have gaits have them on these slopes
+COMMON_SLOPES = (0.03, 0.12)
 # rad; the steepest slope to which gaits are followed lies between these
 MIN_FOLLOWED_TO = 0.2
 MAX_FOLLOWED_TO = 0.35
@@ -54,6 +55,7 @@ def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
     span = ValueSpan(0.02 * slope, min(MAX_FOLLOWED_TO, max(3.0 * slope, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
     for value in (*(factor * slope for factor in SLOPE_FACTORS), *COMMON_SLOPES):
+        # A search is slow, so it stops at the first stable gaits.
         if value in span and not any(candidate.stable for candidate in ranges):
             ranges += walkable_ranges(follow(SLOPE.vary(config, rigid_walker), span, value))
     return min(ranges, key=lambda r: (r.stable is None, distance(r.stable or r.slopes, slope)), default=None)
@@ -77,6 +79,7 @@ def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
     part.
     """
     for branch in branches:
+        # The first monitor of the rigid model is the minimum normal force.
         good = [point for point in branch.points if point.monitors[0] >= 0.0]
         if len(good) < 2:
             continue
@@ -139,6 +142,7 @@ def find_gait_with_feet_ahead(config: Config) -> tuple[float, RigidGait] | None:
 def feet_ahead(config: Config) -> tuple[float, ...]:
     if not isinstance(config.walker, Kneed):
         return ()
+    # Rounded as in the suggested command, so that the command gives the same gait.
     return tuple(float(f"{share * config.walker.leg_length_m:.3g}") for share in FOOT_SHARES)
 
 

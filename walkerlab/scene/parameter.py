@@ -50,6 +50,7 @@ class Parameter:
         except ValidationError as error:
             first = error.errors()[0]
             (*_, name), reason = first["loc"], first["msg"]
+            # The schema's limits are in radians.
             if self.key == SLOPE_DEG and first["type"] in ("less_than", "greater_than"):
                 reason = "Input should be between -90 and 90, both excluded"
             subject = "it" if name == self.path[-1] else name
@@ -83,6 +84,7 @@ def _changed(config: ContactConfig, parameters: Sequence[Parameter], values: Seq
     for parameter, value in zip(parameters, values, strict=True):
         block = data
         for name in parameter.path[:-1]:
+            # A second leg like the first has no block of its own yet.
             block[name] = block.get(name) or {}
             block = block[name]
         block[parameter.path[-1]] = math.radians(value) if parameter.key == SLOPE_DEG else value
@@ -95,13 +97,27 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
     """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg."""
     value = fields.value_at(config, path)
-    return fields.value_at(config, [name for name in path if name != SECOND_LEG]) if value is None else value
+    return fields.value_at(config, first_leg_path(path)) if value is None else value
+
+
+def first_leg_path(path: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the path of leg 1's key for that of a key of leg 2, or the path itself for other keys."""
+    return tuple(name for name in path if name != SECOND_LEG)
+
+
+def mass_of_second_leg(config: ContactConfig) -> str | None:
+    """Return the first key of a mass of leg 2, or None for a type of walker without such keys."""
+    paths = (
+        path for path, _ in fields.leaves(Config, held=config) if SECOND_LEG in path and path[-1].endswith("mass_kg")
+    )
+    return next(map(".".join, paths), None)
 
 
 def _keys_set(value: Any) -> Any:
     if not isinstance(value, fields.Block):
         return value
     keys = value.model_dump(exclude_unset=True)
+    # The type is needed even where it is a default, because it decides which keys a block has.
     return {**keys, "type": value.type} if hasattr(value, "type") else keys
 
 
@@ -119,9 +135,7 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in fields.leaves(Config, held=config)}
-    # `identify` does not support legs that differ; all others may vary a key that leg 2 takes from leg 1.
-    left_out = SECOND_LEG in key.split(".") and asker[:1] != ("identify",)
-    reason = why_no_parameter(key, config, own, stated_value if left_out else fields.value_at)
+    reason = why_no_parameter(key, config, own, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
     unit = fields.annotation_of(own[key], "unit") or "1"

@@ -88,6 +88,7 @@ def add_drives(passive: RigidModel, config: RigidConfig) -> RigidModel:
         {"push_off": push} | ({"knees": drives.knees[leg]} if drives.knees else {})
         for leg, push in enumerate(drives.push_offs)
     ]
+    # Equal drives leave equal legs a single model.
     if legs[0] == legs[1]:
         return driven.changed(**legs[0])
     return pair(*(replace_fields(model, leg) for model, leg in zip((driven, driven.exchanged), legs, strict=True)))
@@ -109,16 +110,6 @@ def level_walker(walker: Walker, gravity: float) -> RigidModel:
 
 def have_different_legs(config: RigidConfig) -> bool:
     return rigid_walker(config).legs_differ
-
-
-def refuse_different_legs(config: RigidConfig, request: str) -> None:
-    """Raise ConfigError for a request that needs two equal legs, if those of the config's walker differ."""
-    if have_different_legs(config):
-        raise ConfigError(
-            f"{request} needs two equal legs, but those of this walker differ.",
-            "Leave out walker.leg_2, or run `walkerlab report`, which shows the walk of legs that differ.",
-            ("walker",),
-        )
 
 
 def state_names(config: RigidConfig) -> tuple[str, ...]:

@@ -62,6 +62,7 @@ def contact_map(config: ContactConfig, parameter: Parameter, scale: float, step_
 
 
 def model_differs(model: str, config: ContactConfig, parameter: Parameter, values: tuple[float, float]) -> bool:
+    # Any step length will do to see whether two scenes differ.
     make: Callable[[ContactConfig], Any] = rigid_walker if model == "rigid" else scene_for(1.0)
     first, last = ([*iterate_values(parameter.vary(config, make)(value))] for value in values)
     return len(first) != len(last) or not all(map(np.array_equal, first, last))
@@ -133,6 +134,12 @@ class ModelUnderTest:
         ]
 
     @property
+    def first_leg(self) -> int:
+        """Leg (1 or 2) that swings in the first complete step from the gait's section."""
+        # On the contact model's section leg 1 has begun its swing, so the first complete step is that of leg 2.
+        return 1 if self.model == RIGID else 2
+
+    @property
     def units(self) -> Units:
         return unit_walker(rigid_walker(self.config))[1]
 
@@ -165,6 +172,7 @@ def find_model_gait(
     # Imported late, because the rigid model does not need it.
     from walkerlab.scene.contact import gait_off_pads, require_contact
 
+    # The scene's config may hold only the keys that a stage reads; the search copies a complete one.
     scene_config = SLOPE.config_at(config, config.slope_rad)
     assert scene_config is not None, "the slope of the config is always possible"
     answer = gait_off_pads(scene_config, length, as_state(gait["state"]))

@@ -14,7 +14,7 @@ from walkerlab.pipeline.plan.graph import PIPELINE
 from walkerlab.pipeline.plan.results import Keys
 from walkerlab.pipeline.progress import Silent
 from walkerlab.pipeline.stages import fixedpoint, identify, simulate
-from walkerlab.pipeline.stages.measured_walk import NO_FILE, digests, read_measured
+from walkerlab.pipeline.stages.measured_walk import NO_FILE, MeasuredFile, digests
 from walkerlab.views.cli.main import program
 from walkerlab.views.figures.stage import FIGURES
 from walkerlab.views.report.answers import answer
@@ -157,7 +157,7 @@ def test_columns_and_units_are_mapped(table, tmp_path):
     columns = 'identify.columns={period_s: T, length_m: "stride"}'
     changes = ask(path, "identify.fit={slope_deg: null}", columns, "identify.units={period_s: ms}")
     config = taken(*changes)
-    steps = read_measured(config.identify, config)
+    steps = next(MeasuredFile(config.identify, config).divisions())
     assert np.allclose(np.column_stack((steps.periods_s, steps.lengths_m)), 1e-3 * rows)
 
 
@@ -181,7 +181,7 @@ def test_sampled_angles_are_divided_at_their_heel_strikes(transient, tmp_path):
     lines = (f"{t!r},{a!r},{b!r}" for t, (a, b) in zip(time[rising].tolist(), angle[rising].tolist(), strict=True))
     path.write_text("time (s),angle 1 (rad),angle 2 (rad)\n" + "\n".join(lines))
     config = taken(*ask(path, "identify.level=angles", "identify.fit={slope_deg: null}"))
-    measured = read_measured(config.identify, config)
+    measured = next(MeasuredFile(config.identify, config).divisions())
     expected = transient.groups["steps"]["period_s"][:-1][-measured.count :]
     assert measured.count >= 18
     assert np.allclose(measured.periods_s, expected, atol=2e-4)
@@ -283,7 +283,7 @@ def test_randomly_damaged_file_is_read_or_rejected(level, tmp_path):
     for _ in range(100):
         path.write_bytes(damaged(text, rng))
         try:
-            counts.append(read_measured(config.identify, config).count)
+            counts.append(next(MeasuredFile(config.identify, config).divisions()).count)
         except ConfigError as error:
             problems.append(error)
     assert all(count >= 2 for count in counts)
@@ -319,7 +319,7 @@ def test_report_section_begins_with_the_estimates(identified):
 def test_table_of_periods_alone_is_read(tmp_path):
     path = tmp_path / "stopwatch.csv"
     path.write_text("period_s\n0.70\n0.71\n0.70\n")
-    measured = read_measured(taken(*ask(path)).identify, taken())
+    measured = next(MeasuredFile(taken(*ask(path)).identify, taken()).divisions())
     assert measured.periods_s.tolist() == [0.70, 0.71, 0.70]
     assert measured.lengths_m is None
 
@@ -434,7 +434,7 @@ def test_noise_is_at_least_the_rounding_of_the_file(tmp_path, gait):
     path = tmp_path / "stopwatch.csv"
     path.write_text("T [ms]\n" + "\n".join(["730", "740", "730", "740", "730", "740"]))
     changes = ask(path, "identify.columns={period_s: T}", "identify.units={time: ms}", "identify.fit={slope_deg: null}")
-    measured = read_measured(taken(*changes).identify, taken())
+    measured = next(MeasuredFile(taken(*changes).identify, taken()).divisions())
     assert measured.resolution == {"step_period_s": pytest.approx(0.001)}
     summary = identify.run(taken(*changes), gait, Silent()).summary
     assert summary["noise"]["measurement"]["step_period_s"] >= 0.001 / np.sqrt(12.0) * (1.0 - 1e-9)
@@ -445,7 +445,7 @@ def test_angles_in_degrees_are_rounded_to_their_last_digit(tmp_path, transient):
     time, *angles = np.loadtxt(path, delimiter=",", skiprows=1).T
     rows = "\n".join(f"{t:.3f},{a:.1f},{b:.1f}" for t, a, b in zip(time, *np.degrees(angles), strict=True))
     path.write_text(f"time (s),angle 1 (deg),angle 2 (deg)\n{rows}")
-    measured = read_measured(taken(*ask(path, "identify.level=angles")).identify, taken())
+    measured = next(MeasuredFile(taken(*ask(path, "identify.level=angles")).identify, taken()).divisions())
     assert measured.resolution == {"angle_rad": pytest.approx(np.radians(0.1), rel=1e-6)}
 
 

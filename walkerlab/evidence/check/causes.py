@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 from typing import NamedTuple
 
 from walkerlab.config.fields import Block, short_number
@@ -18,7 +18,6 @@ from walkerlab.evidence.check.conventions import GRAVITIES
 from walkerlab.evidence.check.gaits import plain_walker
 from walkerlab.evidence.check.plain_walker import BENT, SHANK, STANCE, STRAIGHT, SWING, PlainWalker
 
-NAMES = {SWING: "swing leg", STANCE: "stance leg", SHANK: "swing shank"}
 EXTRA_TERMS = {
     (1.0, 0.0): "the trailing leg's rate",
     (0.0, 1.0): "the leading leg's rate",
@@ -78,15 +77,18 @@ def generate_mistakes(right: PlainWalker) -> Iterator[Candidate]:
 def wrong_signs(kneed: bool) -> Iterator[tuple[str, dict[tuple[str, int, int], float]]]:
     """Yield wrong signs of velocity terms in the equations of motion: their description and the factors."""
     for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
-        bodies = (SWING, STANCE, SHANK) if phase == BENT else (SWING, STANCE)
         when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
-        for row in bodies:
-            for column in bodies:
-                if row != column:
-                    term = f"the term of the {NAMES[column]}'s squared rate in the equation of the {NAMES[row]}"
-                    yield f"{term} has the wrong sign{when}", {(phase, row, column): -1.0}
-        everything = {(phase, row, column): -1.0 for row in range(4) for column in range(4)}
-        yield f"all velocity terms have the wrong sign{when}", everything
+        bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}
+        if phase == BENT:
+            bodies |= {"swing leg": (SWING,), "swing shank": (SHANK,)}
+        for (row, rows), (column, columns) in permutations(bodies.items(), 2):
+            signs = {(phase, k, l): -1.0 for k in rows for l in columns}
+            yield (
+                f"the term of the {column}'s squared rate in the equation of the {row} has the wrong sign{when}",
+                signs,
+            )
+        signs = {(phase, row, column): -1.0 for row in range(4) for column in range(4)}
+        yield f"all velocity terms have the wrong sign{when}", signs
 
 
 def generate_families(right: PlainWalker) -> Iterator[MistakeFamily]:
@@ -135,7 +137,7 @@ def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | No
     if key == GRAVITY:
         return replace(plain_walker(config), gravity=value) if value > 0.0 else None
     walker = plain_walker(config, with_inner(config.walker, key.removeprefix("walker."), value))
-    turns = all(part.inertia + part.mass * abs(part.centre) ** 2 > 0.0 for part in walker.parts)
+    turns = all(part.inertia + part.mass * abs(part.centre) ** 2 > 0.0 for part in walker.parts[: 1 + walker.kneed])
     return walker if turns and walker.leg_length > walker.radius >= 0.0 else None
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product, starmap
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from walkerlab.config.check import Check, Instant
 from walkerlab.errors import ConfigError
@@ -22,53 +23,79 @@ from walkerlab.evidence.check.plain_walker import (
     PlainStep,
     PlainWalker,
 )
+from walkerlab.evidence.check.printed import Item
 
 BODIES: Final = {"swing": SWING, "stance": STANCE, "shank": SHANK}
 DEFAULT_ORDERS: Final = {2: ("stance",), 4: ("swing", "stance"), 6: ("swing", "stance", "shank")}
 GRAVITIES: Final = (1.0, 9.8, 9.81, 10.0)
 SCALED: Final = "sqrt(L/g)"
+RAD_IN_DEG: Final = math.degrees(1.0)
 FEET_DIGITS = 5.0  # largest distance of the feet from the slope, in units of the last digit
+CHOICES: Final[Mapping[str, tuple[str, Mapping[Any, str]]]] = {
+    "origin": ("angles are measured from {}", {"vertical": "the vertical", "slope-normal": "the slope’s normal"}),
+    "second": ("the second angle is {}", {
+        "absolute": "absolute", "relative": "relative, swing leg minus stance leg",
+        "stance-minus-swing": "relative, stance leg minus swing leg",
+    }),
+    "unit": ("angles are in {}", {"rad": "radians", "deg": "degrees"}),
+    "positive": ("positive angles turn {}", {turn: turn for turn in ("counter-clockwise", "clockwise")}),
+    "order": ("the order is {}", {
+        order: ", ".join(order) for count in (1, 2, 3) for order in permutations(BODIES, count)
+    }),
+    "layout": ("{}", {
+        "angles-first": "the rates follow all angles", "interleaved": "each rate follows its angle",
+    }),
+    "instant": ("the state is that {}", {
+        "after-strike": "just after the heel strike", "before-strike": "just before the heel strike",
+        "mid-stance": "in mid-stance",
+    }),
+    "steps": ("period, length and multipliers are those of {}", {1: "a step", 2: "a stride, which has two steps"}),
+    "time": ("{}", {
+        "": "time is in seconds", SCALED: "time is in units of sqrt(L/g)",
+        **{f"{gravity:g}": f"gravity is {gravity:g} m/s²" for gravity in GRAVITIES},
+    }),
+}  # fmt: skip
+"""Conventions: for each, a sentence about it, and the words for its values."""
 
 
 @dataclass(frozen=True)
 class Convention:
-    """Conventions that determine the meaning of a printed state and of printed times."""
+    """Conventions that determine the meaning of a printed state and of printed times. `CHOICES` has their values."""
 
-    origin: str  # vertical or slope-normal
-    second: str  # absolute, relative or stance-minus-swing
-    unit: str  # rad or deg
-    positive: str  # counter-clockwise or clockwise
-    order: tuple[str, ...]  # bodies
-    layout: str  # angles-first or interleaved
+    origin: str
+    second: str
+    unit: str
+    positive: str
+    order: tuple[str, ...]
+    layout: str
     instant: Instant
-    time: str = ""  # sqrt(L/g), or the gravity that was used; empty for the config's
     steps: int = 1  # steps that a printed period, length or multiplier belongs to
+    time: str = ""  # unit of time, or the gravity that was used; empty for the config's
 
     def rows(self, bodies: int) -> Floats:
         """Return the matrix (printed angles, bodies) from absolute angles to printed ones, without their origin."""
-        sign = (1.0 if self.positive == "counter-clockwise" else -1.0) * (
-            math.degrees(1.0) if self.unit == "deg" else 1.0
-        )
-        K = np.zeros((len(self.order), bodies))
+        K = np.eye(bodies)[[BODIES[body] for body in self.order]]
+        second = (1.0, -1.0) if self.second == "relative" else (-1.0, 1.0)
         for row, body in enumerate(self.order):
-            K[row, BODIES[body]] = sign
-            if self.second == "absolute" or row == 0:
-                continue
-            if body == "shank":
-                K[row, SWING] = -sign
-            else:
-                K[row, SWING], K[row, STANCE] = sign, -sign
-                K[row] *= -1.0 if self.second == "stance-minus-swing" else 1.0
-        return K
+            if row and self.second != "absolute":
+                K[row, :2] = (-1.0, 0.0) if body == "shank" else second
+        return K * (1.0 if self.positive == "counter-clockwise" else -1.0) * (RAD_IN_DEG if self.unit == "deg" else 1.0)
+
+    def arrange(self, pairs: NDArray[Any]) -> list[Any]:
+        """Return angles and rates, or their names (2, bodies), in the order in which they are printed."""
+        return list((pairs.T if self.layout == "interleaved" else pairs).ravel().tolist())
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the numbers of a printed state."""
+        return self.arrange(np.array([[f"{body}_{kind}" for body in self.order] for kind in ("angle", "rate")]))
 
     def write(self, walker: PlainWalker, state: Floats) -> list[float]:
         """Return the printed numbers of a state: absolute angles from the slope's normal, then rates, of all bodies."""
-        n = len(state) // 2
-        K = self.rows(n)
-        angles = K @ (state[:n] - (walker.slope if self.origin == "vertical" else 0.0))
-        rates = K @ state[n:] * self.rate_factor(walker)
-        pairs = np.stack((angles, rates))
-        return list((pairs.T if self.layout == "interleaved" else pairs).ravel().tolist())
+        angles, rates = np.reshape(state, (2, -1))
+        K = self.rows(len(angles))
+        tilt = walker.slope if self.origin == "vertical" else 0.0
+        return self.arrange(np.stack((K @ (angles - tilt), K @ rates * self.rate_factor(walker))))
 
     def read(self, walker: PlainWalker, numbers: Sequence[float], known: Floats) -> Floats:
         """Return the state that printed numbers describe. Bodies that are not printed move as in the state `known`."""
@@ -80,8 +107,8 @@ class Convention:
         free = [body for body in range(n) if not K[:, body].any()]
         square = np.vstack((K, np.eye(n)[free]))
         state = known.copy()
-        state[:n] = tilt + np.linalg.solve(square, [*table[0], *(known[body] - tilt for body in free)])
-        state[n:] = np.linalg.solve(square, [*table[1] / self.rate_factor(walker), *(known[n + body] for body in free)])
+        state[:n] = tilt + np.linalg.solve(square, [*table[0], *(known[free] - tilt)])
+        state[n:] = np.linalg.solve(square, [*table[1] / self.rate_factor(walker), *known[n:][free]])
         if SWING in free and self.instant == "after-strike":
             state[SWING] = -2.0 * walker.lean - state[STANCE]
         if SHANK in free and n > SHANK:
@@ -90,45 +117,15 @@ class Convention:
 
     def rate_factor(self, walker: PlainWalker) -> float:
         """Return the factor on rates, and on the inverse of times, due to the unit of time."""
-        if not self.time:
-            return 1.0
         if self.time == SCALED:
             return walker.pendulum_time
-        return math.sqrt(float(self.time) / walker.gravity)
+        return math.sqrt(float(self.time) / walker.gravity) if self.time else 1.0
 
-    def differences(self, other: Convention) -> Iterator[str]:
+    def differences(self, other: Convention) -> list[str]:
         """Describe each difference of this convention from another."""
-        if self.origin != other.origin:
-            yield f"angles are measured from {'the vertical' if self.origin == 'vertical' else 'the slope’s normal'}"
-        if self.second != other.second:
-            yield SECOND_WORDS[self.second]
-        if self.unit != other.unit:
-            yield f"angles are in {'degrees' if self.unit == 'deg' else 'radians'}"
-        if self.positive != other.positive:
-            yield f"positive angles turn {self.positive}"
-        if self.order != other.order:
-            yield f"the order is {', '.join(self.order)}"
-        if self.layout != other.layout:
-            rates = "each rate follows its angle" if self.layout == "interleaved" else "the rates follow all angles"
-            yield rates
-        if self.instant != other.instant:
-            yield f"the state is that {INSTANT_WORDS[self.instant]}"
-        if self.steps != other.steps:
-            yield "period, length and multipliers are those of a stride, which has two steps"
-        if self.time != other.time:
-            yield "time is in units of sqrt(L/g)" if self.time == SCALED else f"gravity is {self.time} m/s²"
-
-
-SECOND_WORDS: Final = {
-    "absolute": "the second angle is absolute",
-    "relative": "the second angle is relative, swing leg minus stance leg",
-    "stance-minus-swing": "the second angle is relative, stance leg minus swing leg",
-}
-INSTANT_WORDS: Final = {
-    "after-strike": "just after the heel strike",
-    "before-strike": "just before the heel strike",
-    "mid-stance": "in mid-stance",
-}
+        values = {name: getattr(self, name) for name in CHOICES}
+        changes = {name: value for name, value in values.items() if value != getattr(other, name)}
+        return [CHOICES[name][0].format(CHOICES[name][1][value]) for name, value in changes.items()]
 
 
 def stated(check: Check, count: int, bodies: int, name: str = "state") -> Convention:
@@ -150,44 +147,30 @@ def stated(check: Check, count: int, bodies: int, name: str = "state") -> Conven
     return Convention(angles.origin, angles.second, angles.unit, angles.positive, order, angles.layout, instant)
 
 
-def put_feet_on_slope(convention: Convention, walker: PlainWalker, numbers: Sequence[float], unit: float) -> Convention:
-    """Return the convention with the sign of the relative angle chosen such that both feet are on the slope.
-
-    unit  unit of the angles' last digit
-    """
+def put_feet_on_slope(convention: Convention, walker: PlainWalker, items: Sequence[Item]) -> Convention:
+    """Return a printed state's convention, with the sign of its relative angle such that both feet are on the slope."""
     if convention.second != "relative" or len(convention.order) < 2 or convention.instant == "mid-stance":
         return convention
 
     def miss(reading: Convention) -> float:
         known = np.zeros(6 if walker.kneed else 4)
-        return abs(walker.feet_apart(reading.read(walker, numbers, known)))
+        return abs(walker.feet_apart(reading.read(walker, [item.value for item in items], known)))
 
     opposite = replace(convention, second="stance-minus-swing")
-    near = FEET_DIGITS * unit * (math.radians(1.0) if convention.unit == "deg" else 1.0)
+    near = FEET_DIGITS * max(item.last_digit for item in items) / (RAD_IN_DEG if convention.unit == "deg" else 1.0)
     return opposite if miss(opposite) <= near < miss(convention) else convention
 
 
-def alternatives(convention: Convention) -> Iterator[Convention]:
-    """Yield all other conventions, those with the fewest differences first."""
-    orders = list(permutations(convention.order)) if len(convention.order) > 1 else [convention.order]
-    if convention.order in (("stance",), ("swing",)):
-        orders = [("stance",), ("swing",)]
-    seconds = tuple(SECOND_WORDS) if len(convention.order) > 1 else (convention.second,)
-    layouts = ("angles-first", "interleaved") if len(convention.order) > 1 else (convention.layout,)
-    choices: tuple[Sequence[Any], ...] = (
-        ("vertical", "slope-normal"), seconds, ("rad", "deg"), ("counter-clockwise", "clockwise"), orders, layouts,
-        get_args(Instant), ("", SCALED, *(f"{gravity:g}" for gravity in GRAVITIES)), (1, 2),
-    )  # fmt: skip
-    found = starmap(Convention, product(*choices))
-    yield from sorted(found, key=lambda other: len(list(other.differences(convention))))[1:]
-
-
-def full_state(coordinates: Floats, kneed: bool) -> Floats:
-    """Return angles, then rates, of all bodies from coordinates with a straight swing leg."""
-    if not kneed:
-        return coordinates[:4]
-    shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
-    return np.array([*coordinates[:2], coordinates[0], *coordinates[2:4], shank])
+def alternatives(convention: Convention) -> list[Convention]:
+    """Return all other conventions, those with the fewest differences first."""
+    possible: dict[str, Collection[Any]] = {name: words for name, (_, words) in CHOICES.items()}
+    if len(convention.order) > 1:
+        possible["order"] = [*permutations(convention.order)]
+    else:
+        single = [("stance",), ("swing",)] if convention.order != ("shank",) else [convention.order]
+        possible |= {"order": single, "second": [convention.second], "layout": [convention.layout]}
+    found = starmap(Convention, product(*possible.values()))
+    return sorted(found, key=lambda other: len(other.differences(convention)))[1:]
 
 
 def coordinates_of(walker: PlainWalker, state: Floats) -> Floats:
@@ -202,9 +185,9 @@ def state_at(walker: PlainWalker, start: Floats, step: PlainStep, instant: Insta
     vertical  whether mid-stance is where the stance leg is vertical; otherwise it is normal to the slope
     """
     if instant == "after-strike":
-        return full_state(start, walker.kneed)
+        return walker.full_state(start)
     if instant == "before-strike":
-        return full_state(step.before, walker.kneed)
+        return walker.full_state(step.before)
     upright = walker.slope if vertical else 0.0
 
     def lean(state: Floats) -> float:
@@ -214,7 +197,7 @@ def state_at(walker: PlainWalker, start: Floats, step: PlainStep, instant: Insta
         if piece.start[STANCE] > upright >= piece.end[STANCE]:
             middle = walker.swing(piece.phase, piece.start, lean, lambda _: True, EXACT)
             if middle is not None:
-                return middle.end if middle.phase == BENT else full_state(middle.end, walker.kneed)
+                return middle.end if middle.phase == BENT else walker.full_state(middle.end)
     return None
 
 

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 
 from walkerlab.config.check import Instant
 from walkerlab.config.reads import RigidConfig
+from walkerlab.config.second_leg import describe_second_leg
 from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
 from walkerlab.evidence.check.conventions import Convention, state_at
 from walkerlab.evidence.check.plain_walker import (
     EXACT,
+    NO_PART,
     STANCE,
     STRAIGHT,
     SWING,
@@ -27,15 +30,11 @@ from walkerlab.evidence.check.plain_walker import (
 from walkerlab.evidence.check.printed import Item, match_multipliers
 
 BEFORE: Instant = "before-strike"
+NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 POWERS_OF_TIME = {"period_s": -1, "knee_strike_s": -1, "speed_m_s": 1}
 """Power of rates in which a quantity scales with the unit of time."""
 SUMMED_OVER_STEPS = ("period_s", "step_length_m")
 """Quantities whose value for a stride is the sum of the values of its steps."""
-PLAIN = (
-    "state", "state_before", "multipliers", "spectral_radius", "period_s", "step_length_m", "speed_m_s", "froude",
-    "knee_strike_s",
-)  # fmt: skip
-"""Quantities that the plain model computes."""
 # Near the optimum of central differences of steps with errors of `EXACT`: rad, and rad/s times sqrt(L/g).
 DIFFERENCE = 1e-6
 MAX_MOVES = 16
@@ -46,7 +45,7 @@ SLOW_RATIO = 0.1  # ratio of successive errors above which the derivative is com
 
 def why_not_plain(config: RigidConfig) -> str:
     """Explain why the plain model does not describe a config's walker, or return '' if it does."""
-    if getattr(config.walker, "leg_2", None) is not None:
+    if describe_second_leg(config.walker):
         return "the plain model has two equal legs"
     if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
         return "the plain model has no walkers of type parts"
@@ -57,44 +56,34 @@ def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
     """Build the plain model of a config's walker, or of a changed one on its slope."""
     walker = changed or config.walker
     assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
-    radius = walker.foot_radius_m
-    ahead = getattr(walker, "foot_centre_ahead_m", 0.0)
-    knee = 0j
-    damping = 0.0
-    free = False
-    if isinstance(walker, CompassWalker):
-        # the compass rolls on its ball feet in the contact model only
-        radius = 0.0
-        centre = -1j * walker.mass_to_hip_m
-        parts: tuple[LegPart, ...] = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
-    elif isinstance(walker, StraightLegs):
-        centre = walker.leg_mass_ahead_m - 1j * walker.leg_mass_below_hip_m
-        parts = (LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2),)
-    else:
-        thigh = walker.thigh
-        shank = walker.shank
-        knee = -1j * walker.thigh.length_m
-        upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
-        lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
-        parts = (upper, lower)
-        free = walker.knee.at_heel_strike == "free"
-        damping = walker.knee.damping_N_m_s_per_rad
+    # the compass rolls on its ball feet in the contact model only
+    radius = 0.0 if isinstance(walker, CompassWalker) else walker.foot_radius_m
     torso = walker.torso
-    return PlainWalker(
-        parts=parts,
-        knee=knee,
+    plain = PlainWalker(
+        parts=(NO_PART, NO_PART),
+        knee=0j,
         hip_mass=walker.hip_mass_kg,
-        foot=ahead - 1j * (walker.leg_length_m - radius),
+        foot=getattr(walker, "foot_centre_ahead_m", 0.0) - 1j * (walker.leg_length_m - radius),
         radius=radius,
         gravity=config.gravity_m_s2,
         slope=config.slope_rad,
-        torso=None if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
+        torso=NO_PART if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
         hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
         push_off=config.push_off.impulse_N_s,
-        free_at_strike=free,
-        knee_damping=damping,
         signs={(STRAIGHT, STANCE, SWING): -1.0} if config.equations == "as-printed" else {},
     )
+    if not isinstance(walker, Kneed):
+        below = walker.mass_to_hip_m if isinstance(walker, CompassWalker) else walker.leg_mass_below_hip_m
+        centre = getattr(walker, "leg_mass_ahead_m", 0.0) - 1j * below
+        return replace(plain, parts=(LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART))
+    thigh = walker.thigh
+    shank = walker.shank
+    upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
+    lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
+    free = walker.knee.at_heel_strike == "free"
+    damping = walker.knee.damping_N_m_s_per_rad
+    knee = -1j * thigh.length_m
+    return replace(plain, parts=(upper, lower), knee=knee, free_at_strike=free, knee_damping=damping)
 
 
 def scales(walker: PlainWalker, size: int) -> Floats:
@@ -118,49 +107,6 @@ def derivative(walker: PlainWalker, start: Floats, tolerance: float = EXACT) -> 
     return np.array(columns).T
 
 
-def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> tuple[Floats, PlainStep] | None:
-    """Find the gait near a start by Newton's method. Return its start and step, or None if it is not found.
-
-    A  derivative of the step map of a similar walker, with which the search begins
-    """
-    unit = scales(walker, len(start))
-    identity = np.eye(len(start))
-    x, last, is_own = np.array(start, float), math.inf, False  # whether A is this walker's own derivative
-    old = error = x
-    move = np.zeros(len(x))
-    for _ in range(MAX_MOVES):
-        step = walker.step(x)
-        size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
-        if step is not None and size < SMALLEST_MOVE:
-            break
-        if step is not None and size < last:
-            slow = size > SLOW_RATIO * last
-            last = size
-            old = x
-            error = step.after - x
-        elif last == math.inf:
-            return None
-        elif last < MAX_RESIDUAL:
-            step = walker.step(old)
-            return None if step is None else (old, step)
-        else:
-            slow = not is_own
-            move = 0.5 * move
-            x = old - move
-            if not slow:
-                continue
-        if A is None or slow:
-            A = derivative(walker, old, 1e-10)
-            is_own = True
-            if A is None:
-                return None
-        move = np.linalg.solve(A - identity, error)
-        x = old - move
-    else:
-        return None
-    return x, step
-
-
 @dataclass(frozen=True, eq=False)
 class CheckedStep:
     """One step of a walker: a gait, or a first guess at one."""
@@ -168,7 +114,6 @@ class CheckedStep:
     walker: PlainWalker
     start: Floats  # coordinates just after the heel strike
     step: PlainStep
-    measured: Mapping[str, Any] = field(default_factory=dict)  # values of the compiled model by name
 
     @cached_property
     def derivative(self) -> Floats | None:
@@ -183,52 +128,83 @@ class CheckedStep:
         return tuple(values[:-1])
 
     def quantity(self, name: str) -> Any:
-        """Return a value from the compiled model or, if it lacks it, the plain one. Return None if both lack it."""
-        if name in self.measured:
-            return self.measured[name]
+        """Return a value by name, or None if the plain model lacks it."""
         if name == "multipliers":
             return self.multipliers
         if name == "spectral_radius":
             return abs(self.multipliers[0]) if self.multipliers else None
-        step = self.step
         speed = self.step.length / self.step.period
         return {
-            "period_s": step.period,
-            "step_length_m": step.length,
+            "period_s": self.step.period,
+            "step_length_m": self.step.length,
             "speed_m_s": speed,
             "froude": speed / math.sqrt(self.walker.gravity * self.walker.leg_length),
-            "knee_strike_s": step.knee_strike,
+            "knee_strike_s": self.step.knee_strike,
         }.get(name)
 
-    def values(self, items: Sequence[Item], convention: Convention) -> dict[str, complex | None]:
-        """Return the right value of each printed number in the printed conventions, or None if the models lack it."""
+    def values(
+        self, items: Sequence[Item], convention: Convention, measured: Mapping[str, Any] = NOTHING
+    ) -> dict[str, complex | None]:
+        """Return the right value of each printed number in the printed conventions, or None if the models lack it.
+
+        measured  values of the compiled model by name, which replace those of the plain one
+        """
+        instants = {"state": convention.instant, "state_before": BEFORE}
         values: dict[str, complex | None] = {}
-        factor = convention.rate_factor(self.walker)
-        written = self.written(items, convention)
+        known: dict[str, Any] = {}
+        for name in {item.quantity for item in items}:
+            if name in instants:
+                state = self.state(instants[name], convention.origin == "vertical")
+                known[name] = [] if state is None else convention.write(self.walker, state)
+            else:
+                known[name] = measured[name] if name in measured else self.quantity(name)
         for item in items:
-            value = written[item.quantity] if item.quantity in written else self.quantity(item.quantity)
+            value = known[item.quantity]
             if isinstance(value, list | tuple):
                 value = value[item.place] if item.place < len(value) else None
-            if isinstance(value, int | float | complex):
-                scale = factor ** POWERS_OF_TIME.get(item.quantity, 0)
-                scale *= convention.steps if item.quantity in SUMMED_OVER_STEPS else 1
-                power = convention.steps if item.quantity == "spectral_radius" else 1
-                values[item.name] = complex((value * scale) ** power)
-            else:
-                values[item.name] = None
+            if value is not None:
+                value *= convention.rate_factor(self.walker) ** POWERS_OF_TIME.get(item.quantity, 0)
+                value *= convention.steps if item.quantity in SUMMED_OVER_STEPS else 1
+                value = complex(value ** (convention.steps if item.quantity == "spectral_radius" else 1))
+            values[item.name] = value
         listed = [item for item in items if item.quantity == "multipliers"]
-        multipliers = self.quantity("multipliers") if listed else ()
-        return values | match_multipliers(listed, [value**convention.steps for value in multipliers])
+        return values | match_multipliers(listed, [value**convention.steps for value in known.get("multipliers", ())])
 
     @cache  # noqa: B019 - walks are few, and live as long as their check
     def state(self, instant: Instant, vertical: bool) -> Floats | None:
         return state_at(self.walker, self.start, self.step, instant, vertical)
 
-    def written(self, items: Sequence[Item], convention: Convention) -> dict[str, list[float]]:
-        """Return the numbers of the states that are printed, by quantity. Empty lists where there is no such state."""
-        written = {}
-        instants = {"state": convention.instant, "state_before": BEFORE}
-        for name in instants.keys() & {item.quantity for item in items}:
-            state = self.state(instants[name], convention.origin == "vertical")
-            written[name] = [] if state is None else convention.write(self.walker, state)
-        return written
+
+def gait_near(walker: PlainWalker, start: Floats, A: Floats | None = None) -> CheckedStep | None:
+    """Find the gait near a start by Newton's method, or return None if it is not found.
+
+    A  derivative of the step map of a similar walker, with which the search begins
+    """
+    unit = scales(walker, len(start))
+    best: CheckedStep | None = None
+    x: Floats = np.array(start, float)
+    last = math.inf
+    is_own = False  # whether A is this walker's own derivative
+    for _ in range(MAX_MOVES):
+        step = walker.step(x)
+        size = math.inf if step is None else float(np.abs((step.after - x) / unit).max())
+        if step is not None and size < last:
+            best = CheckedStep(walker, x, step)
+            if size < SMALLEST_MOVE:
+                return best
+            slow = size > SLOW_RATIO * last
+            last = size
+        elif best is None or last < MAX_RESIDUAL:
+            return best
+        elif is_own:
+            x = 0.5 * (x + best.start)
+            continue
+        else:
+            slow = True
+        if A is None or slow:
+            A = derivative(walker, best.start, 1e-10)
+            is_own = True
+            if A is None:
+                return None
+        x = best.start - np.linalg.solve(A - np.eye(len(x)), best.step.after - best.start)
+    return None

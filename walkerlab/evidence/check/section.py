@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from walkerlab.evidence.check.printed import (
+    CONTRADICTED,
     DIFFERENT,
     EXPLAINED,
+    INPUT,
     NOT_COMPARABLE,
+    NOT_REPRODUCED,
     REPRODUCED,
-    UNEXPLAINED,
     format_units,
     spell_name,
 )
@@ -20,7 +22,11 @@ from walkerlab.views.report.numbers import count, number
 from walkerlab.views.report.tables import Cell, Column, Table, Tone, table
 
 Row = Mapping[str, Any]
-TONES: Mapping[str, Tone] = {REPRODUCED: "good", DIFFERENT: "bad", NOT_COMPARABLE: "plain"}
+TONES: Mapping[str, Tone] = {
+    INPUT: "given", REPRODUCED: "good", EXPLAINED: "fair", CONTRADICTED: "bad", DIFFERENT: "bad",
+    NOT_REPRODUCED: "plain", NOT_COMPARABLE: "plain",
+}  # fmt: skip
+"""Appearance of each verdict on a printed value, in the order in which verdicts are listed."""
 MANY_UNITS = 1e5
 LONGEST_LIST = 2  # angles and rates that are listed one by one
 COLUMNS = (
@@ -69,29 +75,27 @@ def source_of(source: Row) -> str:
 def headline(summary: Row) -> str:
     """Return a sentence that states whether the printed gait is right and, if known, why not."""
     rows: Sequence[Row] = summary["values"]
-    wrong = [row for row in rows if row["verdict"] == DIFFERENT]
     explanations = summary["explanations"]
     finding = summary["finding"]
+    cause = follow(explanations[0], rows) if len(explanations) == 1 else ""
+    verdicts = [row["verdict"] for row in rows]
     if finding == NOT_COMPARABLE:
         return f"Nothing can be compared: {summary.get('reason') or 'the file prints no values'}."
     if finding == REPRODUCED:
-        compared = [row for row in rows if row["verdict"] == REPRODUCED]
-        short = [row for row in compared if is_short(row)]
+        compared = count(verdicts.count(REPRODUCED), "printed value")
+        short = sum(map(is_short, rows))
         if not short:
-            return f"Right: {count(len(compared), 'printed value')} reproduced to the last digit."
-        some = f"{len(short)} of {count(len(compared), 'printed value')}"
-        verb = "agrees" if len(short) == 1 else "agree"
-        return f"Reproduced, but not to the last digit: {some} {verb} in fewer digits than are printed."
-    if finding == EXPLAINED and len(explanations) == 1:
-        return f"Explained: {follow(explanations[0], rows)}."
+            return f"Right: {compared} reproduced to the last digit."
+        verb = "agrees" if short == 1 else "agree"
+        return f"Reproduced, but not to the last digit: {short} of {compared} {verb} in fewer digits than are printed."
     if finding == EXPLAINED:
-        return f"Explained, but by more than one cause: each of {len(explanations)} fits the printed digits."
-    assert finding == UNEXPLAINED
+        many = f"Explained, but by more than one cause: each of {len(explanations)} fits the printed digits."
+        return f"Explained: {cause}." if cause else many
     if len(rows) == 1:
         return "Different, unexplained: the printed value differs, and one value is too little to find the cause."
-    what = f"{len(wrong)} of {len(rows)} printed values differ"
-    if len(explanations) == 1:
-        return f"Different, partly explained: {follow(explanations[0], rows)}."
+    if cause:
+        return f"Different, partly explained: {cause}."
+    what = f"{verdicts.count(DIFFERENT)} of {len(rows)} printed values differ"
     if explanations:
         return f"Different, partly explained: {what}, and no cause found reproduces more than some of them."
     return f"Different, unexplained: {what}, and no known convention, mistake or misprint reproduces them all."

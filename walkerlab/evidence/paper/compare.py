@@ -27,7 +27,7 @@ from walkerlab.evidence.paper.measured import (
 )
 from walkerlab.evidence.paper.printed import fixed_point_as_printed
 from walkerlab.evidence.paper.recorded import characteristics_of, compare_recorded, stored_energy
-from walkerlab.evidence.paper.rows import NumberVerdict, count_verdicts, paper_rows, table_1, table_2, table_3
+from walkerlab.evidence.paper.rows import VERDICTS, count_verdicts, paper_rows, table_1, table_2, table_3
 from walkerlab.evidence.paper.study import study_the_paper
 from walkerlab.evidence.paper.walker import compass
 from walkerlab.labels import labels_of
@@ -65,7 +65,7 @@ COLUMN_NAMES = {
     "percent_of_matlab": "difference in percent of the MATLAB value",
     "percent_of_adams": "difference in percent of the ADAMS value",
     "printed": "as printed",
-    "verdict": ", ".join(NumberVerdict),
+    "verdict": ", ".join(VERDICTS),
     "evidence": "evidence",
 }
 """Long names of the columns in the paper's numbers and tables."""
@@ -104,7 +104,7 @@ def compare_with_paper(
     measured = measure(config, inputs, motion)
     judged_rows = tuple(paper_rows(measured, study))
     paper_errata = errata(study)
-    rows = [vars(row) for row in judged_rows]
+    rows = [each.row for each in judged_rows]
     tables = {"table1": table_1(measured, study), "table2": table_2(measured), "table3": table_3(measured)}
     groups = {name: numbers_group(list(table.values()), table) for name, table in tables.items()}
     groups |= {"paper_numbers": numbers_group(rows), "errata": rows_group(paper_errata, labels_of(Erratum))}

@@ -5,23 +5,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from walkerlab.evidence.check.section import TONES
 from walkerlab.labels import add_unit
 from walkerlab.views.report import blocks as page
 from walkerlab.views.report.answers import last_steps
 from walkerlab.views.report.numbers import count, number, typeset
-from walkerlab.views.report.tables import Cell, Column, Table, Tone, grouped, table
+from walkerlab.views.report.tables import Cell, Column, Table, grouped, table
 from walkerlab.views.report.words import describe_error, words
 
 Row = Mapping[str, Any]
-
-TONES: dict[str, Tone] = {
-    "input": "given",
-    "reproduced": "good",
-    "explained": "fair",
-    "contradicted": "bad",
-    "not-reproduced": "plain",
-}
-"""Appearance of each verdict on a printed value."""
 
 TEXT_SUFFIX = "_text"
 """Suffix of keys whose values are numbers in their printed form."""

@@ -20,10 +20,14 @@ from walkerlab.physics.solvers.system import Floats
 LARGEST_SHARE: Final = 0.05  # largest noise or systematic difference, as a fraction of a quantity's size
 MAX_ROUGHNESS: Final = 0.02  # largest roughness, as a fraction of the leg length
 OUTLIER: Final = 6.0  # standard deviations; larger residuals are outliers
-SMALLEST_OUTLIER: Final = 0.01  # fraction of a quantity's size; the residual of a missed heel strike is far larger
+# fraction of a quantity's size; the residual of a missed heel strike is far larger
+SMALLEST_OUTLIER: Final = 0.01
 ALTERNATION: Final = 5.0  # largest acceptable difference between odd and even steps, in standard deviations
+LIMP: Final = ": a limp"  # end of the reason for a misfit of odd and even steps
+NOTABLE_ALTERNATION: Final = 3.0  # the same difference that suggests legs that differ
 PHASE_BINS: Final = 20
-UNUSUALLY_ROUGH: Final = 0.003  # fraction of the leg length; the floor of a laboratory is rough by about 0.001
+# fraction of the leg length; the floor of a laboratory is rough by about 0.001
+UNUSUALLY_ROUGH: Final = 0.003
 UNUSUAL_KICK: Final = 0.05  # fraction of the rates
 # largest acceptable scatter of averaged residuals, as a normal deviate; 0.8 % of walks that the model explains exceed
 # it
@@ -40,13 +44,12 @@ def judge(fitted: Fitted) -> tuple[Fit, tuple[str, ...]]:
 def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
     forecast = fitted.forecast
     sizes = fitted.data.sizes
+    limp = describe_limp(fitted)
     for quantity, noise, size in zip(forecast.quantities, fitted.noise.measurement, sizes, strict=True):
         if noise > LARGEST_SHARE * size:
             (name, unit), share = name_and_unit(quantity), 100.0 * noise / size
-            return (
-                "misfit",
-                f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.0f} % of its size",
-            )
+            reason = f"the {name} differs from the model by {noise:.2g} {unit} (r.m.s.), {share:.0f} % of its size"
+            return "misfit", limp or reason
     if fitted.reason:
         return "not-converged", fitted.reason
     if fitted.noise.roughness_m > MAX_ROUGHNESS * fitted.problem.leg_length_m:
@@ -67,14 +70,33 @@ def judge_fit(fitted: Fitted) -> tuple[Fit, str]:
                 "misfit",
                 f"the {name} of step {worst + 1} deviates by {times:.2g} times the scatter of the other steps",
             )
-        if (alternation := alternation_of(residuals)) > ALTERNATION:
-            reason = f"the {name} alternates from step to step by {alternation:.2g} standard deviations: a limp"
-            return "misfit", reason
+    if limp:
+        return "misfit", limp
     if forecast.measured.sampled:
         systematic = float(np.sqrt(np.nanmean(phase_means(fitted) ** 2)))
         if systematic > LARGEST_SHARE * sizes[forecast.quantities.index(LEG_ANGLE)]:
             return "misfit", f"the angles differ by {systematic:.3g} rad at the same phase of every step"
     return "fits", ""
+
+
+def alternates(fitted: Fitted) -> bool:
+    """Whether a quantity of odd and even steps differs from the model's, which a rough floor may explain, too."""
+    channels = fitted.data.residuals[: fitted.forecast.measured.count * len(fitted.forecast.channels)]
+    return any(
+        alternation_of(each) > NOTABLE_ALTERNATION for each in np.split(channels, len(fitted.forecast.channels) or 1)
+    )
+
+
+def describe_limp(fitted: Fitted) -> str:
+    """Describe by how much a quantity of odd and even steps differs from the model's, or return '' if it does not."""
+    white = whitening(fitted.data, fitted.noise)(fitted.data.residuals)
+    steps = fitted.forecast.measured.count
+    for index, quantity in enumerate(fitted.forecast.channels):
+        alternation = alternation_of(white[index * steps : (index + 1) * steps])
+        if alternation > ALTERNATION:
+            name = name_and_unit(quantity)[0]
+            return f"the {name} alternates from step to step by {alternation:.2g} standard deviations{LIMP}"
+    return ""
 
 
 def implausible_disturbances(fitted: Fitted) -> Iterator[str]:
@@ -103,6 +125,7 @@ def dependent_residuals(fitted: Fitted) -> Iterator[str]:
     sums = np.bincount(groups, whitening(fitted.data, fitted.noise)(fitted.data.residuals))
     squares = float((sums**2 / counts).sum())
     freedom = max(1, counts.size - fitted.u.size)
+    # As a normal deviate, so that the limit does not depend on the number of averages.
     if -float(ndtri(max(chdtrc(freedom, squares), 1e-300))) > MAX_DEPENDENCE:
         yield (
             f"residuals of successive angles are correlated (averages over half a step scatter "
@@ -143,15 +166,18 @@ MIN_STEPS = 8
 REPLICATES = 400
 
 
-def spectral_radius(steps: Floats) -> Floats:
+def spectral_radius(steps: Floats, stride: int = 1) -> Floats:
     """Return the largest multiplier (...,) of the linear map that takes each step's values to the next step's.
 
     The map is that of least squares, as in the literature, so it is biased by noise.
 
-    steps  (..., steps, quantities)
+    steps   (..., steps, quantities)
+    stride  number of steps after which a gait repeats, each with its own mean
     """
-    before, after = steps[..., :-1, :], steps[..., 1:, :]
-    before, after = (each - each.mean(axis=-2, keepdims=True) for each in (before, after))
+    before, after = steps[..., :-1, :].copy(), steps[..., 1:, :].copy()
+    for each in (before, after):
+        for first in range(stride):
+            each[..., first::stride, :] -= each[..., first::stride, :].mean(axis=-2, keepdims=True)
     # In units of its own scatter, no quantity is lost in the pseudo-inverse, whatever its unit.
     scale = np.sqrt(np.mean(before**2, axis=-2, keepdims=True))
     before, after = before / scale, after / scale
@@ -169,6 +195,7 @@ def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | Non
     fitted_radius  spectral radius of the fitted walker
     """
     forecast = fitted.forecast
+    # The seed is fixed, so that the same walk always gives the same error.
     rng = np.random.default_rng(0)
     count = forecast.measured.count
     channels = len(forecast.channels)
@@ -182,6 +209,7 @@ def measure_radius(fitted: Fitted, fitted_radius: float) -> MeasuredRadius | Non
     noise = fitted.noise.measurement[forecast.quantity]
     disturbed = (rng.normal(size=(REPLICATES, spread.size)) * spread) @ fitted.data.G.T
     replicates = fitted.predicted.values + disturbed + rng.normal(size=(REPLICATES, noise.size)) * noise
-    plain = float(spectral_radius(reshape_by_step(forecast.values)))
-    simulated = spectral_radius(reshape_by_step(replicates))
+    stride = forecast.walks.stride
+    plain = float(spectral_radius(reshape_by_step(forecast.values), stride))
+    simulated = spectral_radius(reshape_by_step(replicates), stride)
     return MeasuredRadius(plain, plain + fitted_radius - float(simulated.mean()), float(simulated.std(ddof=1)))

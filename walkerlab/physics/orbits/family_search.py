@@ -133,7 +133,8 @@ class FamilySearch:
     def family(self, generator: np.random.Generator) -> Family:
         """Run the whole search. `generator` draws the scattered starts."""
         results = self.branches()
-        if self.step_map.stride > 1:  # attractors are looked for by steps that are all alike
+        # Attractors are looked for by steps that are all alike.
+        if self.step_map.stride > 1:
             return results
         if self.periods > 1:
             results = self.add_attractors(results)
@@ -163,6 +164,7 @@ class FamilySearch:
         attractors = sweep_attractor(self.step_map, start, values, how.transient, how.samples, self.listener.advance)
         if not attractors.found:
             return replace(family, attractors=attractors)
+        # Attractors are listed by rising value.
         if end < begin:
             attractors = replace(attractors, found=attractors.found[::-1])
         chosen = attractors.found[:: max(1, len(attractors.found) // how.exponents)]

@@ -67,6 +67,7 @@ def spread_over(builder: Any, value: Any) -> Any:
     if value.type == VECTOR:
         return value
     undefined = ir.Constant(VECTOR, ir.Undefined)
+    # LLVM's way to repeat a number: put it into one element, then shuffle.
     first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(first, undefined, mask)
@@ -100,6 +101,7 @@ def _define(function: Callable[..., Any], build: Callable[..., Any], arguments: 
 
         def generic(self, given: Any, named: Any) -> Any:
             if named or not all(_is_number(kind) for kind in given) or LANES not in given:
+                # None leaves all other arguments to numba's definitions.
                 return None
             return signature(LANES, *(LANES for _ in given))
 
@@ -194,6 +196,7 @@ def choose(context: Any, sign: Any, if_positive: Any, otherwise: Any) -> Any:
 def any_positive(context: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
         positive = builder.fcmp_ordered(">", arguments[0], ir.Constant(VECTOR, [0.0] * WIDTH))
+        # One bit per lane, read as an integer.
         mask = builder.bitcast(positive, ir.IntType(WIDTH))
         return builder.icmp_unsigned("!=", mask, ir.Constant(ir.IntType(WIDTH), 0))
 
@@ -254,13 +257,15 @@ Jet = tuple[float, float, float]
 """A value with its first two derivatives in time."""
 Quintic = tuple[float, float, float, float, float, float]
 """Bernstein coefficients of a quintic polynomial over a step."""
-LAST_MOVE = 1e-4  # Newton stops below this fraction of the step; its error is about the square of its last move
+# Newton stops below this fraction of the step. Its error is about the square of its last move.
+LAST_MOVE = 1e-4
 MAX_ITERATIONS = 50
 
 
 @kernel_part
 def hermite(h: float, start: Jet, end: Jet) -> Quintic:
     """Return the quintic over a step of h (s) with the given values and derivatives at both ends."""
+    # In Bernstein form of degree 5, the first difference is h f' / 5 and the second h^2 f'' / 20.
     slope = 0.2 * h * start[1]
     bend = 0.05 * h * h * start[2]
     last_slope = 0.2 * h * end[1]
@@ -311,6 +316,7 @@ def first_fall(finder: CrossingFinder, quintic: Quintic, zero_at_start: bool, af
         changes += (quintic[i] < 0.0) != (quintic[i + 1] < 0.0)
     if changes == 0:
         return NO_CROSSING
+    # `only_crossing` starts from the end of the step and knows neither `after` nor a zero at the start.
     if changes == 1 and not zero_at_start and after == 0.0:
         return only_crossing(quintic) if quintic[0] >= 0.0 else NO_CROSSING
     for i in range(6):
@@ -332,6 +338,8 @@ def only_crossing(quintic: Quintic) -> float:
             high = x
         else:
             low = x
+        # Where the quintic does not fall, Newton would leave the bracket. `low` is not inside it either, so bisection
+        # follows.
         new = x - value / slope if slope < 0.0 else low
         if not low < new < high:
             new = 0.5 * (low + high)
@@ -408,6 +416,7 @@ def stage_state(context: Any, y: Any, h: Any, weights: Any, vectors: Any) -> Any
 @kernel_part
 def run_stages(system: Any, t: float, y: State, k1: State, h: float) -> tuple[tuple[State, ...], State, State]:
     """Compute the stages needed for solution and error (k1, k6 to k12), the solution, and its derivative."""
+    # Written out, because in compiled code tuples of different lengths are different types: no loop can extend them.
     k2 = derivative(system, t + LANE_NODES[1] * h, stage_state(y, h, A_2, (k1,)))
     k3 = derivative(system, t + LANE_NODES[2] * h, stage_state(y, h, A_3, (k1, k2)))
     k4 = derivative(system, t + LANE_NODES[3] * h, stage_state(y, h, A_4, (k1, k3)))

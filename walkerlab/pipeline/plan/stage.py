@@ -153,11 +153,14 @@ class Stage:
 
     def why_no_such_legs(self, config: Config) -> str | None:
         """Return the reason why the stage cannot answer for a config's legs, or None if it can."""
-        # walkers made of parts have no key `leg_2`
-        one_leg = getattr(config.walker, "leg_2", ...) is None and config.push_off.leg_2 is None
-        if one_leg or not self.needs_equal_legs:
+        if not self.needs_equal_legs:
             return None
-        from walkerlab.scene.rigid import have_different_legs  # imported here: equal legs need no mechanics
+        # Imported here: the command line's help needs neither, and equal legs need no mechanics.
+        from walkerlab.config.second_leg import states_second_leg
+
+        if not states_second_leg(config):
+            return None
+        from walkerlab.scene.rigid import have_different_legs
 
         return "the legs differ" if have_different_legs(config) else None
 
@@ -171,7 +174,7 @@ class Stage:
         if self.why_no_such_legs(config) is not None:
             raise ConfigError(
                 f"{target} needs two equal legs, but those of this walker differ.",
-                f"Leave out walker.leg_2 and push_off.leg_2, or ask another stage, such as {', '.join(WALKED)}.",
+                f"Leave out what differs in the second leg, or ask another stage, such as {', '.join(WALKED)}.",
             )
         # Imported here: the command line's help needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add

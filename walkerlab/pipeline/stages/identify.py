@@ -21,12 +21,12 @@ from walkerlab.physics.mechanics.rigid_model import STRAIGHT, apply_couplings
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.progress import Progress
 from walkerlab.pipeline.stages.estimated import refuse_keys, refuse_model
-from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, divide_at, doubts_about, read_divisions, read_measured
+from walkerlab.pipeline.stages.measured_walk import SAME_TOUCHES, MeasuredFile
 from walkerlab.pipeline.stages.rigid_groups import place_variables, reorder_by_leg
 from walkerlab.pipeline.stages.walk import legs, variables_over_time
 from walkerlab.pipeline.store.content import Content, Group, Variable, numbered, rows_group
-from walkerlab.scene.identification import identify_walk
-from walkerlab.scene.parameter import config_with, parameter_of
+from walkerlab.scene.identification import LEGS, identify_walk
+from walkerlab.scene.parameter import SLOPE, config_with, parameter_of
 from walkerlab.scene.rigid import rigid_walker
 
 LABELS: Final = {
@@ -47,11 +47,10 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
 
     Raises ConfigError for an invalid config or file, NoAnswer if no fit converges.
     """
-    refuse(config)
-    block = config.identify
-    assert block is not None, "refuse rejects a config without the block"
+    file = read_data(config)
+    block = file.block
     gait = inputs["fixedpoint"].summary
-    for doubt in doubts_about(block, config) if block.level == "angles" else ():
+    for doubt in file.doubts():
         progress.note(doubt)
 
     def begin(label: str, rounds: int) -> Callable[[], None]:
@@ -61,7 +60,7 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
     def ask(measured: MeasuredWalk) -> Identification:
         return identify_walk(cast("Config", config), measured, gait, block, progress.note, begin)
 
-    result = identify_divided(config, block, ask)
+    result = identify_divided(file, ask)
     content = content_of(config, result)
     verdict = result.verdict
     if verdict.fit == "not-converged":
@@ -73,6 +72,14 @@ def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progres
 
 def refuse(config: IdentifyConfig) -> None:
     """Raise ConfigError for an invalid `identify` block, or a file without a walk."""
+    read_data(config)
+
+
+def read_data(config: IdentifyConfig) -> MeasuredFile:
+    """Read the file of the `identify` block.
+
+    Raises ConfigError for an invalid block, or a file without a walk.
+    """
     block = config.identify or Identify()
     if not block.data or not block.fit:
         raise ConfigError(
@@ -87,24 +94,24 @@ def refuse(config: IdentifyConfig) -> None:
             ("identify", "nuisance"),
         )
     refuse_keys(config, block)
-    measured = read_measured(block, config)
+    file = MeasuredFile(block, config)
+    measured = next(file.divisions())
     values_count = measured.count * len(measured.channels()) + measured.step.size
     if values_count + len(block.prior) <= len(block.fit):
         raise ConfigError(
             f"{block.data} holds {values_count} values, too few for {len(block.fit)} parameters.",
             "Measure more steps, or fit fewer parameters.",
         )
+    return file
 
 
-def identify_divided(
-    config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification]
-) -> Identification:
+def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification]) -> Identification:
     """Try divisions of the walk into steps, and return the first that fits or, if none does, the most usable one."""
     answers = list[Identification]()
     problems = list[NoAnswer]()
-    for measured in read_divisions(block, config):
+    for measured in file.divisions():
         try:
-            answers.append(divide_again(config, block, ask, ask(measured)))
+            answers.append(divide_again(file, ask, ask(measured)))
         except NoAnswer as error:
             problems.append(error)
             continue
@@ -116,19 +123,21 @@ def identify_divided(
 
 
 def divide_again(
-    config: IdentifyConfig, block: Identify, ask: Callable[[MeasuredWalk], Identification], before: Identification
+    file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Repeat a fit if the identified slope and sensors move heel strikes, and keep the old fit if the new
-    one is bad.
+    """Repeat a fit if the identified slope, sensors or soles move heel strikes, and keep the old fit if the new one is
+    bad.
     """
     if not before.measured.sampled:
         return before
-    slope_change = identified_config(config, before).slope_rad - config.slope_rad
-    touch_sum = 2.0 * (before.sensors[OFFSET] - slope_change)
-    if abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
+    identified = identified_config(file.config, before)
+    touch_sum = 2.0 * (before.sensors[OFFSET] - identified.slope_rad + file.config.slope_rad)
+    same_soles = rigid_walker(identified).alike
+    if same_soles and abs(touch_sum - before.measured.touch_sum_rad) < SAME_TOUCHES:
         return before
+    on_slope = SLOPE.config_at(identified, file.config.slope_rad)
     try:
-        refit = ask(divide_at(block, config, touch_sum))
+        refit = ask(file.divide_at(touch_sum, on_slope))
     except (ConfigError, NoAnswer):
         return before
     return refit if refit.verdict.usable else before
@@ -166,6 +175,9 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
         "rms_residual": dict(result.rms_residual),
         "chi_square_per_dof": result.chi_square_per_dof,
         "gait": {name: asdict(value) for name, value in result.gait.items()},
+        "leg_differences": [asdict(difference) for difference in result.leg_differences],
+        "other_leg_differences": [asdict(difference) for difference in result.other_differences],
+        "first_leg": None if result.first_leg is None else asdict(result.first_leg),
         "measured_spectral_radius": None if result.measured_radius is None else asdict(result.measured_radius),
         "models": [{**asdict(model), "reason": "; ".join(model.reasons)} for model in result.models],
         "reference_masses_kg": reference_masses(config, [estimate.key for estimate in result.estimates], result.model),
@@ -253,12 +265,14 @@ def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
 
     config  config of the identified walker
     """
+    measured = result.measured
     walker = rigid_walker(config)
+    # the leg that swings first is shown as leg 1
+    walker = walker.exchanged if measured.first_leg == LEGS[1] else walker
     walk = result.walk
     sensors = result.sensors
-    if walker.kneed:
+    if walker.kneed or walker.exchanged.kneed:
         return {}
-    measured = result.measured
     shown = np.flatnonzero(measured.step < SHOWN_STEPS)
     sides = np.flatnonzero(np.diff(measured.step[shown])) + np.array([[0], [1]])
     every = max(1, shown.size // SHOWN_SAMPLES)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -21,10 +22,10 @@ from walkerlab.exchange.columns import (
     refuse_units,
     unit_value,
 )
-from walkerlab.exchange.leg_angles import mend_angles
+from walkerlab.exchange.leg_angles import legs, mend_angles
 from walkerlab.exchange.rate_jumps import sums_at_jumps
 from walkerlab.exchange.recording import NO_FILE, Recording, read_delimited, read_file, read_recording
-from walkerlab.exchange.walk_in_steps import PLAUSIBLE, divide_into_steps, is_plausible
+from walkerlab.exchange.walk_in_steps import PLAUSIBLE, RecordedSteps, divide_into_steps, is_plausible, sum_over_level
 from walkerlab.labels import unit_by_name
 from walkerlab.physics.estimation.measurements import (
     LEG_ANGLE,
@@ -34,14 +35,13 @@ from walkerlab.physics.estimation.measurements import (
     split_into_steps,
 )
 from walkerlab.physics.estimation.prediction import OFFSET
-from walkerlab.physics.mechanics.rigid_model import feet_on_slope
 from walkerlab.physics.solvers.system import Floats
 from walkerlab.pipeline.store.files import file_digest
 from walkerlab.scene.rigid import rigid_walker
 
 if TYPE_CHECKING:
     from walkerlab.config.identify import Identify
-    from walkerlab.config.reads import RigidConfig
+    from walkerlab.config.reads import IdentifyConfig, RigidConfig
     from walkerlab.config.schema import Config
 
 STEP_KINDS: Final = {"period_s": "time", "length_m": "length", "touch_angle_rad": "angle"}
@@ -60,46 +60,71 @@ def digests(config: Config) -> Mapping[str, str]:
     return {"identify.data": file_digest(Path(config.identify.data)) or NO_FILE}
 
 
-def read_measured(block: Identify, config: RigidConfig) -> MeasuredWalk:
-    """Read the block's file as steps or angles, as `block.level` says.
+class MeasuredFile:
+    """The file of an `identify` block, as steps or angles, as `block.level` says. It is read once.
 
-    Raises ConfigError if it holds no such walk.
+    Raises ConfigError if it cannot be read.
     """
-    return next(read_divisions(block, config))
 
+    def __init__(self, block: Identify, config: IdentifyConfig) -> None:
+        self.block = block
+        self.config = config
+        self.path = Path(block.data)
+        self.steps = read_steps(self.path, block, config.slope_rad) if block.level == "steps" else None
+        if self.steps is None:
+            self.walk, self.resolution = read_angles(block, config.slope_rad)
+            self.find_steps = cache(partial(self.steps_of, config))
 
-def read_divisions(block: Identify, config: RigidConfig) -> Iterator[MeasuredWalk]:
-    """Read the file that the block names, and yield its walk in steps. Angles may be divided in several ways.
+    def steps_of(self, config: RigidConfig, touch_sum_rad: float) -> RecordedSteps:
+        """Find the steps in the recorded walk of a config's walker."""
+        return divide_into_steps(self.walk, rigid_walker(config), self.block.data, touch_sum_rad)
 
-    They are divided in more than one way only if slope or sensor offset is estimated: heel strikes depend on both.
-    Raises ConfigError for a file without a walk.
-    """
-    path = Path(block.data)
-    if block.level == "steps":
-        yield refuse_count(path, read_steps(path, block, config.slope_rad))
-        return
-    walk, resolution = read_angles(block, config.slope_rad)
-    problem = None
-    divided = False
-    for touch_sum_rad in touch_sums(walk, block, config):
+    def divisions(self) -> Iterator[MeasuredWalk]:
+        """Yield the walk in steps. Angles may be divided in several ways.
+
+        They are divided in more than one way only if slope or sensor offset is estimated: heel strikes depend on both.
+        Raises ConfigError for a file without a walk.
+        """
+        if self.steps is not None:
+            yield refuse_count(self.path, self.steps)
+            return
+        problem = None
+        divided = False
+        for touch_sum_rad in touch_sums(self.walk, self.block, self.config):
+            try:
+                measured = self.divide_at(touch_sum_rad)
+            except ConfigError as error:
+                problem = problem or error
+            else:
+                divided = True
+                yield refuse_count(self.path, measured)
+        if problem is not None and not divided:
+            raise problem
+
+    def divide_at(self, touch_sum_rad: float, config: RigidConfig | None = None) -> MeasuredWalk:
+        """Divide the angles into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
+
+        config  walker whose soles come down, if not the file's
+        """
+        steps = self.find_steps(touch_sum_rad) if config is None else self.steps_of(config, touch_sum_rad)
+        if steps.touch_time_s.size < MIN_STEPS:
+            raise ConfigError(
+                f"{self.path} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk."
+            )
+        # Only measured samples are used, because those of `steps` at heel strikes are interpolated.
+        angles = legs(self.walk)[:, ::-1] if steps.swapped else legs(self.walk)
+        touches = np.append(0.0, steps.touch_time_s)
+        measured = split_into_steps(self.walk.time_s - steps.origin_s, angles, touches, touch_sum_rad)
+        return replace(measured, resolution={LEG_ANGLE: self.resolution}, first_leg=2 if steps.swapped else 1)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return sentences about oddities in the angles, and about their corrections."""
+        if self.steps is not None:
+            return ()
         try:
-            measured = divide_angles(walk, config, str(path), touch_sum_rad, resolution)
-        except ConfigError as error:
-            problem = problem or error
-        else:
-            divided = True
-            yield refuse_count(path, measured)
-    if problem is not None and not divided:
-        raise problem
-
-
-def doubts_about(block: Identify, config: RigidConfig) -> tuple[str, ...]:
-    """Return sentences about oddities in the block's angles, and about their corrections."""
-    walk, _ = read_angles(block, config.slope_rad)
-    try:
-        return (*walk.doubts, *divide_into_steps(walk, rigid_walker(config), block.data).doubts)
-    except ConfigError:
-        return walk.doubts
+            return (*self.walk.doubts, *self.find_steps(0.0).doubts)
+        except ConfigError:
+            return self.walk.doubts
 
 
 def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
@@ -113,18 +138,10 @@ def refuse_count(path: Path, measured: MeasuredWalk) -> MeasuredWalk:
 def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iterator[float]:
     """Yield possible sums (rad) of the leg angles at heel strike, measured from the slope's normal: 0, then others."""
     yield 0.0
-    angles = walk.both_legs("angle")
-    if angles is None or not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
+    if not (SLOPE_KEY in block.fit or SLOPE_KEY in block.prior or OFFSET in block.sensors):
         return
-    model = rigid_walker(config)
-    sums = sums_at_jumps(walk.time_s, angles, lambda angles: np.asarray(feet_on_slope(model, *angles.T)))
+    sums = sums_at_jumps(walk.time_s, legs(walk), partial(sum_over_level, rigid_walker(config)))
     yield from (each for each in sums if each)
-
-
-def divide_at(block: Identify, config: RigidConfig, touch_sum_rad: float) -> MeasuredWalk:
-    """Divide the angles in the block's file into steps. At heel strike the sum of the leg angles is `touch_sum_rad`."""
-    walk, resolution = read_angles(block, config.slope_rad)
-    return divide_angles(walk, config, block.data, touch_sum_rad, resolution)
 
 
 def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]:
@@ -151,25 +168,6 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
 def smallest_decimal(values: Floats) -> float:
     """Return the smallest decimal place that the values use: 0.001 for 0.72 and 0.725, 1 for whole numbers."""
     return next((10.0**-place for place in range(16) if np.array_equal(np.round(values, place), values)), 0.0)
-
-
-def divide_angles(
-    walk: RecordedWalk, config: RigidConfig, source: str, touch_sum_rad: float, resolution: float = 0.0
-) -> MeasuredWalk:
-    """Divide angles of the config's walker into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
-
-    resolution  smallest decimal place of the angles, rad
-    """
-    steps = divide_into_steps(walk, rigid_walker(config), source, touch_sum_rad)
-    if steps.touch_time_s.size < MIN_STEPS:
-        raise ConfigError(f"{source} has 1 complete step; at least {MIN_STEPS} are needed.", "Record a longer walk.")
-    angles = walk.both_legs("angle")
-    assert angles is not None, "a walk in steps has angles"
-    # Only measured samples are used, because those of `steps` at heel strikes are interpolated.
-    own = angles[:, ::-1] if steps.swapped else angles
-    touches = np.append(0.0, steps.touch_time_s)
-    measured = split_into_steps(walk.time_s - steps.origin_s, own, touches, touch_sum_rad)
-    return replace(measured, resolution={LEG_ANGLE: resolution})
 
 
 def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
@@ -203,7 +201,8 @@ def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:
         values["touch_angle_rad"] = values["touch_angle_rad"] - tilt
     quantities = dict(zip(STEP_KINDS, (STEP_PERIOD, STEP_LENGTH, LEG_ANGLE), strict=True))
     resolution = {quantities[name]: smallest for name, (_, smallest) in columns.items()}
-    return MeasuredWalk(period, values.get("length_m"), values.get("touch_angle_rad"), resolution=resolution)
+    lengths, angles = values.get("length_m"), values.get("touch_angle_rad")
+    return MeasuredWalk(period, lengths, angles, resolution=resolution, first_leg=block.first_leg)
 
 
 def read_column(table: Recording, name: str, block: Identify) -> tuple[Floats, float] | None:

@@ -193,7 +193,9 @@ class RuleFollower:
     @property
     def is_outdated(self) -> bool:
         """Whether a touch has released a knee that the engine's model still has locked."""
-        return int(np.count_nonzero(self.walk_state.knee == LOCKED)) != len(self.scene.locked)
+        # a leg without a knee counts as locked
+        knees = self.walk_state.knee[: len(self.scene.assembly.knees)]
+        return int(np.count_nonzero(knees == LOCKED)) != len(self.scene.locked)
 
     def go_on(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Lock or release the knee in `turn`, and return coordinates and velocities of the model with the new locks."""

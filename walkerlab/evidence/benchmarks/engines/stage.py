@@ -18,7 +18,7 @@ from walkerlab.evidence.benchmarks.engines.experiments import EngineOnScene, Own
 from walkerlab.evidence.benchmarks.engines.rows import OURS, OWN_LAW, SAME_LAW, EngineRow, SwingRow, TuningRow
 from walkerlab.evidence.benchmarks.extension import EXTRA, PHYSICS_ENGINES, installed
 from walkerlab.evidence.benchmarks.words import words
-from walkerlab.exchange.engine_scene import EngineScene, contact_target, engine_scene, refuse_one_knee
+from walkerlab.exchange.engine_scene import EngineScene, contact_target, engine_scene
 from walkerlab.exchange.planar import SMALLEST_BALL_M
 from walkerlab.labels import labels_of
 from walkerlab.physics.ground.knees import IdealLock
@@ -39,7 +39,6 @@ def supported_scene(
 
     Raises ConfigError for a walker that other engines do not support.
     """
-    refuse_one_knee(config)
     assembly = assembly_of(config.walker)
     if assembly.couplings:
         raise ConfigError(

@@ -23,6 +23,9 @@ GAIT_WORDS = {
     "spectral_radius": "a largest multiplier of {}",
     "drop_sensitivity_s_m": "a sensitivity norm (period for a drop of the floor) of {}",
 }
+BOTH_LEGS = "the legs weigh {} kg each"
+ONE_LEG = "leg 1 weighs {} kg"
+DIFFERENCES = {"mass of leg 2": ("heavier", "lighter"), "length of leg 2": ("longer", "shorter")}
 ESTIMATE_COLUMNS = (
     Column("parameter", "key"),
     Column("estimate", lambda row: rounded(row["value"], row["standard_error"]), numeric=True),
@@ -56,8 +59,9 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     verdict = verdict_of(summary)
     other = next((row for row in summary["models"] if row["model"] != summary["model"]), None)
     known = [row for row in summary["estimates"] if row["standard_error"] is not None]
-    references = [mass_in_words(key, number(value)) for key, value in summary["reference_masses_kg"].items()]
-    masses = [estimate_in_words(row) for row in known if row["key"].endswith("mass_kg")]
+    leg = ONE_LEG if summary.get("first_leg") else BOTH_LEGS
+    references = [mass_in_words(key, number(value), leg) for key, value in summary["reference_masses_kg"].items()]
+    masses = [estimate_in_words(row, leg) for row in known if row["key"].endswith("mass_kg")]
     others = [estimate_in_words(row) for row in known if not row["key"].endswith("mass_kg")]
     condition = f" if {join_words(references)}" if references else ""
     determined = capitalised("; ".join([*([join_words(masses) + condition] if masses else []), *others]))
@@ -80,6 +84,7 @@ def findings(summary: Mapping[str, Any]) -> list[str]:
     held = next(iter(sensitive_rows(summary, known)), None)
     return [
         *words.parts("identify.findings", summary, verdict, *parameters, *beside),
+        *(limp_in_words(summary) if is_usable(verdict) else []),
         *words.parts("identify.quality", summary, verdict, *quality),
         *([radius_in_words(measured)] if measured and is_usable(verdict) else []),
         *([change_in_words(held, known)] if held and is_usable(verdict) else []),
@@ -152,17 +157,42 @@ def value_and_error(value: float, error: float | None, unit: str) -> str:
     return f"{fixed(value, decimals_of(error))} ± {fixed(error, decimals_of(error))}{ending}"
 
 
-def mass_in_words(key: str, text: str) -> str:
-    """Describe a mass in a phrase such as 'the hip weighs 9.8 ± 0.2 kg'."""
-    body = axis_label(key).removesuffix(" mass")
-    return f"the legs weigh {text} kg each" if body == "leg" else f"the {body} weighs {text} kg"
+def mass_in_words(key: str, text: str, leg: str = BOTH_LEGS) -> str:
+    """Describe a mass in a phrase such as 'the hip weighs 9.8 ± 0.2 kg'. `leg` is the phrase for the mass of leg 1."""
+    label = axis_label(key)
+    if label == "leg mass":
+        return leg.format(text)
+    body = "leg 2" if label == "mass of leg 2" else f"the {label.replace(' mass', '')}"
+    return f"{body} weighs {text} kg"
 
 
-def estimate_in_words(row: Mapping[str, Any]) -> str:
+def limp_in_words(summary: Mapping[str, Any]) -> list[str]:
+    """Return sentences about the legs' differences, if any is clear, and about the leg that swings first."""
+    rows, others = summary.get("leg_differences", []), summary.get("other_leg_differences", [])
+    if not any(abs(row["value"]) > CONTRADICTION * row["standard_error"] for row in rows):
+        return []
+    limp, first = join_words(map(difference_in_words, rows)), summary["first_leg"]
+    if first["by"] == "guess":
+        or_else = f"{limp} if leg {first['leg']} swings first, otherwise {join_words(map(difference_in_words, others))}"
+        return [f"The legs differ: {or_else}. The data do not say which leg swings first: --first-leg 1 or 2 would."]
+    tried = " Both legs were tried as the first to swing: it is leg {leg}, as the walk shows.".format(**first)
+    return [f"The legs differ: {limp}.{tried if first['by'] == 'likelihood' else ''}"]
+
+
+def difference_in_words(row: Mapping[str, Any]) -> str:
+    """Describe how leg 2 differs, as in 'leg 2 is 0.31 ± 0.02 kg heavier'."""
+    label = axis_label(row["key"])
+    more, less = DIFFERENCES.get(label, ("larger", "smaller"))
+    subject = "leg 2" if label in DIFFERENCES else f"the {label}"
+    by = value_and_error(abs(row["value"]), row["standard_error"], row["unit"])
+    return f"{subject} is {by} {more if row['value'] > 0.0 else less}"
+
+
+def estimate_in_words(row: Mapping[str, Any], leg: str = BOTH_LEGS) -> str:
     value = value_and_error(row["value"], row["standard_error"], row["unit"])
     bound = " (at its bound)" if row["at_bound"] else ""
     if row["key"].endswith("mass_kg"):
-        return mass_in_words(row["key"], value.removesuffix(" kg")) + bound
+        return mass_in_words(row["key"], value.removesuffix(" kg"), leg) + bound
     return f"the {axis_label(row['key'])} is {value}{bound}"
 
 
