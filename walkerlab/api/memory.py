@@ -30,6 +30,10 @@ from walkerlab.pipeline.store.files import csv_text
 if TYPE_CHECKING:
     from walkerlab.views.explore.server import Server
 
+__all__ = [
+    "basin", "check", "compass", "contact", "continue_gait", "design", "explore", "find_gait", "identify", "kneed",
+    "plan_measurements", "read_walk", "robustness", "simulate", "walker",
+]  # fmt: skip
 MADE_HERE: dict[str, tuple[tuple[type[Block], ...], str]] = {
     "walker": (
         tuple(kinds_of(Config.model_fields["walker"]).values()),
