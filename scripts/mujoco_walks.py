@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Compare ten steps of exported walkers in MuJoCo with our contact model.
 
-The results are in docs/exchange-details.md and docs/legs.md.
+The results are in docs/exchange-details.md and docs/legs-reference.md.
 
 Usage: python scripts/mujoco_walks.py [CONFIG [KEY=VALUE ...]], by default the walkers of both tables
 
-Printed for each walker: periods and lengths of the last two steps here and in MuJoCo, and the largest difference of any
-step.
+For each walker the script prints periods and lengths of the last two steps here and in MuJoCo, and the largest
+difference in any step.
 """
 
 import sys

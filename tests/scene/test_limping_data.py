@@ -13,7 +13,7 @@ from walkerlab.config.identify import Identify
 from walkerlab.config.loader import load
 from walkerlab.physics.estimation.measurements import MeasuredWalk, split_into_steps
 from walkerlab.scene.identification import identify_walk
-from walkerlab.views.report.sections.identification import limp_in_words
+from walkerlab.views.report.sections.identification import describe_limp_of_legs
 
 MASS = "walker.leg_2.leg_mass_kg"
 HEAVIER = 0.31
@@ -55,7 +55,7 @@ def identify(walk, *keys, sets=(), **options):
 def sentences(result):
     rows = ([vars(row) for row in each] for each in (result.leg_differences, result.other_differences))
     names = ("leg_differences", "other_leg_differences", "first_leg")
-    return " ".join(limp_in_words(dict(zip(names, (*rows, vars(result.first_leg)), strict=True))))
+    return " ".join(describe_limp_of_legs(dict(zip(names, (*rows, vars(result.first_leg)), strict=True))))
 
 
 @pytest.mark.parametrize("leg", [1, 2])

@@ -26,7 +26,7 @@ from walkerlab.physics.orbits.contact_gait import scale_laws, set_rigidity, why_
 from walkerlab.physics.orbits.rigid_limit import STICTION_SERIES, series_settings
 from walkerlab.physics.solvers.registry import Tolerances
 from walkerlab.pipeline.run.runner import execute
-from walkerlab.pipeline.stages.contact_sim import tell_unresolved_slip
+from walkerlab.pipeline.stages.contact_sim import warn_of_unresolved_slip
 from walkerlab.pipeline.store.runs import RunFolder
 from walkerlab.scene.contact import contact_scene, ground_laws, scene_measures, start_state
 
@@ -174,9 +174,9 @@ def test_friction_law_too_weak_for_the_slope_explains_the_missing_gait(own):
 def test_unresolved_slip_of_any_law_is_reported(own):
     said = []
     progress = SimpleNamespace(note=said.append)
-    tell_unresolved_slip(1e-9, own, progress)
+    warn_of_unresolved_slip(1e-9, own, progress)
     assert said == []
-    tell_unresolved_slip(0.1, own, progress)
+    warn_of_unresolved_slip(0.1, own, progress)
     assert "0.3 m/s" in said[0]
 
 

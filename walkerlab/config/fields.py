@@ -135,11 +135,11 @@ def leaves(
     """
     for name, field in block.model_fields.items():
         inner = block_of(field)
-        own = getattr(held, name, None)
+        instance = getattr(held, name, None)
         if inner is None:
             yield (*prefix, name), field
         else:
-            yield from leaves(type(own) if isinstance(own, Block) else inner, (*prefix, name), own)
+            yield from leaves(type(instance) if isinstance(instance, Block) else inner, (*prefix, name), instance)
 
 
 def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
@@ -152,6 +152,12 @@ def leaves_of_other_kinds(block: type[Block]) -> Iterator[tuple[tuple[str, ...],
 def value_at(config: Any, path: Iterable[str]) -> Any:
     """Return the value at a path of keys, or None if the config lacks a block on the path."""
     return reduce(lambda block, name: getattr(block, name, None), path, config)
+
+
+def replace_key(block: Any, path: str, value: Any) -> Any:
+    """Return a copy of a block with another value at a dotted path. It is not validated."""
+    name, _, tail = path.partition(".")
+    return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})
 
 
 def annotation_of(field: FieldInfo, name: str) -> str:

@@ -50,7 +50,11 @@ class Identify(Recorded):
         1, "1", "number of starts of the fit: the config's values first, then values within 10 % of them", ge=1, le=100
     )
     max_walks: int = key(
-        10_000, "1", "number of predicted walks after which a fit ends without convergence", ge=1, le=10_000_000
+        10_000,
+        "1",
+        "maximum number of predicted walks before a fit ends without convergence",
+        ge=1,
+        le=10_000_000,
     )
     robustness: bool = key(
         False, "", "whether to report the identified gait's sensitivity norm (floor drop to step period)"
@@ -72,7 +76,7 @@ class Identify(Recorded):
     def sensors(self) -> tuple[Nuisance, ...]:
         """Properties of clock and sensors to estimate.
 
-        A camera's free tilt is an offset of all angles. So is the floor's normal, while the slope is estimated.
+        A free tilt of the camera is an offset of all angles, and so is the floor's normal if the slope is estimated.
         """
         follows = self.camera_tilt_deg == "floor" and self.level == "angles" and "slope_deg" in self.keys
         return tuple(dict.fromkeys((*self.nuisance, *((OFFSET,) if follows or self.camera_tilt_deg == "free" else ()))))

@@ -31,8 +31,8 @@ def statements(model: AdamsModel) -> Iterator[str]:
         for marker_name, marker in model.markers.items():
             if marker.part == name:
                 place = "FLOATING" if marker.floating else f"QP = {values(*marker.place)}"
-                own = marker_name.rpartition(".")[2]
-                yield from named_statement(own, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
+                short_name = marker_name.rpartition(".")[2]
+                yield from named_statement(short_name, f"MARKER/{ids[marker_name]}", f"PART = {number}", place)
     for name, joint in model.joints.items():
         head = f"{'JPRIM' if joint.kind == 'INLINE' else 'JOINT'}/{ids[name]}"
         yield from named_statement(name, head, joint.kind, f"I = {ids[joint.i]}", f"J = {ids[joint.j]}")
@@ -149,7 +149,7 @@ def view_text(model: AdamsModel, head: Iterable[str], end_s: float, pinned_until
     lines = ["! CMD Version:2", *(f"! {line}" for line in head)]
     commands = ", ".join(map(quote, model.commands(end_s, pinned_until_s)))
     script = command("simulation script create", sim_script_name=f".{model.name}.walk", solver_commands=commands)
-    lines += [line for each in (*building(model), script) for line in each]
+    lines += [line for each in (*build_commands(model), script) for line in each]
     return "\n".join([*lines, ""])
 
 
@@ -163,7 +163,7 @@ def quote(text: str) -> str:
     return f'"{text}"'
 
 
-def building(model: AdamsModel) -> Iterator[list[str]]:
+def build_commands(model: AdamsModel) -> Iterator[list[str]]:
     root = f".{model.name}"
 
     def full(name: str) -> str:
@@ -265,19 +265,19 @@ def bodies(model: AdamsModel, full: Naming) -> Iterator[list[str]]:
             motion = {"vx": vx, "vy": vy, "vz": "0", "wx": "0", "wy": "0", "wz": f"({finite(part.spin)}(rad/sec))"}
             yield command("part create rigid_body initial_velocity", part_name=full(name), **motion)
     for name, shape in model.shapes.items():
-        own = full(model.shape_name(name))
+        shape_path = full(model.shape_name(name))
         sizes = [finite(edge) for edge in shape.size]
         if shape.kind == "BOX":
             corner = {"corner_marker": full(shape.marker), "diag_corner_coords": ", ".join(sizes)}
-            yield command("geometry create shape block", block_name=own, **corner)
+            yield command("geometry create shape block", block_name=shape_path, **corner)
         else:
             scales = {f"{axis}_scale_factor": size for axis, size in zip("xyz", sizes, strict=True)}
             centre = {"center_marker": full(shape.marker)}
-            yield command("geometry create shape ellipsoid", ellipsoid_name=own, **centre, **scales)
+            yield command("geometry create shape ellipsoid", ellipsoid_name=shape_path, **centre, **scales)
     for name, ends in model.outlines.items():
-        own = full(f"{model.markers[ends[0]].part}.{name}")
+        shape_path = full(f"{model.markers[ends[0]].part}.{name}")
         points = ", ".join(full(end) for end in ends)
-        yield command("geometry create curve outline", outline_name=own, marker_name=points)
+        yield command("geometry create curve outline", outline_name=shape_path, marker_name=points)
 
 
 def format_rotation(angle: float) -> str:

@@ -33,7 +33,7 @@ PAD_MM = 50.0
 """Thickness of the pads."""
 LEGS = ("leg_1", "leg_2")
 FRICTION_NAMES = ("mu_static", "mu_dynamic", "stiction_transition_velocity", "friction_transition_velocity")
-"""ADAMS's names for the parameters of `Coulomb`, in its order."""
+"""ADAMS's names for the fields of `Coulomb`, in the same order."""
 REFERENCE = re.compile(r"\{([\w.]+)\}")
 """Name of a marker or variable in an expression."""
 OUTPUT_S = 1e-3
@@ -79,7 +79,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Shape:
-    """Ellipsoid centred on a marker, or box with a corner there. `size` holds its diameters or edge lengths (mm)."""
+    """Ellipsoid around a marker, or box with a corner at it. `size` holds its diameters or edge lengths (mm)."""
 
     kind: str
     marker: str
@@ -158,7 +158,7 @@ class AdamsModel:
 
     @cached_property
     def numbers(self) -> dict[str, int]:
-        """Number of each object within its kind, from 1."""
+        """Number of each object among those of its kind, counted from 1."""
         primitives = [name for name, joint in self.joints.items() if joint.kind == "INLINE"]
         # ADAMS numbers primitives separately from joints.
         joints = [name for name in self.joints if name not in primitives]
@@ -234,7 +234,7 @@ class MovingFrame(NamedTuple):
     spin: float
 
     def moved_to(self, point: Position) -> "MovingFrame":
-        """Return the parallel frame at a point of this one."""
+        """Return the parallel frame with its origin at a point of this frame."""
         s, c = math.sin(self.angle), math.cos(self.angle)
         x, y = c * point[0] - s * point[1], s * point[0] + c * point[1]
         velocity = self.velocity[0] - self.spin * y, self.velocity[1] + self.spin * x
@@ -276,7 +276,7 @@ def add_bodies(model: AdamsModel, export: Exported) -> None:
         weights = {f"hinge_of_{names[link]}": weight for link, weight in coupling.items()}
         model.couplers[f"coupler_{number + 1}"] = weights
     for foot, ball in enumerate(planar.balls):
-        # parts turn only about the normal of the plane, so a ball stays at its distance from the plane, in its lane
+        # Parts turn only about the normal of the plane, so each ball keeps its distance from the plane and its lane.
         name = names[ball.link]
         model.markers[f"{name}.foot"] = marker_at(name, ball.centre_m)
         model.markers[f"{name}.ball"] = marker_at(name, ball.centre_m, export.lane_across_m(foot))
@@ -333,7 +333,7 @@ class FootTerms:
         return f"DY({self.place()})-{finite(self.radius)}" if self.radius else f"DY({self.place()})"
 
     def restrict_to_pads(self, expression: str, elsewhere: str = "0") -> str:
-        """Restrict an expression to the pads of the foot's lane. Over the gaps between them it is `elsewhere`."""
+        """Restrict an expression to the pads of the foot's lane. Between the pads its value is `elsewhere`."""
         terrain = self.export.scene.ground.terrain
         if not terrain.has_pads:
             return expression
@@ -360,7 +360,7 @@ def add_ground(model: AdamsModel, export: Exported) -> None:
 
 
 def laws(export: Exported) -> tuple[Impact, Coulomb | None]:
-    """Return normal-force law and Coulomb friction (None: no friction) in N, mm, s.
+    """Return the normal-force law and Coulomb friction in N, mm and s. Friction is None if there is none.
 
     Raises ConfigError for other laws.
     """
@@ -440,7 +440,7 @@ def add_push_offs(model: AdamsModel, export: Exported) -> None:
         return
     for number, leg in enumerate(LEGS):
         foot = FootTerms(export, number)
-        # leg_1 touches down first, so leg_2 is the first to trail
+        # Leg 1 touches down first, so leg 2 is the first trailing leg.
         pulses = [f"{leg}_pulse_{pulse + 1}" for pulse in range(len(export.touches_s[1 - number :: 2]))]
         for pulse, time in zip(pulses, export.touches_s[1 - number :: 2], strict=True):
             begin = finite(time)

@@ -126,7 +126,7 @@ def scene_for_engines(scene: ContactScene, rigid_state: State) -> EngineScene:
 
 @dataclass(frozen=True)
 class EngineContact:
-    """Properties that the native contact model of an engine is tuned to reproduce, SI."""
+    """Properties, in SI units, that the native contact model of an engine is tuned to reproduce."""
 
     mass: float  # mass that rests on one foot (kg)
     gravity: float  # gravity towards the ground (m/s^2)

@@ -58,9 +58,9 @@ Slope = Literal["gravity", "geometry"]
 
 @dataclass(frozen=True)
 class Foot:
-    """Ball of a foot: name, collision group, position across the walk (m), and its leg's links with their lower ends.
+    """Ball of a foot: name, collision group, lateral position (m), and the parts of its leg.
 
-    limbs  link and lower end (m) of each part of the leg to draw, in the link's frame
+    limbs  for each part of the leg that is drawn: its link, and its lower end (m) in the link's frame
     """
 
     name: str
@@ -126,7 +126,7 @@ def inverse_weights(model: PlanarModel) -> InverseWeights:
     centres: list[Floats] = []
     mass_matrix = np.zeros((model.size, model.size))
     for number, link in enumerate(model.links):
-        # rates along the ground, normal to it and of turning (3, coordinates), of the link's material at its hinge
+        # velocity along the ground and normal to it, and rate of turning (3, coordinates), of each link at its hinge
         hinge = np.zeros((3, model.size))
         if link.parent < 0:
             hinge[:, : len(model.freedoms)] = base_rates

@@ -20,7 +20,7 @@ WINDOW_CLOSES_S = 5.0
 class Walk:
     """Walk from the keyframe `gait`: a control callback for push-offs, hip torque, touchdowns and knees.
 
-    It judges by the state at each time step. A knee locks when it has been bent and comes straight, by a plastic impact
+    It reacts to the state at each time step. A knee locks when it has been bent and straightens, by a plastic impact
     or, if it has a stop, when the stop turns it back. The trailing knee is released after the next touchdown.
 
     stance  index of the stance foot, 0 or 1
@@ -53,7 +53,7 @@ class Walk:
         mujoco.set_mjcb_control(self.control)
 
     def begin(self) -> None:
-        """Stand on the second leg, with its knee locked and the other one free."""
+        """Stand on the second leg, whose knee is locked while the other one is free."""
         self.time_s = -1.0
         self.stance = 1
         self.touches_s: list[float] = []
@@ -66,7 +66,7 @@ class Walk:
             self.model.jnt_limited[knee] = 0
 
     def control(self, _model: Any, data: Any) -> None:
-        """Apply push-off and hip torque. Once in a time step, look for a touchdown and turn the knees."""
+        """Apply push-off and hip torque. Once in a time step, also look for touchdowns and update the knees."""
         # MuJoCo's control callback is global, so it also runs for other data.
         if data is not self.data:
             return
@@ -98,7 +98,7 @@ class Walk:
             self.sinks = self.pushes = True
 
     def scale_friction(self) -> None:
-        """Let the friction's damper grow with the load on the feet, as in ADAMS: a strike is many times the weight."""
+        """Let the friction's damper grow with the load on the feet, as in ADAMS. At a strike it is many weights."""
         load = self.data.qfrc_constraint[self.height]
         self.model.opt.impratio = self.impratio * max(1.0, load / self.weight)
 
@@ -195,8 +195,8 @@ def main(path: str, steps: int, view: bool) -> None:
     period = np.diff(walk.touches_s, prepend=0.0)[-1]
     length = np.diff(walk.touches_m, prepend=0.0)[-1]
     its_periods, its_lengths = walk.model.numeric("steps_in_walkerlab").data.reshape(2, -1)
-    known = min(steps, len(its_periods))
-    theirs = f"step {known} in walkerlab: {its_periods[known - 1]:.4f} s, {its_lengths[known - 1]:.4f} m"
+    compared = min(steps, len(its_periods))
+    theirs = f"step {compared} in walkerlab: {its_periods[compared - 1]:.4f} s, {its_lengths[compared - 1]:.4f} m"
     print(f"step {steps}: {period:.4f} s, {length:.4f} m; {theirs}")
 
 

@@ -33,7 +33,7 @@ from walkerlab.physics.mechanics.rigid_model import (
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-SHANK: Final = 1.4  # smallest ratio of a shank's farthest angle behind to that at heel strikes; for a thigh it is 1
+SHANK: Final = 1.4  # a leg whose farthest angle behind is this many times that at heel strikes is a shank
 WIDEST_RAD: Final = math.radians(100.0)  # largest credible angle between the legs at a heel strike
 SPLINE_DEGREE: Final = 5
 INTERVALS: Final = 24  # largest number of knot intervals of the spline through a step
@@ -44,7 +44,7 @@ PLAUSIBLE: Final = (1e-6, 1e6)
 NARROWEST_RAD: Final = 0.02  # smallest angle between the legs at heel strikes that raises no doubt about its unit
 SHORTEST_STEP: Final = 0.25  # shortest credible step, as a fraction of half a period of the hanging leg
 LOUDEST: Final = 0.2  # largest scatter of the angles, as a fraction of the angle between legs that are far apart
-FEWEST_ALTERNATING: Final = 2  # fewest heel strikes of each leg that show whether lengths alternate
+FEWEST_ALTERNATING: Final = 2  # minimum number of heel strikes of each leg to judge whether lengths alternate
 ALTERNATING: Final = 0.004  # smallest difference of alternating lengths, as a fraction of their sum
 SIDE_ERRORS: Final = 6.0  # like JUMP_ERRORS, for one leg and so half of the strikes
 SEARCH_OFFSET_RAD: Final = 0.03  # offset from the likely sum of angles at which the search for the tilt begins
@@ -54,9 +54,9 @@ FAR_CLOCK: Final = 1.15  # ratio of the clock's rate to that of the swinging leg
 TURN_RAD: Final = 1e-3  # rotation of the walker with which its potential energy is differentiated
 LEGS_ALONE: Final = 2  # number of bodies of a walker without torso and knees
 PHASES: Final = 21
-COARSE: Final = 0.2  # largest step between digits, as a fraction of an error that they show
-CONSTANT: Final = 0.25  # largest scatter of a constant error over a step, as a fraction of it
-SMALLEST: Final = 1e-30  # m, distance by which it is divided
+COARSE: Final = 0.2  # largest spacing of recorded values, as a fraction of an error that they can show
+CONSTANT: Final = 0.25  # an error is constant if its scatter over a step is at most this fraction of it
+SMALLEST: Final = 1e-30  # m, smallest distance by which a value is divided
 SIDE: Final = 1e-10  # time from the last sample of a step to the heel strike, as a fraction of the walk's duration
 
 
@@ -74,7 +74,7 @@ class RecordedSteps:
     scatter_rad: float  # scatter of the angles around heel strikes
     swapped: bool  # whether the recording's second leg swings first
     origin_s: float  # the recording's time at the first heel strike
-    doubts: tuple[str, ...]  # what is odd about the heel strikes
+    doubts: tuple[str, ...]  # oddities of the heel strikes
 
 
 def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_sum_rad: float = 0.0) -> RecordedSteps:
@@ -106,13 +106,13 @@ def divide_into_steps(walk: RecordedWalk, model: RigidModel, source: str, touch_
         )
     step_s = (touches[-1].time_s - touches[0].time_s) / (len(touches) - 1)
     refuse_duration(step_s, source)
-    refuse_hurry(step_s, model, source)
+    refuse_short_steps(step_s, model, source)
     refuse_spread(walk, touches, source)
     offsets = offset_doubts(walk.time_s, angle, touches, model, touch_sum_rad, height)
     doubts += [*unit_doubts(touches), *knee_doubts(walk, touches, model), *offsets]
     steps = build_steps(walk, model, touches, tuple(doubts))
     refuse_lengths(steps, source)
-    # energy jumps at heel strikes, so that the clock shows only if these are certain
+    # Energy jumps at heel strikes, so the clock's rate can be seen only if these are certain.
     return scale_to_belt(walk, steps if offsets else add_clock_doubt(steps, model))
 
 
@@ -185,9 +185,9 @@ def scale_to_belt(walk: RecordedWalk, steps: RecordedSteps) -> RecordedSteps:
 def add_clock_doubt(steps: RecordedSteps, model: RigidModel) -> RecordedSteps:
     """Add a doubt if the legs swing as if the clock were wrong, as in a film that is played at another speed.
 
-    Energy is constant within a step of straight legs that nothing drives. In the clock's time kinetic energy is smaller
-    by the clock rate squared, so its changes over those of potential energy show the rate. A tilt of the recording
-    turns gravity, and is fitted as well.
+    Energy is constant within a step of straight legs that nothing drives. If the clock runs fast by a factor r, the
+    measured kinetic energy is too small by r^2. So the ratio of its changes to those of the potential energy gives r.
+    The tilt of the recording, which turns gravity, is fitted as well.
     """
     if model.kneed or not model.passive or len(model.arm_x) > LEGS_ALONE:
         return steps
@@ -363,7 +363,7 @@ def unit_doubts(touches: list[Touch]) -> Iterator[str]:
         )
 
 
-def refuse_hurry(step_s: float, model: RigidModel, source: str) -> None:
+def refuse_short_steps(step_s: float, model: RigidModel, source: str) -> None:
     """Raise ConfigError for steps that are far shorter than a leg takes to swing forwards."""
     gravity = math.hypot(model.gravity_along, model.gravity_down)
     weight = gravity * math.hypot(model.arm_x[SWING], model.arm_y[SWING])

@@ -203,7 +203,7 @@ def require_contact(config: ContactConfig) -> Contact:
 
 
 def contact_gait(config: ContactConfig, rigid_step_length_m: float, rigid_state: State) -> GaitAnswer:
-    """Find the contact model's gait on pads one step of that gait apart, searching from a rigid start state.
+    """Find the contact model's gait on pads whose pitch is the step length of that gait, starting from a rigid state.
 
     rigid_step_length_m  initial pad pitch
     """

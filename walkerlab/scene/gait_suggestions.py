@@ -1,7 +1,7 @@
 """Suggest changes that give a walker a gait: its feet ahead of its shanks, or another slope.
 
-Kneed walkers are tried with their feet slightly ahead of the shanks, as in real machines. Gaits are searched for on a
-few slopes, and their branches are followed over the slope.
+For kneed walkers, the search also moves the feet slightly ahead of the shanks, as in real machines. It looks for gaits
+on a few slopes and follows their branches over the slope.
 """
 
 import math
@@ -43,14 +43,16 @@ class SlopeRange:
     stable: tuple[float, float] | None
 
     def nearest_slope(self, target: float) -> float:
-        """Return a slope just inside the range, at the end nearer to `target`, preferring the range of stable gaits."""
+        """Return a slope just inside the range, at its end nearer to `target`. The range of stable gaits takes
+        precedence.
+        """
         low, high = self.stable or self.slopes
         near, far = (low, high) if abs(low - target) < abs(high - target) else (high, low)
         return near + INSET * (far - near)
 
 
 def find_slopes_with_gaits(config: Config) -> SlopeRange | None:
-    """Return the nearest range of slopes with gaits, preferring stable gaits, or None if no gait is found."""
+    """Return the nearest range of slopes with gaits, or None if no gait is found. Stable gaits take precedence."""
     slope = config.slope_rad
     span = ValueSpan(0.02 * slope, min(MAX_FOLLOWED_TO, max(3.0 * slope, MIN_FOLLOWED_TO)))
     ranges: list[SlopeRange] = []
@@ -75,8 +77,8 @@ def follow(walker_at: WalkerAt, span: ValueSpan, value: float) -> tuple[GaitBran
 
 
 def walkable_ranges(branches: tuple[GaitBranch, ...]) -> Iterator[SlopeRange]:
-    """Yield the range of slopes of each branch on which the ground need not pull on the foot, and its longest stable
-    part.
+    """Yield, for each branch, the slopes on which the ground need not pull on the foot, with the longest range of
+    stable gaits among them.
     """
     for branch in branches:
         # The first monitor of the rigid model is the minimum normal force.
@@ -94,7 +96,7 @@ def suggest_gaits(scene: RigidConfig) -> str:
     """Suggest gaits near a scene that has none, as commands, or return '' on slopes that do not descend."""
     if scene.slope_rad <= 0.0:
         return ""
-    config = rigid_alone(scene)
+    config = rigid_config(scene)
     feet = find_gait_with_feet_ahead(config)
     suitable = find_slopes_with_gaits(config)
     advice = []
@@ -122,7 +124,7 @@ def round_inward(low: float, high: float) -> tuple[float, float]:
     return rounded if rounded[0] < rounded[1] else (low, high)
 
 
-def rigid_alone(scene: RigidConfig) -> Config:
+def rigid_config(scene: RigidConfig) -> Config:
     """Return a config with only the keys on which a gait of the rigid model depends."""
     data = {name: getattr(scene, name) for name in keys_of(RigidConfig)}
     push_off = {"impulse_N_s": scene.push_off.impulse_N_s, "leg_2": scene.push_off.leg_2}

@@ -83,11 +83,11 @@ CONTACT_WALKS: Final = Tolerances("radau5", 1e-8, 1e-10, 60_000)
 MIN_PRIOR_GAIN: Final = 1e-3  # a smaller relative reduction of the variance of a prior counts as no information
 STRONG_PULL: Final = 3.0  # standard deviations beyond which a bound or prior contradicts the walk
 LINEAR_MOVE: Final = 0.3  # largest change, in a parameter's scale, over which a walk counts as linear
-DECISIVE_GAIN: Final = 3.0  # of the log-likelihood, beyond which one more parameter explains the walk better
-PROMISING_GAIN: Final = 1.0  # of the log-likelihood with the noise as it is, below which one more is not pursued
-MOST_FREED: Final = 3  # number of parameters that are freed in turn
-SMALLEST_CHANGE: Final = 1e-4  # of a freed parameter, in its scale, that explains anything
-RARE_GAIN: Final = 0.03  # probability of a gain in right walks, with as many values, above which it is no surprise
+DECISIVE_GAIN: Final = 3.0  # gain of log-likelihood above which one more parameter explains the walk better
+PROMISING_GAIN: Final = 1.0  # gain of log-likelihood, with unchanged noise, from which on a new fit is worthwhile
+MAX_FREED: Final = 3  # maximum number of parameters that are freed in turn
+SMALLEST_CHANGE: Final = 1e-4  # smallest change of a freed parameter, in its scale, that counts as an explanation
+RARE_GAIN: Final = 0.03  # a gain is surprising if it is more improbable than this under the right model
 GAIT_EFFORT: Final = Effort(1e-9, 40)
 GAIT_NAMES: Final = ("period_s", "step_length_m", "spectral_radius", "drop_sensitivity_s_m")
 
@@ -233,7 +233,7 @@ def identify_beginning(
     problem = replace(problem, forecast=replace(problem.forecast, kicked=kicked))
     fits = [
         fit(problem, start, begin(f"{model} model, start {number} of {question.starts}", MAX_ROUNDS))
-        for number, start in enumerate(starts_of(problem, question.starts), 1)
+        for number, start in enumerate(fit_starts(problem, question.starts), 1)
     ]
     predicted = [result for result in fits if result is not None]
     if not predicted:
@@ -274,7 +274,7 @@ def problem_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identi
     return FitProblem(forecast, leg_m, family.start, bounds, priors, loss, question.max_walks)
 
 
-def starts_of(problem: FitProblem, count: int) -> list[Floats]:
+def fit_starts(problem: FitProblem, count: int) -> list[Floats]:
     """Return the starts of the fit, each (unknowns,): the config's values, then random values near them."""
     rng = np.random.default_rng(0)
     count_parameters = problem.forecast.scales.size
@@ -402,7 +402,7 @@ def strong_pulls(pulls: Sequence[Pull]) -> tuple[Pull, ...]:
 
 def describe_pull(pull: Pull) -> str:
     return (
-        f"the walk pulls {pull.key} against its {pull.against} of {pull.value:g} by {pull.standard_deviations:.2g} "
+        f"the walk contradicts the {pull.against} of {pull.value:g} for {pull.key} by {pull.standard_deviations:.2g} "
         "standard deviations"
     )
 
@@ -412,7 +412,7 @@ def suggest_parameter(
 ) -> Iterator[str]:
     """Yield a fixed parameter or nuisance that would raise the log-likelihood if it were estimated as well.
 
-    Any additional parameter fits a short walk better, so the gain must also be a rare one for as many values.
+    A short walk is fitted better by any additional parameter, so the gain must also be rare for that number of values.
     """
     data = fitted.data
     priors = np.column_stack((data.prior, np.zeros(len(data.prior))))
@@ -420,7 +420,7 @@ def suggest_parameter(
     gains = [evaluate(rows, fitted.noise).likelihood - fitted.evaluation.likelihood for rows in widened]
     values = data.residuals.size
     freedom = max(1, values - fitted.u.size - 1)
-    for index in np.argsort(gains)[: -MOST_FREED - 1 : -1].tolist():
+    for index in np.argsort(gains)[: -MAX_FREED - 1 : -1].tolist():
         other = others[index]
         if gains[index] < PROMISING_GAIN:
             return
@@ -483,7 +483,7 @@ def sensitivities(
 ) -> Iterator[EstimateSensitivity]:
     """Yield how much each determined estimate changes if a fixed parameter is 1 % larger, to first order.
 
-    The change of an estimate is that of least squares with the noise as it is, without bounds.
+    The changes are those of a least-squares fit with the present noise and without bounds.
     """
     data = fitted.data
     prior = np.column_stack((np.zeros(len(data.prior)), data.prior[:, 1:]))
@@ -499,7 +499,7 @@ def sensitivities(
 
 
 def one_percent(parameter: Fixed, config: ContactConfig) -> float:
-    """Return 1 % of a parameter. For lengths and inertias of zero, use the leg. Drives of zero do not change."""
+    """Return 1 % of a parameter. A length or inertia of zero changes by 1 % of that of a leg, a drive not at all."""
     leg, (*block, name) = config.walker.leg_length_m, parameter.name.split(".")
     if parameter.value or parameter.unit == "m":
         return 0.01 * abs(parameter.value or leg)
@@ -519,7 +519,7 @@ def fixed_keys(subject: ModelUnderTest, question: Identify) -> list[str]:
 def fixed_parameters(
     subject: ModelUnderTest, question: Identify, fitted: Fitted, fixed: Sequence[str]
 ) -> Iterator[Fixed]:
-    """Yield each fixed parameter, and each nuisance that is not estimated, along which walks can be predicted."""
+    """Yield each fixed parameter and each other nuisance, if walks can be predicted at changed values."""
     config = subject.config
     forecast = fitted.forecast
     count = len(question.keys)
@@ -644,7 +644,7 @@ def gait_with_errors(fitted: Fitted, covariance: Floats, units: Units | None) ->
     slopes = np.zeros((forecast.scales.size, centre.size))
     names = GAIT_NAMES[: centre.size]
     for index, unit in enumerate(np.eye(fitted.u.size)[: forecast.scales.size]):
-        # for measured steps, the derivatives of the walk take the same step, so these walkers are cached
+        # The derivatives of measured steps use the same differences, so these walkers are already cached.
         slope = derivative(lambda share, unit=unit: quantities(share * unit), EXACT_STEP)  # type: ignore[misc]
         if slope is None:
             return {name: Uncertain(float(v), None) for name, v in zip(names, centre, strict=True)}

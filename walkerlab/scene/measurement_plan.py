@@ -146,7 +146,7 @@ def walk_of(subject: ModelUnderTest, measured: MeasuredWalk, question: Identify)
 def expected_errors(
     walk: PlannedWalk, measured: Collection[str], keys: tuple[str, ...], plan: Plan, steps: int
 ) -> Errors:
-    """Return the errors that remain after measuring these quantities of the first steps, and what stays open."""
+    """Return the errors that remain after measuring these quantities of the first steps, and the open combinations."""
     noise = {STEP_PERIOD: plan.period_noise_s, STEP_LENGTH: plan.length_noise_m, LEG_ANGLE: plan.angle_noise_rad}
     data = walk.data
     quantities = walk.forecast.quantities

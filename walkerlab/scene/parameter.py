@@ -95,7 +95,7 @@ SLOPE = Parameter(SLOPE_RAD, "rad", (SLOPE_RAD,))
 
 
 def stated_value(config: ContactConfig, path: tuple[str, ...]) -> Any:
-    """Return the value at a path of keys. A key that the second leg leaves out has the value of the first leg."""
+    """Return the value at a path of keys. A key that is left out for the second leg has the value of the first leg."""
     value = fields.value_at(config, path)
     return fields.value_at(config, first_leg_path(path)) if value is None else value
 
@@ -127,7 +127,7 @@ def dotted(key: Key) -> str:
 
 
 def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
-    """Return the parameter for a config key.
+    """Return the parameter that a config key names.
 
     Raises ConfigError if the key is not a number that a model uses.
     """
@@ -135,7 +135,7 @@ def parameter_of(key: str, config: ContactConfig, asker: Key = ()) -> Parameter:
     if key == SLOPE_DEG:
         return Parameter(key, "deg", (SLOPE_RAD,))
     own = {".".join(path): field for path, field in fields.leaves(Config, held=config)}
-    reason = why_no_parameter(key, config, own, stated_value)
+    reason = explain_non_parameter(key, config, own, stated_value)
     if reason:
         raise ConfigError(f"{f'{dotted(asker)}: ' if asker else ''}{printable(key)} {reason}", _KEY_ADVICE, asker)
     unit = fields.annotation_of(own[key], "unit") or "1"
@@ -149,10 +149,10 @@ def parameter_keys(config: ContactConfig) -> Iterator[str]:
     """Yield the dotted keys of the parameters of a config. The slope has the unit that the config uses."""
     own = {".".join(path): field for path, field in fields.leaves(Config, held=config)}
     written = {SLOPE_RAD: SLOPE_DEG} if slope_in_degrees(config.slope_rad) is not None else {}
-    yield from (written.get(key, key) for key in own if not why_no_parameter(key, config, own))
+    yield from (written.get(key, key) for key in own if not explain_non_parameter(key, config, own))
 
 
-def why_no_parameter(
+def explain_non_parameter(
     key: str, config: ContactConfig, own: Mapping[str, FieldInfo], value_of: Callable[..., Any] = fields.value_at
 ) -> str:
     """Explain why a key is not a parameter of the config's models, or return '' if it is one."""

@@ -38,7 +38,7 @@ def foothold_heights(ground: Footholds, steps: int) -> Floats | None:
 
 
 FIRST_STEP = Tolerances("dop853", 1e-10, 1e-12, ENDLESS)
-CACHED_LEVEL_WALKERS = 16  # a family over slopes reuses its walker on level ground
+CACHED_LEVEL_WALKERS = 16  # families over slopes reuse their walkers on level ground
 
 
 @dataclass(frozen=True)

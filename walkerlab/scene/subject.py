@@ -77,7 +77,7 @@ def iterate_values(value: Any) -> Iterator[Any]:
 
 
 def model_reads(model: str, config: ContactConfig, key: str) -> bool:
-    """Whether a parameter affects a model. Returns True if the config allows no neighbouring value to test with."""
+    """Whether a parameter affects a model. This is assumed if the config allows no neighbouring value for a test."""
     parameter = parameter_of(key, config)
     value = parameter.value_in(config)
     neighbours = (value + sign * RELATIVE_CHANGE * (abs(value) or 1.0) for sign in (1.0, -1.0))
@@ -92,7 +92,7 @@ def refuse_unread(where: str, key: str, config: ContactConfig, models: Sequence[
 
 
 def unused_key_error(where: str, key: str, models: Sequence[str]) -> ConfigError:
-    """Build the error about the config key `where` that names a parameter `key` which affects none of the models."""
+    """Build the error for a config key `where` that names a parameter `key` which none of the models uses."""
     return ConfigError(
         f"{where}: {key} does not affect the {' or the '.join(models)} model",
         "Choose a key that the model uses, or another model (--model).",
@@ -126,7 +126,9 @@ class ModelUnderTest:
         return GaitOnMap(step_map, p, self.z, walk_steps(step_map, self.z, p, step_map.stride).DP, self.units)
 
     def quick_by_leg(self) -> list[GaitOnMap]:
-        """Return the gait from the start of each leg's step (once for equal legs), on a map of quick walks."""
+        """Return the gait on a map of quick walks, once for each leg that may begin to swing, or only once for equal
+        legs.
+        """
         quick = QUICK_WALKS[self.model]
         return [
             gait._replace(step_map=gait.step_map.replace_tolerances(quick))
@@ -161,7 +163,7 @@ def find_model_gait(
     """Find the gait of a model, on ground without pads for the contact model.
 
     gait  summary of `fixedpoint`
-    note  receives a message about each difference from the config's scene
+    note  receives a message about each difference from the scene of the config
 
     Raises NoAnswer if it has no gait.
     """

@@ -14,28 +14,10 @@ from walkerlab.config.check import Check
 from walkerlab.config.problems import suggestion
 from walkerlab.config.reads import CheckConfig
 from walkerlab.errors import ConfigError
-from walkerlab.evidence.check.conventions import Convention, coordinates_of, put_feet_on_slope, start_from, stated
-from walkerlab.evidence.check.explanations import (
-    Explanation,
-    Question,
-    advise_on_ambiguity,
-    explain,
-    find_periodic_changes,
-)
-from walkerlab.evidence.check.gaits import CheckedStep, gait_near, plain_walker, scales, why_not_plain
-from walkerlab.evidence.check.plain_walker import EXACT, STANCE, STRAIGHT, SWING, Floats, PlainStep, PlainWalker
-from walkerlab.evidence.check.printed import (
-    DIFFERENT,
-    EXACT_ERROR,
-    EXPLAINED,
-    NOT_COMPARABLE,
-    REPRODUCED,
-    UNEXPLAINED,
-    Item,
-    items_of,
-    judge,
-    spell_name,
-)
+from walkerlab.evidence.check.explanations import Explanation, Question, advise, explain, find_periodic_changes
+from walkerlab.evidence.check.gaits import CheckedStep, Convention, gait_near, put_feet_on_slope, stated
+from walkerlab.evidence.check.plain_walker import EXACT, Floats, PlainStep, PlainWalker, plain_walker, why_not_plain
+from walkerlab.evidence.check.printed import EXACT_ERROR, UNEXPLAINED, Item, Verdict, items_of, judge, spell_name
 from walkerlab.physics.orbits.fixed_point import GaitSearch, find_gaits
 from walkerlab.pipeline.stages.fixedpoint import gait_summary
 from walkerlab.scene.rigid import rigid_walker, state_names
@@ -154,7 +136,7 @@ class Checked:
             return None
         nearest = min(self.gaits, key=self.distance)
         printed = self.printed_state("state", self.walker.full_state(nearest.start))
-        start = None if printed is None else start_from(self.walker, printed[0], self.convention.instant)
+        start = None if printed is None else self.walker.start_from(printed[0], self.convention.instant)
         if start is None or np.abs(start - nearest.start).max() < SAME_GAIT:
             return nearest
         other = gait_near(self.walker, start, nearest.derivative) or nearest
@@ -192,9 +174,9 @@ class Checked:
         printed = self.printed_state("state", self.walker.full_state(self.right.start))
         if printed is None:
             return None
-        start = start_from(self.walker, printed[0], self.convention.instant)
+        start = self.walker.start_from(printed[0], self.convention.instant)
         step = None if start is None else self.walker.step(start)
-        return PrintedStep(start, step, coordinates_of(self.walker, printed[1]))
+        return PrintedStep(start, step, self.walker.coordinates(printed[1]))
 
 
 class PrintedStep(NamedTuple):
@@ -248,7 +230,7 @@ def check_gait(config: CheckConfig) -> dict[str, Any]:
         **energy_drift(checked, right),
         "explanations": [asdict(each) for each in explanations],
         "closest": closest,
-        "undecided": advise_on_ambiguity(explanations),
+        "undecided": advise(explanations),
         "searched": searched,
         "nearest_gait": nearest_gait(checked, right),
         "routes": routes(checked, right),
@@ -259,7 +241,7 @@ def answer_without(check: Check, reason: str) -> dict[str, Any]:
     """Return the answer if there is no right gait to compare with."""
     items = items_of({**check.printed, "state_before": check.state_before}, {})
     rows = [judge(item, None, reason).row for item in items]
-    head = {"source": check.source.model_dump(), "finding": NOT_COMPARABLE, "reason": reason, "values": rows}
+    head = {"source": check.source.model_dump(), "finding": Verdict.NOT_COMPARABLE, "reason": reason, "values": rows}
     lists: dict[str, Any] = {"momenta": [], "explanations": [], "undecided": "", "searched": False}
     return {**head, **lists, **dict.fromkeys(("periodic", "closest", "nearest_gait", "routes"))}
 
@@ -267,12 +249,12 @@ def answer_without(check: Check, reason: str) -> dict[str, Any]:
 def finding_of(rows: Sequence[Mapping[str, Any]], explanations: Sequence[Explanation]) -> str:
     """Summarise the verdicts: reproduced, explained, different without explanation, or not comparable."""
     verdicts = {row["verdict"] for row in rows}
-    wrong = {row["name"] for row in rows if row["verdict"] == DIFFERENT}
+    wrong = {row["name"] for row in rows if row["verdict"] == Verdict.DIFFERENT}
     if explanations and wrong.issubset(explanations[0].reproduces):
-        return EXPLAINED
-    if DIFFERENT in verdicts:
+        return Verdict.EXPLAINED
+    if Verdict.DIFFERENT in verdicts:
         return UNEXPLAINED
-    return REPRODUCED if REPRODUCED in verdicts else NOT_COMPARABLE
+    return Verdict.REPRODUCED if Verdict.REPRODUCED in verdicts else Verdict.NOT_COMPARABLE
 
 
 def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
@@ -284,7 +266,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
     start, step, rounding = printed
     if start is None or step is None:
         return {"residual": None, "digits": 0, "is_periodic": False}
-    unit = scales(walker, len(start))
+    unit = walker.scales(len(start))
     residual = np.abs(step.after - start)
     # change over the step that the rounding of the printed state explains
     allowed = np.abs(right.derivative - np.eye(len(start))) @ rounding + EXACT_ERROR * unit
@@ -301,7 +283,7 @@ def periodicity(checked: Checked, right: CheckedStep) -> dict[str, Any] | None:
     }
     if checked.convention.origin == "vertical" and checked.convention.instant == "after-strike":
         # both feet stand on the slope that the legs' angles have
-        answer["slope_rad"] = float(walker.slope - 0.5 * (start[SWING] + start[STANCE]) - walker.lean)
+        answer["slope_rad"] = walker.slope - 0.5 * walker.feet_apart(start)
     return answer
 
 
@@ -348,13 +330,14 @@ def energy_drift(checked: Checked, right: CheckedStep) -> dict[str, Any]:
     end = checked.printed_state("state_before", right.step.before)
     if start is None or end is None:
         return {}
-    return {"energy_drift_J": walker.energy(STRAIGHT, end[0]) - walker.energy(STRAIGHT, start[0])}
+    return {"energy_drift_J": walker.energy(end[0]) - walker.energy(start[0])}
 
 
 def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
     """Describe the right gait that is nearest to the printed one."""
     names = ("period_s", "step_length_m", "multipliers", "spectral_radius")
-    values = {name: gait.quantity(name) for name in names} | checked.gaits.get(gait, {})
+    measured = checked.gaits.get(gait, {})
+    values = {name: measured[name] if name in measured else gait.quantity(name) for name in names}
     radius = values["spectral_radius"]
     return {
         "state": [*(float(angle) - gait.walker.slope for angle in gait.start[:2]), *map(float, gait.start[2:])],
@@ -369,7 +352,7 @@ def nearest_gait(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
 
 def routes(checked: Checked, gait: CheckedStep) -> dict[str, Any]:
     """Compare both routes: the compiled model's gait must return to itself in the plain model."""
-    unit = scales(gait.walker, len(gait.start))
+    unit = gait.walker.scales(len(gait.start))
     period = checked.gaits.get(gait, {}).get("period_s", gait.step.period)
     difference = float(np.abs((gait.step.after - gait.start) / unit).max())
     difference = max(difference, abs(period - gait.step.period) / gait.walker.pendulum_time)

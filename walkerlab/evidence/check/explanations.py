@@ -1,27 +1,36 @@
 """Search for a cause that reproduces all printed values: other conventions, a known mistake, or a misprint.
 
-Each candidate is a walker. A step from the printed state gives a first guess of its gait. Gaits are solved only for the
-best candidates, and only a gait with every printed digit is an explanation.
+Each candidate is a walker: the plain model with a mistake that is known from publications and programs, or with a
+misprinted parameter. A step from the printed state gives a first guess of its gait. Gaits are solved only for the best
+candidates, and only a gait with every printed digit is an explanation.
 """
 
 from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from operator import itemgetter
+from itertools import pairwise
+from operator import attrgetter, itemgetter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from walkerlab.config.reads import RigidConfig
-from walkerlab.evidence.check import causes
-from walkerlab.evidence.check.causes import Candidate, MistakeFamily
-from walkerlab.evidence.check.conventions import Convention, alternatives, start_from
-from walkerlab.evidence.check.gaits import CheckedStep, gait_near
-from walkerlab.evidence.check.plain_walker import EXACT, QUICK, Floats, PlainWalker
+from walkerlab.config.fields import replace_key, short_number
+from walkerlab.config.reads import RigidConfig, flatten
+from walkerlab.evidence.check.gaits import GRAVITIES, CheckedStep, Convention, alternatives, gait_near
+from walkerlab.evidence.check.plain_walker import (
+    EXACT,
+    QUICK,
+    Floats,
+    Mistake,
+    PlainWalker,
+    list_mistakes,
+    plain_walker,
+)
 from walkerlab.evidence.check.printed import Item, spell_name
 from walkerlab.labels import join_words
 
@@ -36,6 +45,66 @@ MUCH_CLOSER = 5.0  # how much closer a cause must come to be worth telling
 READINGS = 2  # other conventions in which a mistake is searched
 NEARLY = 2.0  # ratio of two distances between which the number of changes decides
 CONVERGED: Final = 1e-6  # relative change of a fitted value
+SLOPE = "slope_rad"
+GRAVITY = "gravity_m_s2"
+FIELDS: Final[Mapping[str, Any]] = {SLOPE: "slope", GRAVITY: "gravity"}
+"""Fields of the plain walker that are keys of the config itself."""
+UNIT = re.compile(r"_(m|kg|kg_m2|rad|m_s2)$")
+
+
+class Candidate(NamedTuple):
+    """A walker that may explain the printed values."""
+
+    kind: str  # mistake or misprint
+    what: str  # ends a sentence that begins with 'All printed values follow if'
+    walker: PlainWalker
+    family: str = ""  # the mistake without its size, if it has one
+
+
+def generate_misprints(config: RigidConfig) -> Iterator[Candidate]:
+    """Yield walkers with one parameter changed as a misprint could change it."""
+    values = parameters(config)
+    for key, value in values.items():
+        for other, how in misprinted(key, value, values):
+            walker = walker_with(config, key, other)
+            if walker is not None:
+                yield Candidate("misprint", f"{key} is {short_number(other)} ({how})", walker)
+
+
+def parameters(config: RigidConfig) -> dict[str, float]:
+    """Return the parameters that are not zero, by dotted key."""
+    block = {SLOPE: config.slope_rad, GRAVITY: config.gravity_m_s2, "walker": config.walker.model_dump()}
+    return {key: value for key, value in flatten(block) if isinstance(value, float) and value and UNIT.search(key)}
+
+
+def walker_with(config: RigidConfig, key: str, value: float) -> PlainWalker | None:
+    """Return the plain walker with another value of one parameter, or None if it cannot be built."""
+    own: dict[str, Any] = {FIELDS[key]: value} if key in FIELDS else {}
+    changed = None if own else replace_key(config.walker, key.removeprefix("walker."), value)
+    walker = replace(plain_walker(config, changed), **own)
+    turns = all(part.inertia + part.mass * abs(part.centre) ** 2 > 0.0 for part in walker.parts[: 1 + walker.kneed])
+    return walker if turns and walker.leg_length > walker.radius >= 0.0 < walker.gravity else None
+
+
+def misprinted(key: str, value: float, values: Mapping[str, float]) -> list[tuple[float, str]]:
+    """Return the values for which a value may be a misprint, and how it came about."""
+    unit = UNIT.findall(key)
+    found = {other: f"the value of {name}" for name, other in values.items() if UNIT.findall(name) == unit}
+    found |= dict.fromkeys(transposed(value), "two digits are transposed")
+    found |= {float(f"{value * factor:.12g}"): "a factor of ten" for factor in (0.1, 10.0)}
+    if key == SLOPE:
+        found[math.radians(value)] = "degrees as radians"
+    if key == GRAVITY:
+        found |= dict.fromkeys(GRAVITIES, "another gravity")
+    return [(other, how) for other, how in found.items() if other != value]
+
+
+def transposed(value: float) -> Iterator[float]:
+    """Yield the values that two neighbouring digits exchanged make of a number."""
+    text = short_number(value)
+    for place, (first, second) in enumerate(pairwise(text)):
+        if first.isdigit() and second.isdigit() and first != second:
+            yield float(text[:place] + second + first + text[place + 2 :])
 
 
 @dataclass(frozen=True)
@@ -124,7 +193,7 @@ class Question:
 
     def guess(self, walker: PlainWalker, tolerance: float = QUICK) -> CheckedStep | None:
         """Return a walk near a walker's gait: a Newton step from the printed state, or from the right gait."""
-        start = self.right.start if self.state is None else start_from(walker, self.state, self.convention.instant)
+        start = self.right.start if self.state is None else walker.start_from(self.state, self.convention.instant)
         step = None if start is None else walker.step(start, tolerance)
         if step is None or start is None or self.right.derivative is None:
             return None
@@ -211,7 +280,9 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
     """Yield the gaits of the most promising candidates, then those of mistakes whose size is fitted."""
     right = question.guess(question.walker)
     guesses = []
-    candidates = [*causes.generate_mistakes(question.walker), *causes.generate_misprints(question.config)]
+    mistakes = [*list_mistakes(question.walker)]
+    candidates = [Candidate("mistake", each.what, each.of_size(0.0)) for each in mistakes if not each.first]
+    candidates += generate_misprints(question.config)
     for place, candidate in enumerate(candidates):
         guess = question.guess(candidate.walker)
         if guess is not None and not (right and np.allclose(guess.start, right.start, SAME_WALK, SAME_WALK)):
@@ -220,9 +291,9 @@ def attempts_at(question: Question) -> Iterator[Attempt]:
         yield from question.attempt(candidates[place], guess)
     if len(question.items) < FEW:
         return
-    for family in causes.generate_families(question.walker):
-        for size in sizes_to_try(question, family):
-            candidate = Candidate("mistake", family.what.format(f"{size:.4g}"), family.of_size(size), family.what)
+    for mistake in filter(attrgetter("first"), mistakes):
+        for size in sizes_to_try(question, mistake):
+            candidate = Candidate("mistake", mistake.what.format(f"{size:.4g}"), mistake.of_size(size), mistake.what)
             yield from question.attempt(candidate, question.guess(candidate.walker, EXACT))
 
 
@@ -259,12 +330,12 @@ def fit(
     return result
 
 
-def sizes_to_try(question: Question, family: MistakeFamily) -> Iterator[float]:
+def sizes_to_try(question: Question, mistake: Mistake) -> Iterator[float]:
     """Yield round sizes near the one that brings a mistake's gait closest to the printed values, then that one.
 
     There are none if it does not come much closer than the right gait.
     """
-    fitted = fit(question, family.of_size, 0.0, family.first, family.limits)
+    fitted = fit(question, mistake.of_size, 0.0, mistake.first, mistake.limits)
     if fitted is None or fitted.left * LEAST_GAIN > fitted.without:
         return
     size = fitted.value
@@ -281,7 +352,7 @@ def at_the_start(question: Question) -> Iterator[Explanation]:
     minus_one = [item for item in question.items if item.quantity == "multipliers" and item.fits(-1.0)]
     others = [item for item in question.items if item not in minus_one]
     if minus_one and len(question.reproduced(question.right, others)) == len(others):
-        what = "the integration starts on the strike's surface and meets it at once, which adds a multiplier of -1"
+        what = "the integration starts at a heel strike, which is found again at once and adds a multiplier of -1"
         yield question.explanation("mistake", what)
 
 
@@ -305,7 +376,7 @@ def scenes(question: Question) -> Iterator[tuple[str, CheckedStep]]:
     """Yield the right gaits, and those of walkers whose leg length includes or excludes the foot's radius."""
     yield from (("", gait) for gait in question.gaits)
     walker = question.walker
-    printed = None if question.state is None else start_from(walker, question.state, question.convention.instant)
+    printed = None if question.state is None else walker.start_from(question.state, question.convention.instant)
     starts = [start for start in (printed, question.right.start) if start is not None]
     for sign, how in ((1.0, "excludes"), (-1.0, "includes")) if walker.radius else ():
         foot = walker.foot - sign * 1j * walker.radius
@@ -329,7 +400,7 @@ def misprinted_values(question: Question) -> Iterator[Explanation]:
     reproduced = [item, *question.reproduced(question.right, question.items)]
     if item.fits(-right):
         yield question.explanation("misprint", f"the sign of the printed {name} is wrong", reproduced)
-    elif any(item.fits(right + printed - other) for other in causes.transposed(printed)):
+    elif any(item.fits(right + printed - other) for other in transposed(printed)):
         yield question.explanation("misprint", f"two digits of the printed {name} are transposed", reproduced)
 
 
@@ -339,15 +410,15 @@ def find_periodic_changes(question: Question) -> list[dict[str, float | str]]:
         return []
     states = replace(question, items=[item for item in question.items if item.quantity == "state"])
     found: list[dict[str, float | str]] = []
-    for key, value in causes.parameters(question.config).items():
-        walker_of = partial(causes.walker_with, question.config, key)
+    for key, value in parameters(question.config).items():
+        walker_of = partial(walker_with, question.config, key)
         change = fit(states, walker_of, value, value * (1.0 + 1e-4))
         if change is not None and change.change < CONVERGED and change.left <= 1.0:
             found.append({"key": key, "value": float(f"{change.value:.6g}")})
     return found
 
 
-def advise_on_ambiguity(explanations: Sequence[Explanation]) -> str:
+def advise(explanations: Sequence[Explanation]) -> str:
     """Return a sentence on how to decide between several explanations, or '' if there is at most one."""
     if len(explanations) < 2:
         return ""

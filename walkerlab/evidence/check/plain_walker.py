@@ -14,14 +14,20 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, NamedTuple
+from itertools import permutations, product
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.linalg.lapack import dposv
+
+from walkerlab.config.check import Instant
+from walkerlab.config.reads import RigidConfig
+from walkerlab.config.second_leg import describe_second_leg
+from walkerlab.config.walkers import CompassWalker, Kneed, StraightLegs
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -200,12 +206,12 @@ class PlainWalker:
         """Return the angle (rad) of the shank behind its thigh. It falls to 0 as the knee locks."""
         return float(state[SWING] - state[SHANK])
 
-    def energy(self, phase: str, state: Floats) -> float:
+    def energy(self, state: Floats) -> float:
         """Return kinetic plus potential energy (J).
 
         Heights are measured from the point where an upright stance leg touches the slope.
         """
-        angles, omega = self.bodies(phase, state)
+        angles, omega = self.bodies(STRAIGHT if len(state) == 4 else BENT, state)
         places = self.levers * np.exp(1j * angles)
         heights = (places.sum(axis=1) - self.radius * state[STANCE]) * np.conj(self.down)
         return float(0.5 * omega @ self.mass_matrix(places, self.inertias) @ omega - self.masses @ heights.real)
@@ -260,6 +266,25 @@ class PlainWalker:
             return coordinates[:4]
         shank = coordinates[4] if len(coordinates) > 4 else coordinates[2]
         return np.array([*coordinates[:2], coordinates[0], *coordinates[2:4], shank])
+
+    def coordinates(self, state: Floats) -> Floats:
+        """Return the coordinates just after a heel strike from the state of all bodies."""
+        n = len(state) // 2
+        return np.concatenate((state[:2], state[n : n + 2 + int(self.kneed and self.free_at_strike)]))
+
+    def start_from(self, state: Floats, instant: Instant) -> Floats | None:
+        """Return the coordinates just after the heel strike that a state leads to, or None if it leads to none."""
+        if instant == "after-strike":
+            return self.coordinates(state)
+        n = len(state) // 2
+        if instant == "before-strike":
+            return self.after_strike(np.concatenate((state[:2], state[n : n + 2])))
+        landed = self.land(state)
+        return None if landed is None else self.after_strike(landed[-1].end)
+
+    def scales(self, size: int) -> Floats:
+        """Return the units (size,) of coordinates just after a heel strike: 1 for angles, sqrt(g/L) for rates."""
+        return np.array([1.0, 1.0, *[1.0 / self.pendulum_time] * (size - 2)])
 
     def step(self, start: Floats, tolerance: float = EXACT) -> PlainStep | None:
         """Take a step from coordinates just after a heel strike, or None if the walker does not complete it.
@@ -377,3 +402,112 @@ class PlainStep(NamedTuple):
     def knee_strike(self) -> float | None:
         """Time (s) of the knee strike from the start, or None without knees."""
         return self.pieces[0].duration if len(self.pieces) > 1 else None
+
+
+def why_not_plain(config: RigidConfig) -> str:
+    """Explain why the plain model does not describe a config's walker, or return '' if it does."""
+    if describe_second_leg(config.walker):
+        return "the plain model has two equal legs"
+    if not isinstance(config.walker, CompassWalker | StraightLegs | Kneed):
+        return "the plain model has no walkers of type parts"
+    return ""
+
+
+def plain_walker(config: RigidConfig, changed: Any = None) -> PlainWalker:
+    """Build the plain model of a config's walker, or of a changed one on its slope."""
+    walker = changed or config.walker
+    assert isinstance(walker, CompassWalker | StraightLegs | Kneed), "why_not_plain allows no other"
+    # the compass rolls on its ball feet in the contact model only
+    radius = 0.0 if isinstance(walker, CompassWalker) else walker.foot_radius_m
+    torso = walker.torso
+    plain = PlainWalker(
+        parts=(NO_PART, NO_PART),
+        knee=0j,
+        hip_mass=walker.hip_mass_kg,
+        foot=getattr(walker, "foot_centre_ahead_m", 0.0) - 1j * (walker.leg_length_m - radius),
+        radius=radius,
+        gravity=config.gravity_m_s2,
+        slope=config.slope_rad,
+        torso=NO_PART if torso is None else LegPart(torso.mass_kg, 1j * torso.above_hip_m, torso.inertia_kg_m2),
+        hip=(walker.hip.spring_N_m_per_rad, walker.hip.damping_N_m_s_per_rad, walker.hip.torque_N_m),
+        push_off=config.push_off.impulse_N_s,
+        signs={(STRAIGHT, STANCE, SWING): -1.0} if config.equations == "as-printed" else {},
+    )
+    if not isinstance(walker, Kneed):
+        below = walker.mass_to_hip_m if isinstance(walker, CompassWalker) else walker.leg_mass_below_hip_m
+        centre = getattr(walker, "leg_mass_ahead_m", 0.0) - 1j * below
+        return replace(plain, parts=(LegPart(walker.leg_mass_kg, centre, walker.leg_inertia_kg_m2), NO_PART))
+    thigh = walker.thigh
+    shank = walker.shank
+    upper = LegPart(thigh.mass_kg, thigh.mass_ahead_m - 1j * thigh.mass_below_hip_m, thigh.inertia_kg_m2)
+    lower = LegPart(shank.mass_kg, shank.mass_ahead_m - 1j * shank.mass_below_knee_m, shank.inertia_kg_m2)
+    free = walker.knee.at_heel_strike == "free"
+    damping = walker.knee.damping_N_m_s_per_rad
+    knee = -1j * thigh.length_m
+    return replace(plain, parts=(upper, lower), knee=knee, free_at_strike=free, knee_damping=damping)
+
+
+class Mistake(NamedTuple):
+    """A mistake that is known from publications and programs."""
+
+    what: str  # ends a sentence that begins with 'All printed values follow if'; with a place {} for a size
+    of_size: Callable[[float], PlainWalker]  # walker with the mistake
+    first: float = 0.0  # a size to begin with, or 0 if the mistake has no size
+    limits: tuple[float, float] = (0.0, 0.0)  # of sizes; smaller ones are within a program's own errors
+
+
+def list_mistakes(right: PlainWalker) -> Iterator[Mistake]:
+    """Yield all known mistakes in programs for a walker."""
+
+    def mistake(what: str, **changes: Any) -> Mistake:
+        return Mistake(what, lambda _: replace(right, **changes))
+
+    def mistake_of_size(what: str, field: str, first: float, limits: tuple[float, float], **changes: Any) -> Mistake:
+        return Mistake(what, lambda size: replace(right, **{field: size, **changes}), first, limits)
+
+    for what, signs in wrong_signs(right.kneed):
+        yield mistake(what, signs={**right.signs, **{term: -right.signs.get(term, 1.0) for term in signs}})
+    if right.leg_inertia:
+        rates = {
+            "the trailing leg's rate": (1.0, 0.0),
+            "the leading leg's rate": (0.0, 1.0),
+            "(trailing leg's rate − leading leg's rate)": (1.0, -1.0),
+        }
+        momentum = "the trailing leg's angular momentum about the hip before the heel strike"
+        for (rate, weights), (mark, sign) in product(rates.items(), (("−", 1.0), ("+", -1.0))):
+            what = f"{momentum} has an extra term {mark}I × {rate}, where I is the leg's inertia"
+            yield mistake(what, extra_inertia=tuple(sign * weight for weight in weights))
+        massless = tuple(part._replace(inertia=0.0) for part in right.parts)
+        yield mistake("the legs' inertia is left out", parts=massless)
+        yield mistake("the legs' inertia is left out of the heel strike", strike_inertia=0.0)
+    yield mistake("the trailing leg keeps its rate through the heel strike", keeps_trailing_rate=True)
+    if right.radius:
+        for point, name in ((right.foot, "the arc's centre"), (right.foot - 1j * right.radius, "the sole's middle")):
+            what = f"the heel strike leaves out the foot's rolling: the leading leg turns about {name}"
+            yield mistake(what, strike_foot=point)
+            yield mistake(f"{what}, as the trailing leg does", strike_foot=point, turned_on_it=True)
+    if right.hip_mass:
+        yield mistake("the hip's mass counts once for each leg", hip_mass=2.0 * right.hip_mass)
+    early = "the heel strike is accepted as soon as the sum of the legs' angles is within {} rad of it"
+    angle = ("window", 1e-3, (1e-5, 0.3))
+    yield mistake_of_size(early, *angle)
+    yield mistake_of_size(f"{early}, and both feet are then put on the slope", *angle, evens_angles=True)
+    step = "the equations are integrated by Euler's method with a step of {} s"
+    time = ("euler_step", 4e-3 * right.pendulum_time, (2e-5, 0.2))
+    yield mistake_of_size(step, *time)
+    yield mistake_of_size(
+        f"{step}, and the swing ends at the first time step after the heel strike", *time, interpolates=False
+    )
+
+
+def wrong_signs(kneed: bool) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
+    """Yield velocity terms in the equations of motion that may have a wrong sign, with a description."""
+    for phase in (STRAIGHT, BENT) if kneed else (STRAIGHT,):
+        when = {BENT: " while the knee is free", STRAIGHT: " once the knee is locked" if kneed else ""}[phase]
+        bodies = {"swing leg": (SWING, SHANK), "stance leg": (STANCE,)}
+        if phase == BENT:
+            bodies |= {"swing leg": (SWING,), "swing shank": (SHANK,)}
+        for (row, rows), (column, columns) in permutations(bodies.items(), 2):
+            what = f"the term of the {column}'s squared rate in the equation of the {row} has the wrong sign{when}"
+            yield what, [*product((phase,), rows, columns)]
+        yield f"all velocity terms have the wrong sign{when}", [*product((phase,), range(4), range(4))]

@@ -5,20 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from typing import Any, Final
 
 from walkerlab.config.check import Digits, PrintedValue, agreement, parse_printed
 from walkerlab.labels import axis_label
 
-REPRODUCED = "reproduced"
-EXPLAINED = "explained"
-DIFFERENT = "different"
-NOT_COMPARABLE = "not-comparable"
 UNEXPLAINED = "different, unexplained"
-INPUT = "input"  # as are the next two, a verdict on a value of the study alone: used as given
-CONTRADICTED = "contradicted"  # different by the study's own values
-NOT_REPRODUCED = "not-reproduced"  # different and unexplained, or not comparable
 # At least this many digits must agree, and at least half of them, where the last ones may differ.
 FEWEST_DIGITS = 3
 OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
@@ -26,6 +20,18 @@ OWN_ERROR: Final = {"multipliers": 2e-10, "spectral_radius": 2e-10}
 EXACT_ERROR = 2e-12
 MORE_DIGITS: Final = 2  # digits of a right value beyond those of the printed one
 MOST_DECIMALS: Final = 12
+
+
+class Verdict(StrEnum):
+    """Verdict on a printed number. Some are of the study alone, which has its own scene and its own contradictions."""
+
+    INPUT = "input"  # of the study: used as given
+    REPRODUCED = "reproduced"
+    EXPLAINED = "explained"
+    CONTRADICTED = "contradicted"  # of the study: different, by its own values
+    DIFFERENT = "different"
+    NOT_REPRODUCED = "not-reproduced"  # of the study: different and unexplained, or not comparable
+    NOT_COMPARABLE = "not-comparable"
 
 
 class PrintedNumber:
@@ -141,14 +147,14 @@ class Judged:
 
     number: PrintedNumber
     values: Mapping[str, Any]  # JSON values by name
-    verdict: str
+    verdict: Verdict
     evidence: str
 
     @property
     def row(self) -> dict[str, Any]:
         """Row of a table, as JSON values."""
         printed = {**self.number.about, "printed": self.number.text}
-        return {**printed, **self.values, "verdict": self.verdict, "evidence": self.evidence}
+        return {**printed, **self.values, "verdict": self.verdict.value, "evidence": self.evidence}
 
 
 def judge(item: Item, right: complex | None, reason: str = "") -> Judged:
@@ -157,10 +163,10 @@ def judge(item: Item, right: complex | None, reason: str = "") -> Judged:
     miss = item.miss(right)
     all_digits = agreeing == item.count
     enough = all_digits or (agreeing >= FEWEST_DIGITS and 2 * agreeing >= item.count)
-    verdict = REPRODUCED if enough else DIFFERENT
+    verdict = Verdict.REPRODUCED if enough else Verdict.DIFFERENT
     value: Any = None
     if right is None:
-        verdict = NOT_COMPARABLE
+        verdict = Verdict.NOT_COMPARABLE
         evidence = reason
     else:
         value = [right.real, right.imag] if item.printed.imaginary or right.imag else right.real

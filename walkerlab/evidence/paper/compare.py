@@ -210,7 +210,7 @@ def list_omissions(inputs: Mapping[str, Content], measured: Measured) -> list[di
 def numbers_group(rows: Sequence[Mapping[str, Any]], names: Sequence[str] | Mapping[str, Any] = ()) -> Group:
     """Build a group with the numbers of the paper and of the models.
 
-    A model's column holds only rows with a value; its own coordinate lists these rows. Text columns hold all rows.
+    The column of a model has only the rows with a value, which its coordinate lists. Text columns have all rows.
 
     names  symbols of the rows, if they have any
     """

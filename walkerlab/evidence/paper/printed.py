@@ -105,7 +105,7 @@ TABLE_3: Final = tuple(
     for name, quantity, unit, matlab, adams in (
         ("t_left", "left step period", "s", "0.60", "0.59"),
         ("t_right", "right step period", "s", "0.79", "0.77"),
-        ("t_cycle", "one cycle period", "s", "1.39", "1.38"),
+        ("t_cycle", "stride period", "s", "1.39", "1.38"),
         ("v_com", "average velocity", "m/s", "0.0246", "0.0248"),
         ("E_avg", "average mechanical energy (5 steps)", "J", "150.13", "150.14"),
     )

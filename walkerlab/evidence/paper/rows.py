@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from walkerlab.config.contact import MM_PER_M
-from walkerlab.evidence.check.printed import CONTRADICTED, EXPLAINED, INPUT, NOT_REPRODUCED, REPRODUCED, Judged
+from walkerlab.evidence.check.printed import Judged, Verdict
 from walkerlab.evidence.paper import printed
 from walkerlab.evidence.paper.contradictions import contradictions, percent_left_open
 from walkerlab.evidence.paper.measured import EQUATION_SETS, PAPER_CYCLES, Measured
@@ -19,9 +19,14 @@ from walkerlab.physics.hybrid.comparison import Quantity
 WALKER_PARAMETERS = ("leg_length", "leg_mass", "hip_mass", "gravity")
 
 
-VERDICTS = (INPUT, REPRODUCED, EXPLAINED, CONTRADICTED, NOT_REPRODUCED)
-"""Verdicts on the paper's values. `CONTRADICTED` overrides all others; `EXPLAINED` also covers other scenes, and
-`NOT_REPRODUCED` the values of ADAMS, which was not run."""
+VERDICTS = (
+    Verdict.INPUT,
+    Verdict.REPRODUCED,
+    Verdict.EXPLAINED,  # for a measured reason, or because the scene is not the paper's
+    Verdict.CONTRADICTED,  # overrides all other verdicts
+    Verdict.NOT_REPRODUCED,  # includes values of ADAMS, which was not run
+)
+"""Verdicts on the paper's values."""
 Scene = Literal["rigid", "contact", "any"]
 """Model whose scene must equal the paper's for a mismatch to count; "any" if the paper's values alone decide."""
 
@@ -30,8 +35,8 @@ def count_verdicts(rows: Iterable[Judged]) -> dict[str, int]:
     """Count values by verdict. `refuted` repeats the sum of the last two verdicts until 0.3 is released."""
     verdicts = Counter(row.verdict for row in rows)
     return {
-        **{verdict: verdicts[verdict] for verdict in VERDICTS},
-        "refuted": verdicts[CONTRADICTED] + verdicts[NOT_REPRODUCED],
+        **{verdict.value: verdicts[verdict] for verdict in VERDICTS},
+        "refuted": verdicts[Verdict.CONTRADICTED] + verdicts[Verdict.NOT_REPRODUCED],
     }
 
 
@@ -41,16 +46,16 @@ def paper_rows(measured: Measured, study: PaperStudy) -> Iterator[Judged]:
     contact = measured.contact
     walker = measured.walker
     for entry, parameter in zip(printed.TABLE_1, WALKER_PARAMETERS, strict=True):
-        yield judge.input(entry, float(getattr(walker, parameter)), "rigid")
+        yield judge.judge_input(entry, float(getattr(walker, parameter)), "rigid")
     for coordinate, entry in enumerate(printed.X_P):
         yield judge.fixed_point(entry, coordinate)
     yield judge.eigenvalue()
-    yield judge.input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
-    yield judge.input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
+    yield judge.judge_input(printed.LEG_INERTIA, walker.leg_inertia, "rigid")
+    yield judge.judge_input(printed.FOOT_RADIUS, contact.foot_radius * MM_PER_M, "contact")
     for entry, value in ((printed.STIFFNESS, contact.law.stiffness), (printed.DAMPING, contact.law.damping)):
-        yield judge.input(entry, value, "contact", prose("evidence.unitless", contact))
-    yield judge.input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
-    yield judge.input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
+        yield judge.judge_input(entry, value, "contact", prose("evidence.unitless", contact))
+    yield judge.judge_input(printed.STATIC_FRICTION, contact.law.static_friction, "contact")
+    yield judge.judge_input(printed.DYNAMIC_FRICTION, contact.law.dynamic_friction, "contact")
     yield judge.lost_balance()
     for coordinate, row in enumerate(printed.TABLE_2):
         yield judge.adams_start(row.adams, coordinate)
@@ -75,7 +80,7 @@ class Judge:
         entry: Printed,
         rigid: Mapping[str, float],
         contact: float | None,
-        verdict: str,
+        verdict: Verdict,
         scene: Scene,
         evidence: str,
     ) -> Judged:
@@ -86,13 +91,13 @@ class Judge:
         departures = self.measured.departures
         differs = "; ".join(departures.rigid if scene == "rigid" else departures.contact)
         if (contradiction := contradictions().get(entry)) is not None:
-            verdict = CONTRADICTED
+            verdict = Verdict.CONTRADICTED
             scene = "any"
             evidence = f"{contradiction}. {evidence[:1].upper()}{evidence[1:]}"
         if differs and scene == "any":
             evidence += f" The verdict is about the paper's own numbers, not this scene ({differs})."
-        elif differs and verdict not in (INPUT, REPRODUCED):
-            verdict = EXPLAINED
+        elif differs and verdict not in (Verdict.INPUT, Verdict.REPRODUCED):
+            verdict = Verdict.EXPLAINED
             evidence = f"Not the paper's scene ({differs}): {evidence}"
         values = {name.replace("-", "_"): rigid.get(name) for name in EQUATION_SETS}
         return Judged(entry, {**values, "contact": contact}, verdict, evidence)
@@ -107,10 +112,10 @@ class Judge:
         pairs = zip(start, gait.state, strict=True)
         return [None if ours == 0.0 else 100.0 * (initial / ours - 1.0) for initial, ours in pairs]
 
-    def input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> Judged:
+    def judge_input(self, entry: Printed, value: float, scene: Scene, evidence: str = "") -> Judged:
         """Judge a parameter of both models, or of the contact model alone."""
         rigid: dict[str, float] = dict.fromkeys(EQUATION_SETS, value) if scene == "rigid" else {}
-        verdict = INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else EXPLAINED
+        verdict = Verdict.INPUT if math.isclose(value, entry.value, rel_tol=1e-12) else Verdict.EXPLAINED
         return self.row(entry, rigid, value, verdict, scene, evidence or prose("evidence.input", value, entry.unit))
 
     def fixed_point(self, entry: Printed, coordinate: int) -> Judged:
@@ -137,7 +142,7 @@ class Judge:
     def percent(self, row: printed.StartRow, coordinate: int) -> Judged:
         """Judge a percentage of Table 2, which is arithmetic and so independent of the config."""
         entry = row.percent
-        verdict = verdict_on(entry, [row.percent_of_matlab], EXPLAINED)
+        verdict = verdict_on(entry, [row.percent_of_matlab], Verdict.EXPLAINED)
         left_open = None if entry in contradictions() else percent_left_open(row)
         text = prose("evidence.percent", row, left_open, self.measured.contact, self.raised[2:])
         return self.row(entry, {}, self.raised[coordinate], verdict, "any", text)
@@ -146,7 +151,7 @@ class Judge:
         """Judge a coordinate of the ADAMS start, which is an input if the contact model starts from it."""
         contact = self.measured.contact
         value = None if contact.start is None else contact.start[coordinate]
-        verdict = INPUT if entry.fits(value) else NOT_REPRODUCED
+        verdict = Verdict.INPUT if entry.fits(value) else Verdict.NOT_REPRODUCED
         text = prose("evidence.adams_start", self.study, coordinate < 2, contact, self.raised[2:])
         return self.row(entry, {}, value, verdict, "contact", text)
 
@@ -157,7 +162,7 @@ class Judge:
         rigid = {name: float(model.steps // 2) for name, model in self.measured.models.items()}
         completed = contact.steps // 2
         text = prose("evidence.strides", contact, completed, contact.outcome == "walked" and completed < entry.value)
-        return self.row(entry, rigid, float(completed), INPUT, "contact", text)
+        return self.row(entry, rigid, float(completed), Verdict.INPUT, "contact", text)
 
     def error(self) -> Judged:
         """Judge the largest error of Fig. 8, for angles and angular velocities together."""
@@ -176,7 +181,7 @@ class Judge:
         text = prose("evidence.error", late, self.measured.equations, errors_by_quantity)
         way = "aligned" if "aligned" in differences else "raw"
         largest = max((max(errors[way]) for _, _, errors in errors_by_quantity if way in errors), default=None)
-        return self.row(entry, {}, largest, NOT_REPRODUCED, "any", text)
+        return self.row(entry, {}, largest, Verdict.NOT_REPRODUCED, "any", text)
 
     def step_length(self) -> Judged:
         entry = printed.STEP_LENGTH
@@ -217,16 +222,18 @@ class Judge:
         means = {"five": study.five_steps_energy, "ten": study.from_x_p.E_avg} if row is printed.E_AVG else {}
         matching_means = [steps for steps, mean in means.items() if row.matlab.agreement(mean)]
         # with the misprint, energy is not conserved, so a mean over five or ten steps may explain the printed value
-        verdict = verdict_on(row.matlab, rigid.values(), EXPLAINED if matching_means else NOT_REPRODUCED)
+        verdict = verdict_on(
+            row.matlab, rigid.values(), Verdict.EXPLAINED if matching_means else Verdict.NOT_REPRODUCED
+        )
         text = prose("evidence.matlab", row, measured, names, study, matching_means)
         yield self.row(row.matlab, rigid, contact, verdict, "rigid", text)
         text = prose("evidence.adams", row, measured, names)
         yield self.row(row.adams, rigid, contact, verdict_on(row.adams, [contact]), "contact", text)
 
 
-def verdict_on(entry: Printed, values: Iterable[float | None], otherwise: str = NOT_REPRODUCED) -> str:
+def verdict_on(entry: Printed, values: Iterable[float | None], otherwise: Verdict = Verdict.NOT_REPRODUCED) -> Verdict:
     """Return the verdict on a printed value that is reproduced if one of some values has all of its digits."""
-    return REPRODUCED if any(map(entry.fits, values)) else otherwise
+    return Verdict.REPRODUCED if any(map(entry.fits, values)) else otherwise
 
 
 Table = dict[str, dict[str, Any]]

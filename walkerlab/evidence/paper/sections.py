@@ -127,7 +127,7 @@ def paper_section(results: page.Results) -> page.Section | None:
 
 
 def list_verdicts(results: page.Results, rows: Sequence[Row]) -> Iterator[page.PageBlock]:
-    """Yield the paper's values by verdict and location, and its gravest errors."""
+    """Yield the paper's values by verdict and location, and its most serious errors."""
     places = {name: Counter(row["where"] for row in rows if row["verdict"] == name) for name in TONES}
     parts = tuple((spell_verdict(name), counts.total(), TONES[name]) for name, counts in places.items() if counts)
     yield page.Shares(f"Of {count(len(rows), 'value')} that the paper prints", parts)

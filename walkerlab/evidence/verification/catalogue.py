@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from walkerlab.config.analyses import FATES, Case, Fate
-from walkerlab.config.fields import Block, annotation_of
+from walkerlab.config.fields import Block, annotation_of, replace_key
 from walkerlab.config.loader import paper_config_with
 from walkerlab.config.reader import read
 from walkerlab.config.reads import RigidConfig
@@ -32,8 +32,6 @@ PHYSICAL_ENDS: tuple[Fate, ...] = tuple(
 STOPPED_ENDS: tuple[Fate, ...] = tuple(fate for fate in PHYSICAL_ENDS if fate != "walked")
 SCENE_CHANGES: Final = ("start", "slope", "times", "over", "set")
 CASE_DEFAULTS: Final = {"steps": 4, "budget": 1_000_000, "expected": PHYSICAL_ENDS}
-
-B = TypeVar("B", bound=Block)
 
 
 @cache
@@ -130,12 +128,7 @@ def change_scene(config: Config, changes: Mapping[str, Any]) -> Config:
     return config
 
 
-def replace_key(block: B, path: str, value: Any) -> B:
-    """Return a copy of a block with the value at a dotted path replaced."""
-    name, _, tail = path.partition(".")
-    return block.model_copy(update={name: replace_key(getattr(block, name), tail, value) if tail else value})
-
-
+B = TypeVar("B", bound=Block)
 # leg (m), mass (kg) and gravity (m/s^2) of the twin: uneven values, so that its rounding errors differ
 TWIN_LEG = 1.37
 TWIN_MASS = 11.3
@@ -166,7 +159,7 @@ def scaled_block(block: B, by: Units) -> B:
 
     values: dict[str, Any] = {}
     for name, field in type(block).model_fields.items():
-        values[name] = value(getattr(block, name), by.size_of(annotation_of(field, "unit")))
+        values[name] = value(getattr(block, name), by.natural_unit(annotation_of(field, "unit")))
     return block.model_copy(update=values)
 
 

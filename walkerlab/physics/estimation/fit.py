@@ -98,7 +98,7 @@ class FitProblem:
 
 
 class FitEnd(Enum):
-    """How a fit ended. The value is the reason if it did not converge, with the maximum number of walks to insert."""
+    """How a fit ended. If it did not converge, the value is the reason, with {} for the maximum number of walks."""
 
     CONVERGED = ""
     STILL_CHANGES = "standard deviations still change"

@@ -185,7 +185,7 @@ def describe_combination(parts: list[tuple[str, float]]) -> str:
 def describe_reason(value: float, largest: float) -> str:
     if value <= LOST_SHARE * largest:
         return "the walk does not change with this combination"
-    return f"even a 100 % change along it moves the walk by only {value:.2g} standard deviations of the data"
+    return f"even a 100 % change moves the walk by only {value:.2g} standard deviations of the data"
 
 
 def contributions(fitted: Fitted, basis: Floats) -> dict[str, float]:

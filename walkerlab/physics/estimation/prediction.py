@@ -181,10 +181,10 @@ class Forecast:
     def differentiate(
         self, u: Floats, heights_m: Floats, exact: bool, disturbed: bool = True
     ) -> tuple[Floats, Floats] | None:
-        """Return derivatives for the unknowns, (values, unknowns), and for disturbances, (values, heights + kicks).
+        """Return derivatives with respect to unknowns (values, unknowns) and disturbances (values, heights + kicks).
 
         exact      whether differences over parameters are of 4th order, one-sided where a walk on one side fails
-        disturbed  whether to differentiate by the disturbances as well
+        disturbed  whether to differentiate with respect to the disturbances, too
         """
         # Derivatives for parameters are difference quotients of exact walks; the others follow from tangent columns.
         prediction = self.predict(u, heights_m)

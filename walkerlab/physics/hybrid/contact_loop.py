@@ -14,9 +14,9 @@ from walkerlab.physics.hybrid.contact_state import (
     PASSING,
     PULSE_END,
     WalkState,
+    has_not_lifted,
     is_above,
     is_switching,
-    is_to_lift,
 )
 from walkerlab.physics.hybrid.contact_transitions import apply_event, note_flexion, release
 from walkerlab.physics.kernels import kernel, kernel_part
@@ -120,7 +120,7 @@ def walk_in_form(
 
 @kernel_part
 def steps_are_left(walk_state: WalkState, until: int) -> bool:
-    return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and is_to_lift(walk_state))
+    return walk_state.progress.steps < walk_state.touch_time.size or (until == AT_LIFT and has_not_lifted(walk_state))
 
 
 @kernel_part

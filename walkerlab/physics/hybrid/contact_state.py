@@ -231,11 +231,11 @@ def is_ahead(walk_state: WalkState, foot: int) -> bool:
 
 
 @kernel_part
-def is_to_lift(walk_state: WalkState) -> bool:
+def has_not_lifted(walk_state: WalkState) -> bool:
     """Whether the foot that carried the last step has not lifted yet."""
     return walk_state.leaving[1 - walk_state.progress.stance] != 0
 
 
 def steps_with_lift(walk_state: WalkState) -> int:
     """Count the steps with complete slip and rolling: all, or all but the last if its stance foot has not lifted."""
-    return int(walk_state.progress.steps) - int(is_to_lift(walk_state))
+    return int(walk_state.progress.steps) - int(has_not_lifted(walk_state))

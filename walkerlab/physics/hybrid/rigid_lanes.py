@@ -154,7 +154,7 @@ class LaneMemory(NamedTuple):
 
 def new_lane_memory(rtol: float, atol: float) -> LaneMemory:
     teach_arithmetic()
-    # A finder of degree 5 fits the quintics of hermite.py.
+    # A finder of degree 5 fits the quintics of lanes.py.
     return LaneMemory(
         rtol, atol, np.zeros((LANE_ROWS, WIDTH)), np.full((2, WIDTH), NOBODY, np.int64), new_crossing_finder(5)
     )

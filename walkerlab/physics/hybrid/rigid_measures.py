@@ -79,7 +79,7 @@ def places(
     angle: Array,
     step: NDArray[np.int64],
 ) -> Places:
-    """Compute the walker's points at angles (samples, n) in rad, swing leg first, in steps (samples,).
+    """Compute positions of the walker's points for each sample from angles (samples, n) in rad and steps (samples,).
 
     knees_m  position of each leg's knee in its thigh's frame; empty for legs without knees
     """

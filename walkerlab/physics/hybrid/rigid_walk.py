@@ -319,9 +319,7 @@ class HeelStrikes(NamedTuple):
 def new_heel_strikes(
     steps: int, m: int, kneed: bool = True, rise: Any = None, nearest: float = 0.0, columns: int = 0
 ) -> HeelStrikes:
-    """Create room for heel strikes with states of m values, tangent columns included. The fields are as in
-    `HeelStrikes`.
-    """
+    """Allocate the arrays of `HeelStrikes` for states of m values, tangent columns included."""
     before, after = np.zeros((2, steps, m))
     even = np.zeros(steps + 1) if rise is None else rise
     knee_time = np.zeros(steps if kneed else 0)

@@ -145,7 +145,7 @@ class Seed(NamedTuple):
 
 @dataclass(frozen=True)
 class BranchTracer:
-    """Follows one branch of gaits, from one of them to its end."""
+    """Follows a branch of gaits from one gait to the end of the branch."""
 
     step_map: StepMap
     span: ValueSpan
@@ -332,7 +332,7 @@ class BranchFollower(BranchTracer):
         return False
 
     def covers(self, branch: GaitBranch, other: GaitBranch) -> bool:
-        """Whether a gait well inside another branch, a quarter of the way along it, lies on a branch."""
+        """Whether `branch` covers `other`, judged by the gait a quarter of the way along `other`."""
         # half of the way along may be a fold, near which gaits of both arms are hardly distinct
         covered = np.cumsum(np.abs(np.diff(other.values, prepend=other.values[0])))
         return self.lies_on(branch, other.points[int(np.searchsorted(covered, 0.25 * other.reach))])

@@ -454,7 +454,7 @@ class Search:
         # stance leg's.
         starts[:, 0] = 0.5 * (starts[:, 0] - feet_on_slope(self.walker, 0.0, 0.0))
         if self.walker.legs_differ:
-            self.draw_strides(starts)
+            self.search_strides(starts)
             return
         gaits = [(record.cycle.z, record.cycle.DP) for record in self.records]
         results = self.looking.solve_starts(rigid_map.strike_section(self.walker), gaits, starts)
@@ -464,8 +464,8 @@ class Search:
             elif gait == rigid_map.NEW_GAIT and not self.stands(z):
                 self.keep(z, RANDOM_START)
 
-    def draw_strides(self, starts: Floats) -> None:
-        """Solve the map of a stride from starts (starts, d)."""
+    def search_strides(self, starts: Floats) -> None:
+        """Look for fixed points of the stride map near each start (starts, d), and keep those that are new."""
         quick = map_over_slope(self.walker, SEARCH_TOLERANCES)
         effort = Effort(rigid_map.NEAR_RESIDUAL, rigid_map.MAX_START_EVALUATIONS, rigid_map.SMALLEST_MOVE)
         for start in starts:

@@ -219,7 +219,7 @@ def radius_gradient(A: Floats, change: Floats, error: Floats, steps: int = 1) ->
     of_step = float(abs(values[largest])) ** (1.0 / steps - 1.0) / steps
     towards = of_step * (values[largest].conjugate() / abs(values[largest]))
     slope = (towards * (left[largest] @ change @ right[:, largest])).real
-    # absolute values: errors of A's elements may cancel by chance
+    # Use absolute values, because the errors of A's elements might cancel by chance.
     off = of_step * (np.abs(left[largest]) @ np.abs(error) @ np.abs(right[:, largest]))
     return make_gradient(float(slope), float(off))
 

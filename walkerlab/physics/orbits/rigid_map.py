@@ -389,7 +389,7 @@ class RigidMap(StepMap):
     probe = 2e-5
 
     def __init__(self, walker_at: WalkerAt, scale: float, like: RigidModel, exact: Tolerances = EXACT_STEPS) -> None:
-        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` is an example."""
+        """Prepare a family's map. `walker_at` returns None for values without a valid walker, `like` is any walker."""
 
         @lru_cache(CACHE_SIZE)
         def unit_at(p: float) -> SimilarWalker | None:

@@ -135,7 +135,7 @@ def sensitivity(gait: GaitOnMap, disturbance: Disturbance) -> Sensitivity | None
 
 
 def response(gait: GaitOnMap, disturbance: Disturbance, times: float = 1.0) -> tuple[Floats, Floats] | None:
-    """Return norms and the disturbed step's response (None if either fails). `times` scales the difference step."""
+    """Return norms and response of the disturbed step, or None if a walk falls. `times` scales the difference step."""
     d, h = gait.z.size, times * gait.step_map.probe
 
     def step_after(size: float) -> Floats | None:

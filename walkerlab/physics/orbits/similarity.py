@@ -31,8 +31,8 @@ class Units(NamedTuple):
     def impulse(self) -> float:
         return self.mass * self.length / self.time
 
-    def size_of(self, unit: str) -> float:
-        """Return the walker's unit, in SI, with the dimension of `unit` (as in the config).
+    def natural_unit(self, unit: str) -> float:
+        """Return the walker's natural unit, in SI, for a quantity with the config's `unit`, such as 'N m'.
 
         Raises KeyError if unknown.
         """

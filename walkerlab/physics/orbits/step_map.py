@@ -124,7 +124,7 @@ class StepMap(Stepper, Protocol):
         return z
 
     def sample_legs(self, z: Floats, p: float, heights_m: Floats, times_s: Floats) -> Floats:
-        """Sample both legs' angles (times, 2) from the vertical in a disturbed walk, first swing leg first.
+        """Sample the angles (times, 2) of both legs in a disturbed walk; the leg that swings first is column 0.
 
         times_s  increasing times from the first heel strike on, all before the last heel strike
         """

@@ -88,17 +88,23 @@ STRIDES = Option("--strides", "strides", "N", "Strides to walk; one stride is tw
 
 
 def recording_options(block: str, *needs: str) -> tuple[Option, ...]:
-    """Return the options for what a recorded file does not state, as keys of a block. Each needs some flags."""
+    """Return options for facts that a recorded file does not state. They set keys of a block, and need some other
+    flags.
+    """
     options = (
         Option("--columns", "columns", "QUANTITY=COLUMN,...", "Columns: NAME, -NAME, NAME+90deg, HIP>FOOT.", "pairs"),
         Option("--units", "units", "KIND=UNIT,...", "Units that the file lacks.", "units"),
         Option("--walks", "walks", "left|right|away|towards", "Direction of the walk in the picture."),
-        Option("--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line that angles are from."),
+        Option(
+            "--camera-tilt", "camera_tilt_deg", "DEG|floor|free", "Lean of the line from which angles are measured."
+        ),
         Option("--belt-speed", "belt_speed_m_s", "M/S", "Speed of a treadmill's belt.", "float"),
         Option("--fps", "fps", "N", "Frames per second of the film.", "float"),
         Option("--from-s", "from_s", "S", "Time at which the part to read begins.", "float"),
         Option("--to-s", "to_s", "S", "Time at which the part to read ends.", "float"),
-        Option("--min-likelihood", "min_likelihood", "P", "Likelihood of a marker below which it is a gap.", "float"),
+        Option(
+            "--min-likelihood", "min_likelihood", "P", "Likelihood below which a marker counts as missing.", "float"
+        ),
     )
     return tuple(replace(option, key=f"{block}.{option.key}", needs=needs) for option in options)
 
@@ -174,7 +180,7 @@ class Stage:
         if self.why_no_such_legs(config) is not None:
             raise ConfigError(
                 f"{target} needs two equal legs, but those of this walker differ.",
-                f"Leave out what differs in the second leg, or ask another stage, such as {', '.join(WALKED)}.",
+                f"Leave out what differs in the second leg, or run another stage, such as {', '.join(WALKED)}.",
             )
         # Imported here: the command line's help needs neither.
         from walkerlab.config.walkers import contact_required_error, contact_to_add

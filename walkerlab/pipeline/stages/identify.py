@@ -43,7 +43,7 @@ FEWER: Final = "Fit fewer parameters, add measured values as priors (--prior), o
 
 
 def run(config: IdentifyConfig, inputs: Mapping[str, Content], progress: Progress) -> Content:
-    """Fit the measured walk.
+    """Fit the config's parameters to the measured walk.
 
     Raises ConfigError for an invalid config or file, NoAnswer if no fit converges.
     """
@@ -111,7 +111,7 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
     problems = list[NoAnswer]()
     for measured in file.divisions():
         try:
-            answers.append(divide_again(file, ask, ask(measured)))
+            answers.append(refit_with_new_strikes(file, ask, ask(measured)))
         except NoAnswer as error:
             problems.append(error)
             continue
@@ -122,12 +122,10 @@ def identify_divided(file: MeasuredFile, ask: Callable[[MeasuredWalk], Identific
     return max(answers, key=lambda answer: answer.verdict.usable)
 
 
-def divide_again(
+def refit_with_new_strikes(
     file: MeasuredFile, ask: Callable[[MeasuredWalk], Identification], before: Identification
 ) -> Identification:
-    """Repeat a fit if the identified slope, sensors or soles move heel strikes, and keep the old fit if the new one is
-    bad.
-    """
+    """Fit again if the identified slope, sensors or soles move heel strikes, or keep the old fit if this one is bad."""
     if not before.measured.sampled:
         return before
     identified = identified_config(file.config, before)
@@ -197,7 +195,7 @@ def content_of(config: IdentifyConfig, result: Identification) -> Content:
 
 
 def prior_row(estimate: Estimate, pull: Pull, sigma: float) -> dict[str, Any]:
-    """Return a prior, with its distance from the walk's own estimate in standard errors of the difference."""
+    """Return a prior, with its distance from the estimate by the walk alone, in standard errors of the difference."""
     return {
         "key": pull.key,
         "value": pull.value,
@@ -233,7 +231,7 @@ def step_group(result: Identification) -> Group:
 
 
 def angle_residuals(result: Identification) -> Floats:
-    """Return measured minus predicted angles (samples, 2) on the most probable floor."""
+    """Return the measured minus the predicted angles (samples, 2), given the most probable floor heights."""
     return result.fitted.residuals[-result.measured.angles_rad.size :].reshape(-1, 2)
 
 
@@ -258,8 +256,8 @@ def identified_config(config: IdentifyConfig, result: Identification) -> Identif
 
 
 def motions(config: IdentifyConfig, result: Identification) -> dict[str, Group]:
-    """Build the identified and measured motions of the first steps, or return an empty mapping for kneed walkers (no
-    shank angles are read).
+    """Build the identified and measured motions of the first steps, or an empty mapping for kneed walkers,
+    because their shank angles are not read.
 
     Both motions use the identified footholds and the same phases; angles are corrected for sensor offset and gain.
 

@@ -50,7 +50,7 @@ MIN_STEPS: Final = 2
 MOST_STEPS: Final = 500  # each step adds an unknown floor height, and time grows as steps cubed
 DATA_KEY: Final = ("identify", "data")
 SLOPE_KEY: Final = "slope_deg"
-SAME_TOUCHES: Final = 0.002  # rad, largest change of the sum of leg angles at heel strike that counts as no change
+SAME_TOUCHES: Final = 0.002  # rad; a smaller change of the sum of leg angles at heel strike counts as no change
 
 
 def digests(config: Config) -> Mapping[str, str]:
@@ -61,7 +61,7 @@ def digests(config: Config) -> Mapping[str, str]:
 
 
 class MeasuredFile:
-    """The file of an `identify` block, as steps or angles, as `block.level` says. It is read once.
+    """Contents of the file that an `identify` block names, as steps or angles (`block.level`). The file is read once.
 
     Raises ConfigError if it cannot be read.
     """
@@ -104,7 +104,7 @@ class MeasuredFile:
     def divide_at(self, touch_sum_rad: float, config: RigidConfig | None = None) -> MeasuredWalk:
         """Divide the angles into steps. At heel strike the sum of the leg angles is `touch_sum_rad`.
 
-        config  walker whose soles come down, if not the file's
+        config  config of the walker; None for that of the file
         """
         steps = self.find_steps(touch_sum_rad) if config is None else self.steps_of(config, touch_sum_rad)
         if steps.touch_time_s.size < MIN_STEPS:
@@ -118,7 +118,7 @@ class MeasuredFile:
         return replace(measured, resolution={LEG_ANGLE: self.resolution}, first_leg=2 if steps.swapped else 1)
 
     def doubts(self) -> tuple[str, ...]:
-        """Return sentences about oddities in the angles, and about their corrections."""
+        """Describe, in sentences, the oddities of the angles and how they were handled."""
         if self.steps is not None:
             return ()
         try:
@@ -145,9 +145,9 @@ def touch_sums(walk: RecordedWalk, block: Identify, config: RigidConfig) -> Iter
 
 
 def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]:
-    """Read the recording in the block's file, and return it with the smallest decimal place of its angles (rad).
+    """Read the recording in the block's file. Return it with the smallest decimal place of its angles (rad).
 
-    That is 0 for angles that are computed from markers.
+    The decimal place is 0 for angles that are computed from markers.
     """
     recording = read_recording(Path(block.data), DATA_KEY)
     if recording.levelled_by and block.camera_tilt_deg is None and SLOPE_KEY in block.keys:
@@ -167,7 +167,7 @@ def read_angles(block: Identify, slope_rad: float) -> tuple[RecordedWalk, float]
 
 def smallest_decimal(values: Floats) -> float:
     """Return the smallest decimal place that the values use: 0.001 for 0.72 and 0.725, 1 for whole numbers."""
-    return next((10.0**-place for place in range(16) if np.array_equal(np.round(values, place), values)), 0.0)
+    return next((10.0**-index for index in range(16) if np.array_equal(np.round(values, index), values)), 0.0)
 
 
 def read_steps(path: Path, block: Identify, slope_rad: float) -> MeasuredWalk:

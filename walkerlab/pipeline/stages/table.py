@@ -34,9 +34,9 @@ def check_laws(config: Config) -> None:
         load("walkerlab.scene.contact:ground_laws")(contact)
 
 
-MODEL_HELP = "Model whose gaits to study."
+MODEL_HELP = "Model whose gaits are studied."
 ESTIMATED = (
-    Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, or also its bounds.", "bounds-or-none"),
+    Option("--fit", "identify.fit", "KEY[=A:B]", "Key to estimate, with optional bounds.", "bounds-or-none"),
     Option("--prior", "identify.prior", "KEY=VALUE:SIGMA", "Known value, and its standard deviation.", "bounds"),
     Option("--nuisance", "identify.nuisance", "NAME", "Property of clock or sensors to estimate as well.", "texts"),
     Option("--model", "identify.model", "rigid|contact|both", "Model to fit."),

@@ -195,7 +195,7 @@ def remove_leftovers(folder: Path) -> list[Path]:
 
 
 FORMULA = re.compile(r"[=+\-@\t\r]")
-"""First character of a text that a spreadsheet would evaluate."""
+"""Pattern of the first character of texts that a spreadsheet would evaluate."""
 NUMERAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 

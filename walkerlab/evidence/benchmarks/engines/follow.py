@@ -163,7 +163,7 @@ class RuleFollower:
             else:
                 self._end(contact_transitions.touch(form, walk_state, feet_at_event, foot, time_at_event, y))
         completed = walk_state.progress.steps == walk_state.touch_time.size
-        if completed and not contact_state.is_to_lift(walk_state):
+        if completed and not contact_state.has_not_lifted(walk_state):
             self._end(Outcome.WALKED)
 
     def _turning(self, h: float, now: Feet, bends: list[tuple[float, float]]) -> Turn | None:
