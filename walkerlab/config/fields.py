@@ -178,7 +178,7 @@ def describe_type(annotation: Any) -> str:
     if origin is Annotated:
         return describe_type(get_args(annotation)[0])
     if origin is Literal:
-        return "word"
+        return _KINDS[int] if isinstance(get_args(annotation)[0], int) else "word"
     if origin is tuple:
         return "list"
     if origin in (Union, types.UnionType):
@@ -189,10 +189,10 @@ def describe_type(annotation: Any) -> str:
 
 
 def words_of(annotation: Any) -> tuple[str, ...]:
-    """Return the words that a type allows, including those inside a list or union."""
+    """Return the words and numbers that a type lists, including those inside a list or union, as text."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
-        return tuple(word for word in parts if isinstance(word, str))
+        return tuple(map(str, parts))
     return tuple(chain.from_iterable(map(words_of, parts)))
 
 
@@ -202,8 +202,11 @@ def bounds_of(field: FieldInfo) -> str:
     what = describe_type(field.annotation)
     if description:
         return description
-    if what in ("word", _KINDS[bool]):
-        return ", ".join(words_of(field.annotation)) or what
+    if what == _KINDS[bool]:
+        return what
+    words = words_of(field.annotation)
+    if words and what in ("word", _KINDS[int]):
+        return ", ".join(words)
     limits = {sign: getattr(item, sign) for item in field.metadata for sign, _ in _SIGNS if hasattr(item, sign)}
     if limits.keys() == {"ge", "le"}:
         return f"from {short_number(limits['ge'])} to {short_number(limits['le'])}"
@@ -218,7 +221,7 @@ def describe_allowed(field: FieldInfo) -> str:
     bounds = bounds_of(field)
     unit = annotation_of(field, "unit")
     what = describe_type(field.annotation)
-    if what == "word":
+    if what == "word" or bounds == ", ".join(words_of(field.annotation)) != "":
         return f"one of {bounds}" if "," in bounds else bounds
     if what in _KINDS.values():
         bounds = f"{what}, {bounds}" if bounds not in ("", what, f"any {what}") else what
